@@ -1,17 +1,40 @@
 """Adapters of a chain with segments on several ports."""
 
-from pydantic import Field
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, Field
 
 from snakewalk.config.base import Strict
 
 SIMULATED = "sim"
 """The port of servos that are simulated while the others of the chain are real."""
+URL_SCHEMES: Final = ("socket", "rfc2217", "loop")
+"""Schemes of URLs that may be a port; others of pyserial, such as ``spy``, write to files."""
+
+
+def port_fault(port: str) -> str | None:
+    """Return the fault of a port's name; None for a device, and for a URL of a known scheme."""
+    scheme, separator, _ = port.partition("://")
+    if not separator or scheme.lower() in URL_SCHEMES:
+        return None
+    known = [f"{each}://" for each in URL_SCHEMES]
+    return (
+        f"a port cannot be a {scheme}:// URL; use {', '.join(known[:-1])} or {known[-1]}, "
+        "or the path of a device"
+    )
+
+
+def _checked(port: str) -> str:
+    fault = port_fault(port)
+    if fault is not None:
+        raise ValueError(f"{port}: {fault}")
+    return port
 
 
 class PortConfig(Strict):
     """One adapter, and the segment of the chain that is behind it."""
 
-    port: str = Field(
+    port: Annotated[str, AfterValidator(_checked)] = Field(
         min_length=1,
         description="a device such as /dev/ttyUSB0, a URL such as socket://host:5000, or sim: "
         "these servos are simulated, and the others are real",

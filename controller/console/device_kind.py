@@ -1,9 +1,12 @@
 """Kind of a device by its name; opening it would change lines of an adapter."""
 
 import os
+import re
 import stat
 from pathlib import Path
+from typing import Final
 
+from snakewalk.config.robot.ports import port_fault
 from snakewalk.drivers.errors import PortError
 
 try:
@@ -13,12 +16,13 @@ except ImportError:  # Windows: opening a port reports the remedy
 
 _NO_DEVICES = ("sim", "robot")
 """Names for simulated servos, and for the ports in the robot's file."""
+_IDS: Final = re.compile(r"\s*\d[\d\s-]*=")
 _PSEUDO_TERMINALS = range(136, 144)
 """Major numbers of Linux's pseudo-terminals, which have no entry below ``/sys/dev/char``."""
 
 
 def check_port_name(port: str | None) -> str | None:
-    """Return ``--port`` if no name in it is a file, a folder or another kind of device.
+    """Return ``--port`` if each name in it is a URL of a known scheme, or may be a serial device.
 
     A missing name passes; opening it reports that.
 
@@ -28,7 +32,7 @@ def check_port_name(port: str | None) -> str | None:
     """
     if port is None:
         return None
-    names = [part.rpartition("=")[2] for part in port.split(",")] if "=" in port else [port]
+    names = [_IDS.sub("", part, count=1) for part in port.split(",")]
     faults = [fault for fault in map(_fault, names) if fault is not None]
     if faults:
         raise PortError(faults)
@@ -36,6 +40,8 @@ def check_port_name(port: str | None) -> str | None:
 
 
 def _fault(name: str) -> str | None:
+    if (fault := port_fault(name)) is not None:
+        return f"{name}: {fault}"
     if termios is None or name in _NO_DEVICES:
         return None
     path = Path(name)

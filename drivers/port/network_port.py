@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import serial
 
+from snakewalk.config.robot.ports import port_fault
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import is_url
@@ -22,8 +23,8 @@ NETWORK_LATENCY_S: Final = 0.1
 """How late a reply may be besides its wire time: a local network and its server (ours)."""
 _POLL_S: Final = 0.001
 """Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
-_FIXED: Final = ("socket://",)
-"""URLs that carry no baud rate: that of the far end stays what it is."""
+_FIXED: Final = ("socket",)
+"""Schemes that carry no baud rate: that of the far end stays what it is."""
 _TO_A_HOST: Final = ("socket", "rfc2217")
 
 
@@ -46,7 +47,8 @@ class NetworkPort(LinePort):
     """A line behind pyserial's URL handlers; implements ``BytePort``.
 
     Raises:
-        PortError: (when opened) no server, or an unknown kind of URL; (later) the line is gone.
+        PortError: (when opened) no server, or no scheme of ``URL_SCHEMES``; (later) the line is
+            gone.
 
     """
 
@@ -82,13 +84,20 @@ class NetworkPort(LinePort):
             raise self._lost(error) from error
         return got
 
+    @property
+    def _scheme(self) -> str:
+        return self._name.partition("://")[0].lower()
+
     def setBaudRate(self, baudrate: int) -> bool:
-        if self._name.startswith(_FIXED):
+        if self._scheme in _FIXED:
             return baudrate == self._baud
         return super().setBaudRate(baudrate)
 
     def _open(self) -> None:
-        kind = self._name.partition("://")[0]
+        fault = port_fault(self._name)
+        if fault is not None:
+            raise PortError(f"{self._name}: {fault}")
+        kind = self._scheme
         if kind in _TO_A_HOST and not _names_host_and_port(self._name):
             raise PortError(
                 f"{self._name}: cannot be opened: expected {kind}://HOST:PORT, as {kind}://pi:5000"

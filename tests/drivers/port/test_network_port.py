@@ -4,8 +4,10 @@ Servos and host share simulated time, which stands still while bytes are under w
 operating system: however busy the machine is, no reply is late.
 """
 
+import importlib.resources
 import math
 import queue
+import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
@@ -17,13 +19,17 @@ import pytest
 import serial
 import serial.rfc2217
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.config.robot.ports import URL_SCHEMES
 from snakewalk.config.run import SafetyConfig
 from snakewalk.controller.bench import torque_off
 from snakewalk.controller.bench.adapter import permission
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.cli.main import main
+from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import PortError
@@ -252,10 +258,42 @@ def test_a_read_ends_with_its_bytes_or_its_deadline_and_noise_holds_nobody() -> 
         assert port.getBytesAvailable()  # the noise goes on
 
 
-@pytest.mark.parametrize("url", ["telephone://127.0.0.1:1", "socket://127.0.0.1", "socket://"])
+@pytest.mark.parametrize("url", ["socket://127.0.0.1", "socket://"])
 def test_a_url_that_leads_nowhere_is_told(url: str) -> None:
     with pytest.raises(PortError, match=f"{url}: cannot be opened"):
         NetworkPort(url)
+
+
+def schemes_of_pyserial() -> list[str]:
+    handlers = importlib.resources.files("serial.urlhandler").iterdir()
+    found = (re.fullmatch(r"protocol_(\w+)\.py", each.name) for each in handlers)
+    return [each[1] for each in found if each]
+
+
+def test_only_three_schemes_of_pyserial_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = list[str]()
+    monkeypatch.setattr(serial, "serial_for_url", lambda url, *_, **__: opened.append(url))
+    schemes = schemes_of_pyserial()
+    assert {"spy", "hwgrep", "alt", *URL_SCHEMES} <= set(schemes)
+    for scheme in [*schemes, "telephone", "SPY"]:
+        url = f"{scheme}://127.0.0.1:5000?file={tmp_path}/precious"
+        if scheme in URL_SCHEMES:
+            with suppress(AttributeError):  # the line that is None
+                NetworkPort(url)
+            assert opened.pop() == url
+        else:
+            for use in (NetworkPort, open_port, check_port_name, check_ports_table):
+                with pytest.raises(InputError, match=f"a port cannot be a {scheme}:// URL; use"):
+                    use(url)
+    assert opened == []
+    assert not list(tmp_path.iterdir())
+
+
+def check_ports_table(url: str) -> None:
+    tables = [{"port": url, "ids": [1]}, {"port": "sim", "ids": [2]}]
+    checked(RobotConfig, {"name": "x", "joint_axes": "yp", "ports": tables}, "robot.toml")
 
 
 @pytest.mark.parametrize("place", ["", "pi", "pi:", "pi:0", "pi:65536", "pi:x", ":5000", "[::1"])
@@ -279,7 +317,7 @@ def test_a_url_without_host_and_port_is_told_what_is_expected(kind: str, place: 
         "bus set --id 1 --new-id 2",
     ],
 )
-def test_commands_take_a_url(
+def test_commands_reject_a_url_that_writes_to_a_file(
     command: str,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -287,12 +325,15 @@ def test_commands_take_a_url(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    words = ["snakewalk", *command.split(), "--port", "telephone://127.0.0.1:1"]
+    precious = tmp_path / "precious"
+    precious.write_text("results")
+    words = ["snakewalk", *command.split(), "--port", f"spy:///dev/null?file={precious}"]
     monkeypatch.setattr("sys.argv", words)
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
-    assert "telephone://127.0.0.1:1: cannot be opened" in capsys.readouterr().err
+    assert f"{words[-1]}: a port cannot be a spy:// URL" in capsys.readouterr().err
+    assert precious.read_text() == "results"
 
 
 def test_a_device_is_opened_as_before(servo_bus: Callable[..., Any]) -> None:
