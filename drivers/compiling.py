@@ -8,6 +8,7 @@ A light install of the test fixture has no numba (docs/start/ci.md), and runs th
 import sys
 from array import array
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from typing import Any, TypeVar
 
@@ -57,8 +58,8 @@ def compiled(
             options = _UNCOUNTED
         # numba's cache does not know the options: a forced fallback would share its files
         cached = makes_arrays or not is_forced("numba")
-        made: F = numba.njit(signature, nogil=nogil, error_model=model, cache=cached, **options)(
-            function
+        made: F = _jitted(
+            function, signature, cached=cached, nogil=nogil, error_model=model, **options
         )
         stats = getattr(made, "stats", None)
         if cached and stats is not None and stats.cache_misses:
@@ -66,6 +67,40 @@ def compiled(
         return made
 
     return decorate
+
+
+def compiled_when_called(function: F) -> F:
+    """Compile a function of the physics for the types of its first call; it is cached."""
+    return _jitted(function, None, cached=True, error_model="numpy")
+
+
+def _jitted(function: F, signature: Any, *, cached: bool, **options: Any) -> F:
+    """Return numba's dispatcher of a function, compiled if a signature is given."""
+    made: Any = _numba().njit(**options)(function)
+    if cached:
+        made._cache = _cache_of(made)
+    if signature is not None:
+        made.compile(signature)
+        made.disable_compile()
+    loop: F = made
+    return loop
+
+
+def _cache_of(loop: Any) -> Any:
+    """Return the cache of a dispatcher; numba's own, or none, if its private classes differ."""
+    try:
+        from snakewalk.drivers.loop_cache import LoopCache  # noqa: PLC0415  numba may be missing
+
+        return LoopCache(loop.py_func)
+    except (ImportError, AttributeError, TypeError) as error:
+        report_fallback(
+            "cache",
+            f"loops are cached only in numba's own folders ({type(error).__name__}: {error}); "
+            "install a version of numba that snakewalk's metadata names",
+        )
+    with suppress(RuntimeError):  # no folder is writable
+        loop.enable_caching()
+    return loop._cache
 
 
 def is_compiling() -> bool:
@@ -114,7 +149,7 @@ def _can_skip_counting() -> bool:
         fault = "the environment asks for it"
     else:
         try:
-            loop = numba.njit("float64(float64[::1])", cache=True, **_UNCOUNTED)(_doubled)
+            loop = _jitted(_doubled, "float64(float64[::1])", cached=True, **_UNCOUNTED)
             memory = array("d", [1.0, 2.0, 3.0])
             values = np.frombuffer(memory)
             before = sys.getrefcount(memory), sys.getrefcount(values)

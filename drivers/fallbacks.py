@@ -5,6 +5,7 @@ One module wraps each, checks it once per process, and reports a fallback here.
 | name | wrapped in | fallback |
 | --- | --- | --- |
 | ``numba`` | ``drivers.compiling`` (option ``_nrt``) | loops count references to their arrays |
+| ``cache`` | ``drivers.loop_cache`` (numba's cache of functions) | numba's own folders, or none |
 | ``mujoco`` | ``sim.physics.layout`` (memory of ``mjData``) | ``sim.physics.public_steps`` |
 
 The environment variable ``SNAKEWALK_FALLBACK`` forces fallbacks: names, separated by commas.
@@ -15,7 +16,7 @@ import os
 from typing import Final, Literal
 
 ENVIRONMENT: Final = "SNAKEWALK_FALLBACK"
-Interface = Literal["numba", "mujoco"]
+Interface = Literal["numba", "cache", "mujoco"]
 
 _reported: dict[Interface, str] = {}
 

@@ -6,9 +6,9 @@ step.
 
 import mujoco
 import numpy as np
-from numba import njit
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled_when_called
 from snakewalk.sim.physics.friction import make_lanes
 from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.step_forces import apply_forces, has_friction, settle
@@ -30,9 +30,9 @@ from snakewalk.sim.plant import ServoDrive
 _AT = ContactFields(size=9, dist=0, place=1, normal=4, geom=14, row=16)
 """Fields of a copied contact; geoms and row are integers in its last two words."""
 
-_apply = njit(cache=True, error_model="numpy")(apply_forces)
+_apply = compiled_when_called(apply_forces)
 
-_settle = njit(cache=True, error_model="numpy")(settle)
+_settle = compiled_when_called(settle)
 
 
 class PublicSteps:

@@ -11,11 +11,12 @@ from typing import Any, Protocol
 
 import mujoco
 import numpy as np
-from numba import carray, njit
+from numba import carray
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.compiling import compiled_when_called
 from snakewalk.drivers.fallbacks import report_fallback
 from snakewalk.sim.physics.addresses import call, call_with, pointer
 from snakewalk.sim.physics.belly_contacts import (
@@ -169,7 +170,7 @@ register_jitable(error_model="numpy")(_find_contacts)
 
 register_jitable(error_model="numpy")(_step1)
 
-run_steps = njit(cache=True, error_model="numpy")(_run)
+run_steps = compiled_when_called(_run)
 
 
 class CompiledSteps:
