@@ -28,6 +28,8 @@ MOST_BYTES: Final = 1_000_000_000
 MOST_TEXT_RATIO: Final = 20
 MOST_TEXT_BYTES: Final = 500_000_000
 """The same limit for JSON (ours): parsing needs several times its size in memory."""
+MOST_LOG_BYTES: Final = 16_000_000_000
+"""The same limit for a log, which is read row by row (ours): 30 hours of 16 servos at 50 Hz."""
 MOST_JSON_BYTES: Final = 64_000_000
 """Limit of a JSON file that is read at once (ours)."""
 MOST_STORAGE_BYTES: Final = 1_000_000
@@ -148,7 +150,14 @@ def check_matrices(file: Path) -> None:
         )
 
 
-def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = False) -> None:
+def check_expansion(
+    file: Path,
+    packed: int,
+    unpacked: int,
+    *,
+    text: bool = False,
+    most_bytes: int | None = None,
+) -> None:
     """Check the unpacked size of a file before unpacking.
 
     Args:
@@ -156,12 +165,14 @@ def check_expansion(file: Path, packed: int, unpacked: int, *, text: bool = Fals
         packed: bytes of the file.
         unpacked: stated bytes of its content.
         text: whether the content is JSON.
+        most_bytes: another limit of ``unpacked`` than the usual one.
 
     Raises:
         InputError: more than ``FREE_BYTES``, and more than the permitted ratio or size.
 
     """
     ratio, most = (MOST_TEXT_RATIO, MOST_TEXT_BYTES) if text else (MOST_RATIO, MOST_BYTES)
+    most = most if most_bytes is None else most_bytes
     if unpacked > max(FREE_BYTES, min(ratio * packed, most)):
         raise InputError(
             f"{file}: its {packed / 1e6:.3g} MB would expand to {unpacked / 1e6:,.0f} MB; at most "

@@ -368,7 +368,7 @@ def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
 
 def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
     try:
-        record = read_log(log)
+        record = read_log(log, is_ours=True)
         moved = travel(record)
         return record, write_summary(summary(record, moved), log.parent), moved
     except KeyboardInterrupt as stop:

@@ -15,10 +15,10 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from pydantic import ValidationError
 from zstandard import ZstdError, decompress, frame_content_size
 
-from snakewalk.config.archive import check_expansion
+from snakewalk.config.archive import MOST_LOG_BYTES, check_expansion
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.tables import record_of
+from snakewalk.controller.runlog.tables import RowPacker, record_of
 from snakewalk.controller.runlog.topics import FORMAT, ConfigTable
 from snakewalk.controller.runlog.writer import part_path
 
@@ -40,8 +40,12 @@ class LogError(InputError):
     """A log is missing, is another kind of file, or breaks off before its header ends."""
 
 
-def read_log(path: Path) -> RunRecord:
+def read_log(path: Path, *, is_ours: bool = False) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
+
+    Args:
+        path: the log.
+        is_ours: whether this process has written it, so that no limit of its expansion applies.
 
     Raises:
         LogError: the file does not exist, is not a log of ours, or its start is missing.
@@ -61,7 +65,8 @@ def read_log(path: Path) -> RunRecord:
         raise LogError(f"{path}: {error.strerror or error}{hint}") from None
     if not data.startswith(_MAGIC[: len(data)]) or not data:
         raise LogError(f"{path}: is not an MCAP log")
-    rows, last_s, complete, lost = _rows(path, data)
+    packer = RowPacker()
+    rows, last_s, complete, lost = _rows(path, data, packer, is_ours=is_ours)
     configs = rows[ConfigTable.topic.name]
     if not configs:
         if _whole_records(data)[1] and _crcs_agree(data) and not lost:
@@ -75,7 +80,7 @@ def read_log(path: Path) -> RunRecord:
     if lost:
         note += f"; {lost} damaged parts are left out"
     try:
-        return record_of(rows, complete=complete, note=note)
+        return record_of(rows, complete=complete, note=note, parts=packer.parts)
     except (LookupError, TypeError, ValueError, AttributeError, ValidationError) as error:
         raise LogError(f"{path}: is not a log of this version: {error}") from None
 
@@ -99,10 +104,13 @@ def _foreign(data: bytes) -> str:
     )
 
 
-def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool, int]:
+def _rows(
+    path: Path, data: bytes, packer: RowPacker, *, is_ours: bool
+) -> tuple[Rows, float, bool, int]:
     """Rows by topic, time of the last one, whether the file is whole, and its damaged parts."""
     end, complete, unpacked = _whole_records(data)
-    check_expansion(path, len(data), unpacked, text=True)
+    if not is_ours:
+        check_expansion(path, len(data), unpacked, most_bytes=MOST_LOG_BYTES)
     complete = complete and _crcs_agree(data)
     rows: Rows = defaultdict(list)
     lost = list[str]()
@@ -116,7 +124,9 @@ def _rows(path: Path, data: bytes) -> tuple[Rows, float, bool, int]:
                 row = json.loads(record.data)
                 if not isinstance(row, dict):
                     raise ValueError("a row is a JSON object")
-                rows[topics[record.channel_id]].append(row)
+                topic = topics[record.channel_id]
+                rows[topic].append(row)
+                packer.pack(topic, rows)
                 last_ns = max(last_ns, record.log_time)
     except _BROKEN:
         complete = False  # the end of a cut file comes as an error too; damage fails a CRC

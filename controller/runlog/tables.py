@@ -1,9 +1,10 @@
 """Rows to tables: lists of JSON objects become arrays with one entry for each row."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import fields, replace
 from itertools import pairwise
-from typing import Any, Final, TypeVar, get_type_hints
+from typing import Any, Final, TypeVar, cast, get_type_hints
 
 import numpy as np
 
@@ -28,24 +29,65 @@ _TABLES: Final[Mapping[str, type[Table]]] = {
 """Tables of a record, by attribute."""
 
 
+_ROWS: Final = 4096
+"""Rows that become arrays at a time (ours): a row needs ten times the memory of its arrays."""
+
+
+class RowPacker:
+    """Turns rows into arrays while a long log is read, after the row of its configuration."""
+
+    def __init__(self) -> None:
+        self.parts: dict[type[Table], list[Table]] = {}
+        """Tables of the rows so far, in their order."""
+        self._kinds = {kind.topic.name: kind for kind in _TABLES.values()}
+        self._sizes: dict[str, int] = {}
+
+    def pack(self, topic: str, rows: dict[str, list[dict[str, Any]]]) -> None:
+        """Move the rows of a topic to ``parts`` if there are many.
+
+        Rows that are not of this version stay; ``record_of`` reports them.
+        """
+        kind = self._kinds.get(topic)
+        if kind is None or len(rows[topic]) < _ROWS or not rows[ConfigTable.topic.name]:
+            return
+        with suppress(LookupError, TypeError, ValueError, AttributeError):
+            self._sizes = self._sizes or _sizes(Header.of(rows[ConfigTable.topic.name][0]))
+            part = table_of(kind, rows[topic], self._sizes)
+            self.parts.setdefault(kind, []).append(part)
+            rows[topic] = []
+
+
+def _sizes(header: Header) -> dict[str, int]:
+    return {JOINT: header.robot.joint_count, LINK: header.robot.link_count}
+
+
 def record_of(
-    rows: Mapping[str, Sequence[Row]], *, complete: bool, note: str, header: Header | None = None
+    rows: Mapping[str, Sequence[Row]],
+    *,
+    complete: bool,
+    note: str,
+    header: Header | None = None,
+    parts: Mapping[type[Table], Sequence[Table]] | None = None,
 ) -> RunRecord:
     """Build the record from rows by topic; the first ``ConfigTable`` row is the header's.
 
-    ``header`` replaces it, for example if the rows contain none.
+    ``header`` replaces it, for example if the rows contain none. ``parts`` are the tables of
+    earlier rows.
 
     Raises:
         KeyError: a row lacks a field.
+        ValueError: parts have different shapes.
         pydantic.ValidationError: the configuration is not of this version.
 
     """
     if header is None:
         header = Header.of(rows[ConfigTable.topic.name][0])
-    sizes = {JOINT: header.robot.joint_count, LINK: header.robot.link_count}
+    sizes = _sizes(header)
+    earlier = parts or {}
 
     def table(kind: type[T]) -> T:
-        return table_of(kind, rows.get(kind.topic.name, ()), sizes)
+        last = table_of(kind, rows.get(kind.topic.name, ()), sizes)
+        return _joined(kind, cast(Sequence[T], earlier.get(kind, ())), last)
 
     paths, changed, events = table(PathTable), table(WaypointTable), table(EventTable)
     waypoints = (
@@ -83,6 +125,20 @@ def table_of(kind: type[T], rows: Sequence[Row], sizes: Mapping[str, int]) -> T:
     return kind(
         **{each.name: _cells(each.name, columns[each.name], rows, sizes) for each in fields(kind)}  # type: ignore[arg-type]
     )
+
+
+def _joined(kind: type[T], parts: Sequence[T], last: T) -> T:
+    """Return the table of all parts."""
+    if not parts:
+        return last
+    cells: dict[str, Any] = {}
+    for name in (each.name for each in fields(kind)):
+        values = [getattr(part, name) for part in parts]
+        if len(getattr(last, name)):
+            values.append(getattr(last, name))
+        is_array = isinstance(values[0], np.ndarray)
+        cells[name] = np.concatenate(values) if is_array else sum(values, type(values[0])())
+    return kind(**cells)
 
 
 def _cells(name: str, column: Column, rows: Sequence[Row], sizes: Mapping[str, int]) -> Any:

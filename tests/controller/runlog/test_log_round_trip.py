@@ -2,13 +2,18 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from snakewalk.config import archive
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest, load_robot, load_run, load_world
+from snakewalk.controller.runlog import reader, tables
+from snakewalk.controller.runlog.column import Table
 from snakewalk.controller.runlog.reader import LogError, read_log
 from snakewalk.controller.runlog.record import PlanSummary, Winding
 from snakewalk.controller.runlog.tables import record_of
@@ -56,6 +61,43 @@ def test_every_table_comes_back(
     assert [e.kind for e in record.events] == ["start"]
     assert [t for t, _ in record.paths] == [0.0, 1.0]
     assert record.end_s == pytest.approx(119 * 0.02 + 0.004)
+
+
+def test_rows_that_are_packed_in_parts_are_the_same_rows(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path / "run.mcap", 120)
+    whole = read_log(path)
+    monkeypatch.setattr(tables, "_ROWS", 7)
+    packed = read_log(path)
+    compared = 0
+    for kind in fields(whole):
+        table = getattr(whole, kind.name)
+        if isinstance(table, Table):
+            for column in fields(table):
+                mine = getattr(getattr(packed, kind.name), column.name)
+                expected = getattr(table, column.name)
+                if isinstance(expected, np.ndarray):
+                    np.testing.assert_array_equal(mine, expected, strict=True)
+                else:
+                    assert mine == expected
+                compared += 1
+    assert compared > 60
+    assert packed.events == whole.events
+
+
+def test_a_log_longer_than_other_files_may_be_is_read(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only logs of other processes have a limit: a run's end must not fail because of its log."""
+    path = write(tmp_path / "run.mcap", 120)
+    for limit in ("FREE_BYTES", "MOST_BYTES", "MOST_TEXT_BYTES"):
+        monkeypatch.setattr(archive, limit, 1000)
+    assert len(read_log(path).cycle.time_s) == 120
+    monkeypatch.setattr(reader, "MOST_LOG_BYTES", 1000)
+    with pytest.raises(InputError, match=r"run\.mcap: its .* MB would expand to"):
+        read_log(path)
+    assert len(read_log(path, is_ours=True).cycle.time_s) == 120
 
 
 def test_slow_rows_only_on_change(write: Write, tmp_path: Path) -> None:
