@@ -277,8 +277,8 @@ def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
         line.latency_s = 0.0  # type: ignore[attr-defined]
         yield line
 
-    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
-    monkeypatch.setattr("snakewalk.controller.bench.commands.calibrate.open_port", opened)
+    for module in ("drivers.port.network_port", "controller.bench.commands.calibrate"):
+        monkeypatch.setattr(f"snakewalk.{module}.open_port", opened)
     return Trio(robot, line, tmp_path)
 
 

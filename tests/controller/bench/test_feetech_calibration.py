@@ -73,8 +73,8 @@ def trio(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
     def opened(device: str, baud: int) -> Iterator[BytePort]:
         yield line
 
-    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
-    monkeypatch.setattr("snakewalk.controller.bench.commands.calibrate.open_port", opened)
+    for module in ("drivers.port.network_port", "controller.bench.commands.calibrate"):
+        monkeypatch.setattr(f"snakewalk.{module}.open_port", opened)
 
     def straighten(_: object) -> None:
         assert not line.servos["Torque Enable"].any()

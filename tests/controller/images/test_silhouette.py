@@ -103,7 +103,9 @@ def test_a_light_bar_is_nothing_to_a_detector_of_dark_ones() -> None:
 
 def test_no_body_has_no_threshold() -> None:
     assert silhouette_of(EMPTY, EMPTY).status is FrameStatus.NOTHING
-    assert silhouette_of(EMPTY, EMPTY).area_px == 0.0
+    nothing = silhouette_of(EMPTY, EMPTY)
+    assert (nothing.area_px, nothing.noise_level, nothing.origin_px) == (0.0, 0.0, (0.0, 0.0))
+    assert not nothing.mask.any()
     assert body_threshold(apart()) is None
 
 
@@ -202,7 +204,7 @@ def test_pixels_that_touch_at_a_corner_are_one_part() -> None:
 
 def test_the_threshold_is_half_of_an_even_body() -> None:
     assert body_threshold(apart(BAR)) == pytest.approx(50.0)
-    uneven = apart(BAR, (20, 30, 10, 15, 80))  # half of it at 80: the 70th percentile is 100
+    uneven = apart(BAR, (20, 30, 10, 20, 80))  # two thirds of it at 80: the 70th percentile is 100
     assert body_threshold(uneven) == pytest.approx(50.0)
 
 

@@ -159,8 +159,8 @@ def test_a_sweep_computes_the_travel_of_a_point_once(
         calls.append(1)
         return displacement.gait_displacement(record)
 
-    monkeypatch.setattr(travels, "gait_displacement", counted)
-    monkeypatch.setattr(sweep_measure, "gait_displacement", counted)
+    for module in (travels, sweep_measure):
+        monkeypatch.setattr(module, "gait_displacement", counted)
     row = sweep_measure.measure(Point("lateral-undulation", "yaw16", "flat", 0, 0, 4.0))
     assert row.speed_m_s is not None
     assert len(calls) == 1

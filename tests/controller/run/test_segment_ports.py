@@ -47,8 +47,8 @@ class Bench:
                 raise PortError(f"{device}: no such port")
             return opened.enter_context(PtyPort(by_path[device], baud, clock))
 
-        monkeypatch.setattr(backend, "open_port", open_port)
-        monkeypatch.setattr(network_port, "open_port", open_port)
+        for module in (backend, network_port):
+            monkeypatch.setattr(module, "open_port", open_port)
         leave_out_pages(monkeypatch)
 
     def run(self, folder: Path, port: str, *words: str) -> Ended:

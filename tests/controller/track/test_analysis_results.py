@@ -178,6 +178,17 @@ def test_the_facts_are_the_numbers_of_the_results() -> None:
     assert planted(recording=replace(track(), length_m=0.31234567)).facts()["length_m"] == 0.312346
 
 
+def test_the_quartiles_are_of_all_known_pulses() -> None:
+    found = planted()
+    speeds = np.tile(np.arange(float(POINTS)), (PAIRS, 1))
+    speeds[1:] = np.nan
+    pulse = replace(found.pulse, points_per_frame=speeds)
+    facts = replace(found, pulse=pulse).facts()
+    quartiles = (24.75 * RATE_HZ / POINTS, 74.25 * RATE_HZ / POINTS)
+    assert facts["pulse_quartiles_body_lengths_s"] == pytest.approx(quartiles)
+    assert facts["pulse_measured_share"] == 0.333
+
+
 def test_facts_without_a_wave_or_a_pulse_are_none_and_state_the_reason() -> None:
     short = replace(planted(), wave=replace(WAVE, cycles=0.5)).facts()
     for name in ("frequency_hz", "waves_on_body", "wave_towards_tail", "wave_speed_body_lengths_s"):
@@ -197,17 +208,22 @@ def in_place(u: float, frames: int = 40, waves: float = 1.5) -> Track:
 
 
 @pytest.mark.parametrize(
-    ("u", "frames", "step"), [(4.0, 40, 1), (2.0, 40, 2), (8.0, 40, 1), (1.0, 40, 4), (1.0, 24, 3)]
+    ("u", "frames", "step"), [(4.0, 40, 1), (2.0, 40, 2), (8.0, 40, 1), (1.0, 40, 4), (1.0, 23, 2)]
 )
 def test_frames_are_compared_over_which_the_pattern_moves_four_points(
     u: float, frames: int, step: int
 ) -> None:
-    """24 frames are too few for that at one point a frame: an eighth of them is 3."""
+    """23 frames are too few for that at one point a frame: an eighth of them is 2."""
     found = analyse(in_place(u, frames, waves=4.5 if u < 2.0 else 1.5))
     assert found.pulse.step == step
     assert found.pulse.typical == pytest.approx(u, abs=0.03)
     assert found.advance is None
     assert found.energy.shape == (frames,)
+
+
+def test_a_shift_of_a_quarter_of_the_body_is_found() -> None:
+    """Neighbourhoods of nine points and 30 on either side fit on 100 points."""
+    assert analyse(in_place(25.0, waves=1.0)).pulse.typical == pytest.approx(25.0, abs=0.1)
 
 
 def test_an_analysis_needs_motion_and_four_frames() -> None:
