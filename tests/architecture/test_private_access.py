@@ -45,7 +45,9 @@ def patches(tree: ast.AST) -> int:
         if isinstance(node, ast.Call):
             words = ast.unparse(node.func).split(".")
             is_patch = words[0] in PATCHERS and words[-1] in PATCHES
-            count += is_patch and ast.unparse(node.args[0]) != "'sys.argv'"
+            target = ast.unparse(node.args[0]) if is_patch else ""
+            is_name = words != ["patch"] or target.startswith("'")
+            count += is_patch and is_name and target != "'sys.argv'"
     return count
 
 

@@ -145,8 +145,8 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     monkeypatch.setattr(walk_run, "forecast", short_forecast)
     monkeypatch.setattr(artifacts, "make_artifacts", few_artifacts)
     monkeypatch.setattr(artifacts, "_draw", lambda record, made="": artifacts._Drawn([], "", made))
-    monkeypatch.setattr(pool, "each", first_of)
-    monkeypatch.setattr(trials, "each", first_of)
+    for module in (pool, trials):
+        monkeypatch.setattr(module, "each", first_of)
     monkeypatch.setattr(
         graph_study, "run_study", lambda spec, name, repeats, seed: run_study(spec, name, 1, seed)
     )

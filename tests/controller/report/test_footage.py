@@ -121,6 +121,13 @@ def test_film_and_page_come_from_the_log_alone(make: Make, tmp_path: Path) -> No
     assert "data:video/mp4;base64," in made.report.read_text(encoding="utf-8")
 
 
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the pictures of a page, which other tests draw."""
+    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts._Drawn([], "", made))
+
+
+@pytest.mark.usefixtures("without_pictures")
 def test_what_cannot_be_drawn_is_said_in_a_line(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,8 +135,6 @@ def test_what_cannot_be_drawn_is_said_in_a_line(
         raise InputError("films need an OpenGL that draws without a screen")
 
     monkeypatch.setattr(artifacts, "film_run", nothing_draws)
-    # a page without pictures, of which others tell
-    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts._Drawn([], "", made))
     made = artifacts.make_artifacts(read_log(make(tmp_path / "run.mcap", seconds=1.0)), tmp_path)
     assert made.notes == ("no film: films need an OpenGL that draws without a screen",)
     assert made.film is None
@@ -137,6 +142,7 @@ def test_what_cannot_be_drawn_is_said_in_a_line(
     assert "<video" not in made.report.read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_an_interrupted_film_costs_neither_the_page_nor_an_older_film(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,8 +151,6 @@ def test_an_interrupted_film_costs_neither_the_page_nor_an_older_film(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(artifacts, "film_run", interrupted)
-    # a page without pictures, of which others tell
-    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts._Drawn([], "", made))
     log = make(tmp_path / "log.mcap", seconds=1.0)
     with pytest.raises(KeyboardInterrupt):
         artifacts.make_artifacts(read_log(log), tmp_path)

@@ -31,12 +31,14 @@ both_ways = pytest.mark.parametrize(
 )
 
 
-@both_ways
-def test_goals_are_the_nearest_positions_also_at_halves(
-    loop: Callable[..., bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def encoder(loop: Callable[..., bool], monkeypatch: pytest.MonkeyPatch) -> GoalEncoder:
     monkeypatch.setattr(joint_codec, "encode_goals", loop)
-    encoder = GoalEncoder(JOINTS)
+    return GoalEncoder(JOINTS)
+
+
+@both_ways
+def test_goals_are_the_nearest_positions_also_at_halves(encoder: GoalEncoder) -> None:
     rng = np.random.default_rng(5)
     halves = (rng.integers(-3000, 3000, (500, 3)) + 0.5) * UNITS.rad_per_position
     for goal in (*rng.normal(0.0, 1.5, (500, 3)), *halves, np.array([1e300, -1e300, 1e12])):
@@ -50,11 +52,7 @@ def test_goals_are_the_nearest_positions_also_at_halves(
 
 @both_ways
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_goals_that_are_not_finite_or_too_few_are_refused(
-    bad: float, loop: Callable[..., bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(joint_codec, "encode_goals", loop)
-    encoder = GoalEncoder(JOINTS)
+def test_goals_that_are_not_finite_or_too_few_are_refused(bad: float, encoder: GoalEncoder) -> None:
     with pytest.raises(ValueError, match="not finite"):
         encoder.encode(np.array([0.0, bad, 0.0]))
     with pytest.raises(ValueError, match="3 joints"):
