@@ -3,9 +3,8 @@
 import inspect
 import math
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
 from functools import wraps
-from typing import Any, get_type_hints
+from typing import Any
 
 import typer
 from typer.core import TyperCommand
@@ -77,8 +76,8 @@ def called(
     """Return the function of a command with the options that all commands have.
 
     It checks the files that the command names, of its input and of its results, before ``load``
-    imports what the command uses. A parameter whose type is a dataclass stands for the options that
-    are the fields of the dataclass.
+    imports what the command uses. A parameter whose type is a model stands for the options that are
+    the fields of the model (``console.option``).
 
     Args:
         declared: the command's signature, docstring and declaration.
@@ -89,7 +88,7 @@ def called(
     groups: dict[str, Any] = {
         name: one.annotation
         for name, one in signature.parameters.items()
-        if is_dataclass(one.annotation)
+        if _is_model(one.annotation)
     }
     given = [each for one in signature.parameters.values() for each in _options(one)]
     defaults = {one.name: one.default for one in given}
@@ -112,9 +111,7 @@ def called(
             refuse_to_overwrite([options[name] for name in info.results], force)
             refuse_to_overwrite([options[name] for name in info.tables], force=True)
             for name, group in groups.items():
-                options[name] = group(
-                    **{each.name: options.pop(each.name) for each in fields(group)}
-                )
+                options[name] = _model(group, options)
             return load()(**options)
 
     shared = [
@@ -133,12 +130,20 @@ def called(
     return command
 
 
+def _is_model(annotation: Any) -> bool:
+    return hasattr(annotation, "model_fields")
+
+
 def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
-    group = parameter.annotation
-    if not is_dataclass(group):
-        return [parameter]
-    hints = get_type_hints(group, include_extras=True)
-    return [
-        parameter.replace(name=each.name, default=each.default, annotation=hints[each.name])
-        for each in fields(group)
-    ]
+    if not _is_model(parameter.annotation):
+        return [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
+    from snakewalk.controller.console.option import parameters  # noqa: PLC0415  --help has no models
+
+    return [*parameters(parameter.annotation)]
+
+
+def _model(group: Any, options: dict[str, Any]) -> Any:
+    """Return a model from its options, which it takes out of the others."""
+    from snakewalk.controller.console.option import from_words  # noqa: PLC0415  --help has no models
+
+    return from_words(group, {name: options.pop(name) for name in group.model_fields})

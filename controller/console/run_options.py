@@ -1,7 +1,11 @@
 """The options of every command that moves a body."""
 
-from dataclasses import dataclass
+from typing import Annotated
 
+from pydantic import AfterValidator
+
+from snakewalk.config.base import Strict
+from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -15,14 +19,13 @@ from snakewalk.controller.console.options import (
 )
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RunOptions:
+class RunOptions(Strict):
     """Target of a run, its observers, and the display of its results.
 
     One parameter of this type declares all options of a command.
     """
 
-    port: RunPort = None
+    port: Annotated[RunPort, AfterValidator(check_port_name)] = None
     view: View = False
     view_at: ViewAt = VIEW_AT
     ros: Ros = False

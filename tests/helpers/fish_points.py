@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
+from snakewalk.controller.animals.fish.fish_synthesis import synthesise_motion
 from snakewalk.controller.animals.fish.swimmer import swim
+from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 
 SETS = 20
 
@@ -27,7 +28,7 @@ def main() -> None:
     for dimensions in (2, 3):
         rows = []
         for seed in range(SETS):
-            options = SynthesisOptions(through=points(dimensions, seed), mirror=True)
+            options = SynthesisOptions(through=tuple(points(dimensions, seed)), mirror=True)
             motion = synthesise_motion(truth, options).motion
             place = np.column_stack([motion.base, motion.height])[:, :dimensions]
             off = [np.linalg.norm(place - np.array(p), axis=1).min() for p in options.through]

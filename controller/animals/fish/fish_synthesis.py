@@ -32,37 +32,11 @@ from snakewalk.controller.animals.fish.synthesis import (
     save_motion,
     sequence_through,
 )
+from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 from snakewalk.controller.kinematics.retarget import Retarget
 
 _CAPTURE = 0.5
 """Distance from a control point, in body lengths, from which the way is bent to it (ours)."""
-
-
-@dataclass(frozen=True, slots=True)
-class SynthesisOptions:
-    """The options of a synthesis; angles in degrees, as on the command line."""
-
-    through: list[tuple[float, ...]]
-    """X, Y or X, Y, Z; all alike."""
-    seconds: float = 20.0
-    seed: int = 0
-    radius: float = 0.1
-    """Distance at which a control point is passed, body lengths."""
-    tank: tuple[float, float, float, float] | None = None
-    """Lowest x and y, highest x and y of the walls; None: no walls."""
-    avoid: tuple[Path, ...] = ()
-    """Motions of other fish, made by ``animal fish synthesise``."""
-    apart: float = 0.5
-    """Least distance from walls and other fish, body lengths."""
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Place and direction in degrees of the first posture."""
-    limit_s: float = 120.0
-    mirror: bool = False
-    within_deg: float = 4.0
-    merge_deg: float = 20.0
-    reference: str = "straight"
-    blend_s: float = 0.25
-    robot: str = "yaw16"
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from snakewalk.config.colours import BLUE, GREEN, GREY, INK, PALE, RED
-from snakewalk.controller.animals.fish.fish_synthesis import SynthesisedMotion, SynthesisOptions
+from snakewalk.controller.animals.fish.fish_synthesis import SynthesisedMotion
 from snakewalk.controller.animals.fish.synthesis import junctions
+from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.style import TIMES, WIDTH_IN, save_picture, style
 

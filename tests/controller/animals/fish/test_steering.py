@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.fish.fish_synthesis import SynthesisOptions, synthesise_motion
+from snakewalk.controller.animals.fish.fish_synthesis import synthesise_motion
 from snakewalk.controller.animals.fish.piece_graph import piece_graph
 from snakewalk.controller.animals.fish.segments import segment_motion
 from snakewalk.controller.animals.fish.steering import steered
 from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.animals.fish.synthesis import compose, sequence_through
+from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 
 TRUTH = swim()
 POINTS = [(3.0, 0.8, 0.3), (5.5, 2.6, -0.1)]
@@ -20,7 +21,7 @@ POINTS = [(3.0, 0.8, 0.3), (5.5, 2.6, -0.1)]
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_control_points_are_passed_within_a_tenth_of_a_length_by_default(dimensions: int) -> None:
     points = np.array(POINTS)[:, :dimensions]
-    made = synthesise_motion(TRUTH, SynthesisOptions(through=[tuple(p) for p in points],
+    made = synthesise_motion(TRUTH, SynthesisOptions(through=tuple(tuple(p) for p in points),
                                                      mirror=True))  # fmt: skip
     motion = made.motion
     place = np.column_stack([motion.base, motion.height])[:, :dimensions]
@@ -66,12 +67,12 @@ def test_steering_keeps_ends_and_turns_the_head_with_the_way() -> None:
 
 
 def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
-    other = synthesise_motion(TRUTH, SynthesisOptions(through=[(3.0, 0.0)], mirror=True))
+    other = synthesise_motion(TRUTH, SynthesisOptions(through=((3.0, 0.0),), mirror=True))
     other.save(tmp_path / "other.npz")
     ways = {}
     for avoid in ((), (tmp_path / "other.npz",)):
         made = synthesise_motion(TRUTH, SynthesisOptions(
-            through=[(0.5, -0.3)], mirror=True, start=(3.5, 0.3, 180.0), avoid=avoid, apart=0.6,
+            through=((0.5, -0.3),), mirror=True, start=(3.5, 0.3, 180.0), avoid=avoid, apart=0.6,
         ))  # fmt: skip
         mine, theirs = made.motion.base, other.motion.base
         count = min(len(mine), len(theirs))
@@ -81,12 +82,12 @@ def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
     assert ways[True] > 0.4
     np.savez(tmp_path / "x.npz", a=1)
     with pytest.raises(InputError, match="not a track of snakewalk animal fish synthesise"):
-        synthesise_motion(TRUTH, SynthesisOptions(through=[], avoid=(tmp_path / "x.npz",)))
+        synthesise_motion(TRUTH, SynthesisOptions(avoid=(tmp_path / "x.npz",)))
 
 
 def test_a_fish_stays_in_its_tank() -> None:
     tank = (-2.0, -2.0, 4.0, 3.0)
-    options = {"through": [], "seconds": 9.0, "mirror": True, "seed": 0}
+    options = {"seconds": 9.0, "mirror": True, "seed": 0}
     low, high = np.array(tank[:2]), np.array(tank[2:])
     free = synthesise_motion(TRUTH, SynthesisOptions(**options)).motion.points()
     assert np.minimum(free - low, high - free).min() < -0.2
@@ -95,7 +96,7 @@ def test_a_fish_stays_in_its_tank() -> None:
     assert np.minimum(body - low, high - body).min() > 0.0
     assert made.facts.wall_distance > 0.0
     with pytest.raises(InputError, match="does not start inside"):
-        synthesise_motion(TRUTH, SynthesisOptions(through=[], tank=(1.0, 1.0, 2.0, 2.0)))
+        synthesise_motion(TRUTH, SynthesisOptions(tank=(1.0, 1.0, 2.0, 2.0)))
 
 
 def test_points_at_the_end_of_a_motion_have_frames_of_their_own() -> None:

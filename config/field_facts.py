@@ -1,0 +1,52 @@
+"""Facts of a field of a schema: its description, and the bounds of its value."""
+
+from collections.abc import Iterator
+from types import UnionType
+from typing import Annotated, Any, Final, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+_SIGNS: Final = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+
+
+def description_of(field: FieldInfo) -> str:
+    """Return the description of a field, of its named type, or of the option that it is."""
+    if field.description:
+        return field.description
+    for rule in (*field.metadata, *_rules(field.annotation)):
+        text = getattr(rule, "description", None) or getattr(rule, "help", None)
+        if text:
+            return str(text)
+    return ""
+
+
+def bounds_of(field: FieldInfo) -> dict[str, float]:
+    """Return the bounds of a number: ``gt``, ``ge``, ``lt`` and ``le`` that the field has."""
+    rules = [*field.metadata]
+    for rule in _rules(field.annotation):
+        rules += rule.metadata if isinstance(rule, FieldInfo) else [rule]
+    return bounds_in(rules)
+
+
+def bounds_in(rules: list[Any]) -> dict[str, float]:
+    """Return the bounds among the rules of a type."""
+    return {
+        name: getattr(rule, name)
+        for name in _SIGNS
+        for rule in rules
+        if getattr(rule, name, None) is not None
+    }
+
+
+def bounds_text(bounds: dict[str, float]) -> str:
+    """Return bounds as a reader sees them: ``≥ 0, ≤ 1``."""
+    return ", ".join(f"{_SIGNS[name]} {value:g}" for name, value in bounds.items())
+
+
+def _rules(annotation: Any) -> Iterator[Any]:
+    """Yield the rules of a named type that may also be None."""
+    if get_origin(annotation) is Annotated:
+        yield from get_args(annotation)[1:]
+    elif get_origin(annotation) in {Union, UnionType}:
+        for part in get_args(annotation):
+            yield from _rules(part)

@@ -1,0 +1,161 @@
+"""Options of a command that are the fields of a model: one declaration for each.
+
+Name, type, bounds, default and description are those of the field, so a call from Python has the
+same defaults and bounds. ``Flag`` adds what only a command line has.
+"""
+
+import inspect
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+
+import typer
+from pydantic import BeforeValidator, ValidationError
+from pydantic.fields import FieldInfo
+from typer.models import ParameterInfo
+
+from snakewalk.config.base import Strict
+from snakewalk.config.errors import InputError
+from snakewalk.config.field_facts import bounds_of, description_of
+from snakewalk.config.value_faults import in_words
+from snakewalk.controller.console.completion import Complete
+
+M = TypeVar("M", bound=Strict)
+
+
+@dataclass(frozen=True, slots=True)
+class Flag:
+    """How a command line spells a field; part of the field's annotation."""
+
+    names: tuple[str, ...] = ()
+    """With dashes, ``--film/--no-film`` with an opposite; by default ``--`` and the field's."""
+    metavar: str | None = None
+    """Name of the value in the help."""
+    complete: Complete | None = None
+    """Completion of the value."""
+    is_argument: bool = False
+    """Whether the value has no name before it."""
+    shows_default: bool = True
+
+
+def numbers(form: str, *counts: int) -> BeforeValidator:
+    """Return a rule that reads numbers from a word: ``1,0.5,90``; ``form`` says what is expected.
+
+    ``counts`` are the valid numbers of numbers.
+    """
+
+    def split(given: Any) -> Any:
+        if not isinstance(given, str):
+            return given
+        try:
+            found = tuple(float(part) for part in given.split(","))
+        except ValueError:
+            found = ()
+        if len(found) not in counts or not all(map(math.isfinite, found)):
+            raise ValueError(form)
+        return found
+
+    return BeforeValidator(split)
+
+
+def parameters(model: type[Strict]) -> Iterator[inspect.Parameter]:
+    """Yield the parameter of each field of a model, as Typer reads it."""
+    for name, field in model.model_fields.items():
+        kind = _type_of_words(field)
+        yield inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if field.is_required() else _default(field, kind),
+            annotation=Annotated[kind, _typer_info(name, field, kind)],
+        )
+
+
+def from_words(model: type[M], values: Mapping[str, Any]) -> M:
+    """Return a model with the values of a command line.
+
+    Raises:
+        InputError: one line per value that the model rejects.
+
+    """
+    given = {
+        name: values[name]
+        for name, field in model.model_fields.items()
+        if not (values[name] is None and field.default == ())
+    }
+    try:
+        return model(**given)
+    except ValidationError as error:
+        raise InputError([_fault(model, dict(each)) for each in error.errors()]) from None
+
+
+def _fault(model: type[Strict], fault: dict[str, Any]) -> str:
+    """Return a rejected value with the option that it was given to."""
+    text = in_words(fault).rstrip(".")
+    place: tuple[Any, ...] = fault["loc"]
+    if not place:
+        return text
+    field = model.model_fields[str(place[0])]
+    flag = _flag(field)
+    option = str(place[0]) if flag.is_argument else _names(str(place[0]), flag)[0]
+    given = fault.get("input")
+    shown = f" {given}" if isinstance(given, str | int | float) and given != field.default else ""
+    return f"{option.partition('/')[0]}{shown}: {text}"
+
+
+def _flag(field: FieldInfo) -> Flag:
+    return next((each for each in field.metadata if isinstance(each, Flag)), Flag())
+
+
+def _names(name: str, flag: Flag) -> tuple[str, ...]:
+    return flag.names or (f"--{name.replace('_', '-')}",)
+
+
+def _typer_info(name: str, field: FieldInfo, kind: Any) -> ParameterInfo:
+    ready = next((each for each in field.metadata if isinstance(each, ParameterInfo)), None)
+    if ready is not None:  # an option that plain signatures share
+        return ready
+    flag, bounds = _flag(field), bounds_of(field)
+    facts: dict[str, Any] = {
+        "help": description_of(field),
+        "metavar": flag.metavar,
+        "autocompletion": flag.complete,
+        "show_default": flag.shows_default,
+    }
+    if {int, float} & {kind, *get_args(kind)}:
+        facts |= {"min": bounds.get("ge"), "max": bounds.get("le")}
+    if flag.is_argument:
+        info: ParameterInfo = typer.Argument(**facts)
+    else:
+        is_switch = kind is bool and not flag.names
+        info = typer.Option(*(_names(name, flag) if flag.names or is_switch else ()), **facts)
+    return info
+
+
+def _type_of_words(field: FieldInfo) -> Any:
+    """Return the type that Typer reads: text for a value with a validator of its words."""
+    if any(isinstance(each, BeforeValidator) for each in field.metadata):
+        return str | None if type(None) in get_args(field.annotation) else str
+    arguments = get_args(field.annotation)
+    if get_origin(field.annotation) is tuple and arguments[1:] == (Ellipsis,):
+        return list[_word(arguments[0])] | None  # type: ignore[misc]
+    return _word(field.annotation)
+
+
+def _word(annotation: Any) -> Any:
+    if get_origin(annotation) is Annotated:
+        inner, *rules = get_args(annotation)
+        return str if any(isinstance(each, BeforeValidator) for each in rules) else _word(inner)
+    if get_origin(annotation) in {Union, UnionType}:
+        return Union[tuple(_word(each) for each in get_args(annotation))]  # noqa: UP007  a list of types
+    return str if get_origin(annotation) is tuple else annotation
+
+
+def _default(field: FieldInfo, kind: Any) -> Any:
+    """Return a field's default as a command line shows it."""
+    if field.default == ():
+        return None
+    if kind is str and isinstance(field.default, tuple):
+        return ",".join(f"{each:g}" for each in field.default)
+    return field.default

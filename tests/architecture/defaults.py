@@ -1,0 +1,78 @@
+"""Defaults that stand twice: ``python -m tests.architecture.defaults`` lists them.
+
+A parameter of a command and a field or a parameter of the code below it have the same name (or the
+same with a unit) and the same number or text as their default, each as a literal.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final, NamedTuple
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+
+
+class Default(NamedTuple):
+    """A literal default."""
+
+    name: str
+    value: object
+    place: str
+
+
+def repeated() -> list[tuple[Default, Default]]:
+    """Return the defaults of commands that the code of their package, or a schema, repeats."""
+    schemas = [each for file in (ROOT / "config").rglob("*.py") for each in defaults(file)]
+    found = []
+    for package in sorted(folder.parent for folder in ROOT.glob("controller/*/commands")):
+        files = sorted(package.rglob("*.py"))
+        below = [f for f in files if f.parent.name != "commands"]
+        known = [*schemas, *(each for file in below for each in defaults(file))]
+        for file in files:
+            if file.parent.name == "commands":
+                for one in defaults(file):
+                    same = [other for other in known if _is_same(one, other)]
+                    found += [(one, same[0])] if same else []
+    return found
+
+
+def defaults(file: Path) -> Iterator[Default]:
+    """Yield the literal defaults of public functions and of fields of classes."""
+    place = str(file.relative_to(ROOT))
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef) and node.name[0] != "_":
+            both = [*node.args.posonlyargs, *node.args.args]
+            given = [None] * (len(both) - len(node.args.defaults)) + list(node.args.defaults)
+            pairs = [*zip(both, given, strict=True)]
+            pairs += [*zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)]
+            for argument, value in pairs:
+                yield from _literal(argument.arg, value, f"{place}:{argument.lineno}")
+        elif isinstance(node, ast.ClassDef):
+            for each in node.body:
+                if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name):
+                    yield from _literal(each.target.id, each.value, f"{place}:{each.lineno}")
+
+
+def _literal(name: str, node: ast.expr | None, place: str) -> Iterator[Default]:
+    if isinstance(node, ast.Call) and node.args:  # Field(0.1, ...), Path("a")
+        node = node.args[0]
+    if node is None:
+        return
+    try:
+        value = ast.literal_eval(node)
+    except ValueError:
+        return
+    if not isinstance(value, bool) and value not in (None, "", ()):
+        yield Default(name, value, place)
+
+
+def _is_same(one: Default, other: Default) -> bool:
+    named = other.name == one.name or other.name.startswith(f"{one.name}_")
+    return named and type(one.value) is type(other.value) and one.value == other.value
+
+
+if __name__ == "__main__":
+    pairs = repeated()
+    for one, other in pairs:
+        print(f"{one.place}: {one.name} = {one.value!r}; also {other.place}: {other.name}")
+    print(len(pairs))
