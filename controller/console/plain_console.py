@@ -11,7 +11,6 @@ from rich.text import Text
 
 from snakewalk.config.plain_text import plain
 
-
 _UNLIMITED: Final = 10_000
 """Width at which no table breaks a line."""
 _HEAD: Final = 12

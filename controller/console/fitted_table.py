@@ -1,0 +1,62 @@
+"""A table at the width of its screen: columns that break between words, else a block per row."""
+
+from typing import Final
+
+from rich.console import Console, Group, RenderableType
+from rich.measure import Measurement
+from rich.table import Column, Table
+
+_UNLIMITED: Final = 10_000
+"""Width at which no table breaks a line."""
+_HEAD: Final = 12
+"""Fewest characters of a heading in a column that may break words (ours)."""
+_SENTENCE: Final = (20, 12)
+"""Fewest characters of a column of sentences, and of one in a crowded table (ours)."""
+
+
+def fitted(table: Table, console: Console) -> RenderableType:
+    """Return what shows a table within the width of ``console``, no word cut.
+
+    The widths of the columns are set here: rich shortens words while other columns have space.
+    """
+    unlimited = console.options.update(width=_UNLIMITED)
+    if not table.columns or Measurement.get(console, unlimited, table).maximum <= console.width:
+        return table
+    table.padding, table.pad_edge = (0, 1, 0, 0), False
+    total = Measurement.get(console, unlimited, table).maximum
+    for sentence in _SENTENCE:
+        columns = [_widths(column, console, sentence) for column in table.columns]
+        wanted = sum(most - least for least, most in columns)
+        spare = console.width - total + wanted
+        if spare >= 0:
+            for column, (least, most) in zip(table.columns, columns, strict=True):
+                column.width = min(least + spare * (most - least) // max(wanted, 1), most)
+                column.no_wrap = False
+            return table
+    return _blocks(table)
+
+
+def _widths(column: Column, console: Console, sentence: int) -> tuple[int, int]:
+    """Return the fewest characters of a readable column, and those of its longest line."""
+    unlimited = console.options.update(width=_UNLIMITED)
+    cells = [Measurement.get(console, unlimited, cell) for cell in column.cells]
+    head = Measurement.get(console, unlimited, column.header)
+    most = max(each.maximum for each in (head, *cells))
+    if column.no_wrap:
+        return most, most
+    breaks_words = column.overflow == "fold"
+    heading = min(head.minimum, _HEAD) if breaks_words else head.minimum
+    readable = [max(each.minimum, min(each.maximum, sentence)) for each in cells]
+    return max(heading, *readable, 1), most
+
+
+def _blocks(table: Table) -> RenderableType:
+    """Return a row of a table as a block of lines: the heading of each cell, and the cell."""
+    blocks: list[RenderableType] = [table.title] if table.title else []
+    for row in zip(*(column.cells for column in table.columns), strict=True):
+        block = Table(box=None, show_header=False, pad_edge=False)
+        for column, cell in zip(table.columns, row, strict=True):
+            if cell not in {"", None}:
+                block.add_row(column.header, cell)
+        blocks += [block, ""]
+    return Group(*blocks)
