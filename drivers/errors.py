@@ -22,6 +22,11 @@ from enum import Enum, auto
 from snakewalk.config.errors import InputError
 
 
+def notes_of(error: BaseException | None) -> list[str]:
+    """Return the notes of an error; one without notes has no attribute for them."""
+    return list(getattr(error, "__notes__", []))
+
+
 class DriverError(Exception):
     """Base class of driver errors."""
 

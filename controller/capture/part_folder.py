@@ -155,7 +155,7 @@ class PartFolder:
         """Add to an interruption how to continue."""
         try:
             yield
-        except KeyboardInterrupt as stop:
+        except (KeyboardInterrupt, SystemExit) as stop:
             if self.path.is_dir():
                 stop.add_note(f"{self.path}: holds the frames so far; continue by --resume")
             raise

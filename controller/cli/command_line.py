@@ -24,6 +24,7 @@ from snakewalk.controller.cli.command_tree import (
 from snakewalk.controller.console.command import CommandInfo, command_info
 from snakewalk.controller.console.declaration import declaration
 from snakewalk.controller.console.plugins import Plugin, plugins
+from snakewalk.drivers.errors import notes_of
 
 _FIRST: Final = (*VERBS, *(words for words in FAMILIES if " " not in words))
 """First words in the order of ``--help``; those of other packages follow by name."""
@@ -148,7 +149,7 @@ class CommandGroup(TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as stop:
-            text = "; ".join(["interrupted", *getattr(stop, "__notes__", [])])
+            text = "; ".join(["interrupted", *notes_of(stop)])
             print(f"snakewalk: {text}", file=sys.stderr)
             raise SystemExit(130) from None
 

@@ -14,7 +14,7 @@ from snakewalk.controller.cli.compilation_notice import CompilationNotice
 from snakewalk.controller.console.import_speed import without_collections
 from snakewalk.controller.console.safe_path import make_path_safe
 from snakewalk.drivers.compilation import observe_compilation
-from snakewalk.drivers.errors import DriverError, PortError
+from snakewalk.drivers.errors import DriverError, PortError, notes_of
 
 _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)
@@ -63,8 +63,8 @@ def main() -> None:
         observe_compilation(CompilationNotice(_print_line))
         app(prog_name="snakewalk")
     except PortError as error:
-        began = bool(getattr(error, "__notes__", []))  # of a run, whose port has vanished
-        _end(1 if began else 2, "; ".join(error.faults), *getattr(error, "__notes__", []))
+        began = bool(notes_of(error))  # of a run, whose port has vanished
+        _end(1 if began else 2, "; ".join(error.faults), *notes_of(error))
     except InputError as error:
         _end(2, *error.faults)
     except DriverError as error:
@@ -76,10 +76,10 @@ def main() -> None:
         _end(2, needed)
     except OSError as error:
         place = f"{Path(str(error.filename))}: " if error.filename else ""
-        notes = getattr(error, "__notes__", [])  # of a run: state of torque and log
+        notes = notes_of(error)  # of a run: state of torque and log
         _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
-    except KeyboardInterrupt:
-        _end(_INTERRUPTED, "interrupted")
+    except KeyboardInterrupt as stop:
+        _end(_INTERRUPTED, _with_notes("interrupted", stop))
     except SystemExit as stop:
         if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
             name = signal.Signals(stop.code - _BY_SIGNAL).name
@@ -132,7 +132,7 @@ def _tell_of_pipe(event: str, details: tuple[object, ...]) -> None:
 
 def _with_notes(text: str, error: BaseException) -> str:
     """Return the reason for the end, with a run's notes on torque and log."""
-    return "; ".join([text, *getattr(error, "__notes__", [])])
+    return "; ".join([text, *notes_of(error)])
 
 
 def _end(code: int, *lines: str) -> None:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final, TextIO
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.plain_text import plain
+from snakewalk.drivers.errors import notes_of
 from snakewalk.drivers.fallbacks import fallbacks_in_use
 
 if TYPE_CHECKING:
@@ -170,7 +171,7 @@ def _tell_end(error: BaseException) -> None:
     elif isinstance(error, SystemExit):
         LOGGER.debug("ended with exit code %s", error.code)
     elif isinstance(error, KeyboardInterrupt):
-        LOGGER.error("; ".join(["interrupted", *getattr(error, "__notes__", [])]), extra=elsewhere)
+        LOGGER.error("; ".join(["interrupted", *notes_of(error)]), extra=elsewhere)
     else:
         LOGGER.error("%s", error, extra=elsewhere, exc_info=error)
 

@@ -1,5 +1,6 @@
 """Files of results: checked before any work, written completely or not at all."""
 
+import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -10,6 +11,12 @@ from typing import Final
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 
+try:
+    import fcntl
+except ImportError:  # Windows deletes no file that a program has open
+    fcntl = None  # type: ignore[assignment]
+
+_HAS_LOCKS: bool = fcntl is not None
 LOG: Final = "log.mcap"
 FILM: Final = "film.mp4"
 REPORT: Final = "report.html"
@@ -94,13 +101,69 @@ def run_folder(name: str, out: Path | None) -> Iterator[Path]:
                 place.rmdir()
 
 
-def refuse_another_run(folder: Path, force: bool) -> None:
-    """Check that a folder has no run's files.
+@contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Keep other runs out of the folder of a run; the system ends the lock of a killed program.
+
+    A file system without locks (some network disks) does not keep them out.
 
     Raises:
-        InputError: it has (without ``force``).
+        InputError: another run uses the folder.
 
     """
+    if not _HAS_LOCKS:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        with suppress(OSError):  # no locks here
+            if not _lock(descriptor):
+                raise InputError(
+                    f"{folder}: another run uses this folder; give another --out, or wait for "
+                    "its end"
+                )
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> bool:
+    """Lock an open folder for this program; False if another one has locked it."""
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@contextmanager
+def cleared_folder(folder: Path, force: bool) -> Iterator[None]:
+    """Make or clear the folder of a run that begins, and keep other runs out of it.
+
+    Raises:
+        InputError: another run uses it, or (without ``force``) it holds a run's files.
+
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked_folder(folder):
+        _refuse_run_files(folder, force)
+        clear_run(folder)
+        yield
+
+
+def refuse_another_run(folder: Path, force: bool) -> None:
+    """Check that a folder has no run's files, and that no run uses it.
+
+    Raises:
+        InputError: it has (without ``force``), or a run uses it.
+
+    """
+    if folder.is_dir():
+        with locked_folder(folder):
+            _refuse_run_files(folder, force)
+
+
+def _refuse_run_files(folder: Path, force: bool) -> None:
     there = [name for name in RUN_FILES if (folder / name).exists()]
     if there and not force:
         raise InputError(

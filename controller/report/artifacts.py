@@ -13,9 +13,9 @@ from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Section, film_on_page, page
 from snakewalk.controller.report.trip import trip_of
+from snakewalk.controller.run.execute import write_summary
 from snakewalk.controller.run.film_look import SERVOS, film_look
 from snakewalk.controller.run.finish import Artifacts
-from snakewalk.controller.run.summary_file import write_summary
 from snakewalk.controller.runlog.record import RunRecord
 
 

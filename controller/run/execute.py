@@ -1,5 +1,6 @@
 """Execution of a prepared run: folder, log, link, loop, summary."""
 
+import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -12,7 +13,13 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig, SafetyConfig
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plugins import require
-from snakewalk.controller.console.result_files import LOG, clear_run, refuse_another_run
+from snakewalk.controller.console.result_files import (
+    LOG,
+    SUMMARY,
+    atomic_write,
+    cleared_folder,
+    refuse_another_run,
+)
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.metrics.travel import Travel, travel
 from snakewalk.controller.motion.command import Refused
@@ -36,7 +43,7 @@ from snakewalk.controller.run.pose_provider import (
     pose_provider,
 )
 from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
-from snakewalk.controller.run.summary_file import write_summary
+from snakewalk.controller.run.run_ending import RunEnding
 from snakewalk.controller.run.watchers import SHADOW
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import InitialPose, RunRecord, Winding
@@ -55,11 +62,11 @@ from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.twin import UsesFriction
 from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import DriverError
+from snakewalk.drivers.errors import DriverError, notes_of
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.recovery import Recovery
-from snakewalk.drivers.safety.safe_link import TORQUE_IS_OFF, SafeLink
+from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.safety.stop_output import StopCall, StopOutput, parse_stop_output
 from snakewalk.drivers.safety.trip_hold import TripHold
@@ -91,6 +98,8 @@ class Finished:
     """The motion that ran, at its end."""
     travel: Travel
     """Travel of the centre of mass, which gives the summary's speed."""
+    ending: RunEnding
+    """State of torque and log, for the notes of a later error."""
 
 
 def execute(
@@ -115,15 +124,16 @@ def execute(
     ``RehearsedPort`` serves a simulated robot in this process as if it were real.
 
     The folder is made; one that holds a run's files is refused without ``force``, which deletes
-    them when the new log begins. A ``stoppable`` run has a button that ``snakewalk stop`` presses;
-    the simulated runs of a study have none. ``view`` observes the run: a page that shows it, a ROS
-    node that publishes it. With ``shadow`` a simulated chain follows the same goals, and log and
-    ``on_event`` report the differences. ``confirm`` asks an operator whether an interrupted chain
-    may go on (``safety.recovery``). ``stop_requested`` is called in every read and write and
-    returns why torque goes off, or None. ``waypoint_commands`` is called in every cycle and returns
-    a person's changes of the waypoints, as ``LiveCourse`` accepts them: the run then holds at the
-    last one until it is ended. ``on_progress`` is called after each cycle, ``on_event`` with
-    decisions of the motion: a slower rate, an operator's change.
+    them when the new log begins. One that another run uses is always refused. A ``stoppable`` run
+    has a button that ``snakewalk stop`` presses; the simulated runs of a study have none. ``view``
+    observes the run: a page that shows it, a ROS node that publishes it. With ``shadow`` a
+    simulated chain follows the same goals, and log and ``on_event`` report the differences.
+    ``confirm`` asks an operator whether an interrupted chain may go on (``safety.recovery``).
+    ``stop_requested`` is called in every read and write and returns why torque goes off, or None.
+    ``waypoint_commands`` is called in every cycle and returns a person's changes of the waypoints,
+    as ``LiveCourse`` accepts them: the run then holds at the last one until it is ended.
+    ``on_progress`` is called after each cycle, ``on_event`` with decisions of the motion: a slower
+    rate, an operator's change.
 
     Raises:
         InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
@@ -134,11 +144,13 @@ def execute(
     refuse_another_run(folder, force)
     rehearsed = None if isinstance(port, str | None) else port
     name = port if isinstance(port, str | None) else port.name
+    ending = RunEnding()
     run = _Execution(
-        prepared, folder, name, rehearsed, view, shadow, confirm, stop_requested,
+        prepared, folder, name, rehearsed, force, ending, view, shadow, confirm, stop_requested,
         waypoint_commands, on_progress, on_event,
     )  # fmt: skip
-    return run.carry_out(stoppable=stoppable)
+    with ending.noted():
+        return run.carry_out(stoppable=stoppable)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +161,8 @@ class _Execution:
     folder: Path
     port: str | None
     rehearsed: RehearsedPort | None
+    force: bool
+    ending: RunEnding
     view: Watcher | None
     shadow: bool
     confirm: Callable[[str], bool] | None
@@ -172,7 +186,6 @@ class _Execution:
                 evidence.text,
             )
         log_path = self.folder / LOG
-        clear_run(self.folder)
         LOGGER.debug(
             "%s on %s; the plan keeps the limits; log: %s",
             *(prepared.robot.name, backend.name, log_path),
@@ -180,28 +193,34 @@ class _Execution:
         torque_constant_n_m_a, winding = motor_constants(prepared.robot)
         ports = None if port is None else real_ports(robot) or [port]
         made = StopButton(prepared.run.name, ports, self.folder) if stoppable else nullcontext()
-        with made as button, RunLog(log_path, None if view is None else view.on_row) as log:
-            if view is not None and button is not None:
-                view.on_button(button.path)
-            log.config(
-                prepared.run,
-                robot,
-                prepared.world,
-                backend=backend.name,
-                plan=plan,
-                ground=prepared.ground,
-                initial_pose=initial_pose,
-                torque_constant_n_m_a=torque_constant_n_m_a,
-                winding=winding,
-                pose_evidence=evidence,
-                port_is_pseudo_terminal=(
-                    is_pseudo_terminal(ports) if self.rehearsed is None else True
-                ),
-            )
-            outcome, pose, mapped, source = self._loop(robot, backend, log, button, initial_pose)
-        LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
-        record, numbers, moved = _read_back(log_path)
-        return Finished(outcome, log_path, record, numbers, pose, mapped, source, moved)
+        with made as button, cleared_folder(self.folder, self.force):
+            self.ending.log = log_path
+            with RunLog(log_path, None if view is None else view.on_row) as log:
+                if view is not None and button is not None:
+                    view.on_button(button.path)
+                log.config(
+                    prepared.run,
+                    robot,
+                    prepared.world,
+                    backend=backend.name,
+                    plan=plan,
+                    ground=prepared.ground,
+                    initial_pose=initial_pose,
+                    torque_constant_n_m_a=torque_constant_n_m_a,
+                    winding=winding,
+                    pose_evidence=evidence,
+                    port_is_pseudo_terminal=(
+                        is_pseudo_terminal(ports) if self.rehearsed is None else True
+                    ),
+                )
+                with _end_logged(self.ending, log, backend.clock):
+                    ran = self._loop(robot, backend, log, button, initial_pose)
+            outcome, pose, mapped, source = ran
+            LOGGER.debug("ran %.2f s; tripped: %s", outcome.duration_s, outcome.tripped or "no")
+            record, numbers, moved = _read_back(log_path)
+        return Finished(
+            outcome, log_path, record, numbers, pose, mapped, source, moved, self.ending
+        )
 
     def _backend(self, robot: RobotConfig, initial_pose: InitialPose | None) -> Backend:
         prepared, port = self.prepared, self.port
@@ -257,6 +276,7 @@ class _Execution:
                 TripHold.from_config(robot, safety),
                 output,
             )
+            self.ending.link = link
             start = initial_pose if self.port is None else None
             beside = _shadow(prepared, start, log, self.on_event) if self.shadow else None
             drive = Drive(
@@ -277,17 +297,17 @@ class _Execution:
                 on_progress=observers.with_report(self.on_progress),
                 on_event=self.on_event,
             )
-            with _end_told(link, log, clock):
-                on_wire = self.port is not None and self.rehearsed is None
-                with raised_priority() if on_wire else nullcontext():
-                    outcome = drive.run()
-                end = outcome.tripped or "it had come to its end"
-                if button is not None:
-                    button.report_end(end)
-                if beside is not None:  # for many seconds, in which the port is still open
-                    beside.end(clock.now_s())
-                if button is not None:
-                    button.end(end)
+            on_wire = self.port is not None and self.rehearsed is None
+            with raised_priority() if on_wire else nullcontext():
+                outcome = drive.run()
+            self.ending.is_over = True
+            end = outcome.tripped or "it had come to its end"
+            if button is not None:
+                button.report_end(end)
+            if beside is not None:  # for many seconds, in which the port is still open
+                beside.end(clock.now_s())
+            if button is not None:
+                button.end(end)
         return outcome, pose, mapped, source
 
     def _helped(
@@ -345,35 +365,33 @@ def _live(
 
 
 @contextmanager
-def _end_told(link: SafeLink, log: RunLog, clock: Clock) -> Iterator[None]:
-    """Add the state of torque and log to the error that ends a run."""
+def _end_logged(ending: RunEnding, log: RunLog, clock: Clock) -> Iterator[None]:
+    """Log what ended a run early."""
     try:
-        yield  # the link is closed when an error comes out of it, with a note about torque
-    except DriverError as fault:  # says itself what it knows of torque
-        if link.tripped is not None:
+        yield
+    except DriverError as fault:
+        if ending.link is not None and ending.link.tripped is not None:
             log.event(clock.now_s(), "interrupt", str(fault), "warning")
-            fault.add_note(f"log: {log.path}; its page: snakewalk log report {log.path}")
         raise
-    except (KeyboardInterrupt, SystemExit, OSError) as stop:
-        if not link.was_enabled:
-            stop.add_note("torque was not switched on")
-        torque = "; ".join(stop.__notes__)
-        if link.was_enabled and TORQUE_IS_OFF not in stop.__notes__:
-            stop.add_note("torque may be on: switch the supply off")
-        if not isinstance(stop, OSError):
+    except (KeyboardInterrupt, SystemExit) as stop:
+        if not ending.is_over:
+            torque = "; ".join(dict.fromkeys([*notes_of(stop), ending.torque]))
             log.event(clock.now_s(), "interrupt", torque, "warning")
-            stop.add_note(f"log: {log.path}; its page: snakewalk log report {log.path}")
         raise
 
 
 def _read_back(log: Path) -> tuple[RunRecord, RunSummary, Travel]:
-    try:
-        record = read_log(log, is_ours=True)
-        moved = travel(record)
-        return record, write_summary(summary(record, moved), log.parent), moved
-    except KeyboardInterrupt as stop:
-        stop.add_note(f"the run is whole: {log}; its page: snakewalk log report {log}")
-        raise
+    record = read_log(log, is_ours=True)
+    moved = travel(record)
+    return record, write_summary(summary(record, moved), log.parent), moved
+
+
+def write_summary(numbers: RunSummary, out_dir: Path) -> RunSummary:
+    """Write ``out_dir/summary.json`` and return the numbers; needs no matplotlib."""
+    text = json.dumps(numbers.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+    with atomic_write(out_dir / SUMMARY) as part:
+        part.write_text(text + "\n", encoding="utf-8")
+    return numbers
 
 
 def _check(prepared: PreparedRun, *, metal: bool, shadow: bool) -> None:

@@ -12,7 +12,7 @@ from typing import Final
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.plugins import require
-from snakewalk.controller.console.result_files import LOG
+from snakewalk.controller.console.result_files import locked_folder
 from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.run.execute import Finished
@@ -56,17 +56,17 @@ def write_artifacts(
     """Make report and film of a run; print on standard error why a file is missing.
 
     ``folders`` shows the folders of the user's files in the report.
+
+    Raises:
+        InputError: another run uses the folder.
+
     """
     what = _what_made_it(folders)
-    try:
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked_folder(folder):
         made: Artifacts = require("results", "report", "--film").load()(
             record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
         )
-    except KeyboardInterrupt as stop:
-        log = folder / LOG
-        if log.exists():
-            stop.add_note(f"the run is whole: {log}; its film: snakewalk log report {log}")
-        raise
     for line in made.notes:
         LOGGER.warning("%s", line)
     return made
@@ -76,10 +76,11 @@ def show_run(
     finished: Finished, folder: Path, facts: Mapping[str, object], as_json: bool, *, film: bool
 ) -> None:
     """Make report and film, and print facts and files; exit 1 if safety tripped."""
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
     files = {"log": str(finished.log), "summary": str(folder / "summary.json")}
     evidence = finished.summary.evidence
-    show({**facts, **evidence, **files, **artifacts.to_dict()}, as_json)
+    with finished.ending.noted():
+        artifacts = write_artifacts(finished.record, folder, finished.summary, film=film)
+        show({**facts, **evidence, **files, **artifacts.to_dict()}, as_json)
     if finished.outcome.tripped is not None:
         raise SystemExit(1)
 

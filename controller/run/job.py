@@ -55,25 +55,26 @@ class Job:
         name = self._name(prepared)
         finished, folder = self._execute(prepared, name)
         outcome = finished.outcome
-        artifacts = write_artifacts(
-            finished.record, folder, finished.summary, film=self.options.film, look=look
-        )
-        show(
-            {
-                "run": name,
-                "waypoints": outcome.waypoints,
-                **by_evidence(finished, {"waypoints_reached": outcome.reached}),
-                "duration_s": round(outcome.duration_s, 2),
-                "tripped": outcome.tripped,
-                "advance_alarms": outcome.alarms,
-                **finished.pose.facts(),
-                **finished.map.facts(),
-                "log": str(finished.log),
-                "summary": str(folder / "summary.json"),
-                **artifacts.to_dict(),
-            },
-            self.options.as_json,
-        )
+        with finished.ending.noted():
+            artifacts = write_artifacts(
+                finished.record, folder, finished.summary, film=self.options.film, look=look
+            )
+            show(
+                {
+                    "run": name,
+                    "waypoints": outcome.waypoints,
+                    **by_evidence(finished, {"waypoints_reached": outcome.reached}),
+                    "duration_s": round(outcome.duration_s, 2),
+                    "tripped": outcome.tripped,
+                    "advance_alarms": outcome.alarms,
+                    **finished.pose.facts(),
+                    **finished.map.facts(),
+                    "log": str(finished.log),
+                    "summary": str(folder / "summary.json"),
+                    **artifacts.to_dict(),
+                },
+                self.options.as_json,
+            )
         return exit_code(finished, accept_dead_reckoning)
 
     def _prepared(self) -> PreparedRun:

@@ -57,6 +57,14 @@ class RunLog:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._part = part_path(path)
         self._file = self._part.open("w+b")
+        try:
+            self._begin()
+        except BaseException:  # an interrupt: an empty log would be in the way of the next run
+            self._file.close()
+            self._part.unlink(missing_ok=True)
+            raise
+
+    def _begin(self) -> None:
         self._is_deleted = False
         self._writer: Any = Writer(  # half untyped
             self._file, chunk_size=_CHUNK_BYTES, enable_data_crcs=True
@@ -72,7 +80,7 @@ class RunLog:
         """Rows that are not written yet, of slow topics as they are printed."""
         self._last_rows: dict[type[Table], bytes] = {}
         """Newest row of each topic that holds only changes, without its time."""
-        self._has_cycles = False
+        self._has_config = self._has_cycles = False
 
     def _register(self, table: type[Table]) -> None:
         topic = table.topic
@@ -92,7 +100,8 @@ class RunLog:
     ) -> None:
         """Finish the file also when the run ends with an error: the log says how it came to it.
 
-        Nothing is left of a run that was refused before its first cycle. A log that the disk does
+        Nothing is left of a run that was refused before its first cycle, or that a signal ended
+        before its configuration was written: nobody could read it. A log that the disk does
         not accept stays ``.part``, and the error names it.
         """
         try:
@@ -109,7 +118,9 @@ class RunLog:
             if error is None:
                 raise
             return
-        if isinstance(error, InputError) and not self._has_cycles:
+        is_refused = isinstance(error, InputError) and not self._has_cycles
+        is_signal = isinstance(error, (KeyboardInterrupt, SystemExit))
+        if is_refused or (is_signal and not self._has_config):
             self._part.unlink()
         else:
             self._part.replace(self.path)
@@ -147,6 +158,7 @@ class RunLog:
             port_is_pseudo_terminal=port_is_pseudo_terminal,
         )
         self._write(ConfigTable, 0.0, header.row())
+        self._has_config = True
         self._flush()
 
     def add(self, table: type[Table], time_s: float, **values: Any) -> None:

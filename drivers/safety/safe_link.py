@@ -102,6 +102,8 @@ class SafeLink:
         self._stop_output, self._output_is_active = stop_output, False
         self._asked_to_stop = stop_requested
         self._touched = False
+        self.is_off = False
+        """Whether every servo has confirmed its torque off since ``enable``."""
         self._off_tries = 0
         self._restarted_at_s = -math.inf
         self._handlers: dict[signal.Signals, object] = {}
@@ -170,7 +172,7 @@ class SafeLink:
 
         """
         self._refuse_to_start()
-        self._touched = True
+        self._touched, self.is_off = True, False
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
@@ -194,6 +196,7 @@ class SafeLink:
         except DriverError as fault:
             self._activate_output(fault)
             raise
+        self.is_off = True
         self._off_tries = 0
 
     def read(self) -> JointState:

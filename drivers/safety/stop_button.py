@@ -24,6 +24,7 @@ from typing import Final, Self
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.errors import notes_of
 from snakewalk.drivers.port.byte_port import is_url
 
 try:
@@ -104,7 +105,7 @@ class StopButton:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        notes = getattr(error, "__notes__", [])
+        notes = notes_of(error)
         told = [str(error)] if isinstance(error, Exception) else []  # else a signal, or the exit
         self.end("; ".join([*told, *notes]) or (str(error) if error is not None else ""))
 

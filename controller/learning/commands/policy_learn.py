@@ -78,7 +78,7 @@ def learn_policy(
             policy = search_wave(
                 out.stem, progress, generations=generations, workers=workers, on_progress=save
             )
-        except KeyboardInterrupt as stop:
+        except (KeyboardInterrupt, SystemExit) as stop:
             if part_file.exists():
                 stop.add_note(f"{part_file}: holds the generations so far; continue by --resume")
             raise

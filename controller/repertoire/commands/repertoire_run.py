@@ -51,7 +51,8 @@ def run_route(
     bar = TimeBar(job.run.name, job.route.duration_s)
     with watched_by(options) as watchers:
         finished, folder = carry_out(job, run_name(job), bar, options, watchers)
-    artifacts = write_artifacts(finished.record, folder, finished.summary, film=options.film)
+    with finished.ending.noted():
+        artifacts = write_artifacts(finished.record, folder, finished.summary, film=options.film)
     if picture is not None:
         plots().draw_route(job, finished.record, picture)
     ran = RouteRun(job, finished)

@@ -112,7 +112,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     from snakewalk.controller.console import pool
     from snakewalk.controller.repertoire import crowd_film, repertoire_recording
     from snakewalk.controller.report import artifacts
-    from snakewalk.controller.run import execute, summary_file
+    from snakewalk.controller.run import execute
     from snakewalk.controller.run.kinds import walk_run
     from snakewalk.controller.studies import graph_study, trials
 
@@ -132,7 +132,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     def few_artifacts(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
         if numbers is None:  # of ``log report``
             return make(record, folder, numbers, **options)
-        summary_file.write_summary(numbers, folder)
+        execute.write_summary(numbers, folder)
         return artifacts.Artifacts(None, None, ())
 
     each = pool.each

@@ -1,7 +1,9 @@
 """Results are whole or absent: an error or a full disk in mid-write leaves an old file alone."""
 
 import ast
+import errno
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -18,14 +20,18 @@ from snakewalk.controller.cli.main import main
 from snakewalk.controller.console.result_files import (
     RUN_FILES,
     atomic_write,
+    cleared_folder,
+    locked_folder,
     refuse_mixture,
     refuse_to_overwrite,
     run_folder,
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.finish import write_artifacts
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.studies.tune import Tuned
 
 CONTROLLER = Path(__file__).resolve().parents[3] / "controller"
@@ -131,6 +137,62 @@ def test_a_run_never_mixes_with_another(tmp_path: Path) -> None:
     execute(job, tmp_path, force=True)
     left = sorted(path.name for path in tmp_path.iterdir())
     assert left == ["log.mcap", "notes.txt", "summary.json"], "no film and page of the old run"
+
+
+def test_force_does_not_touch_the_folder_of_a_run_under_way(tmp_path: Path) -> None:
+    """Both runs reported success, and one result was gone."""
+    pytest.importorskip("mujoco")
+    folder = tmp_path / "run"
+    job = prepare_gait("lateral-undulation", seconds=0.2)
+    refused: list[str] = []
+
+    def on_progress(progress: Progress) -> None:
+        if not refused:
+            with pytest.raises(InputError) as info:
+                execute(job, folder, force=True)
+            refused.append(str(info.value))
+
+    finished = execute(job, folder, on_progress=on_progress)
+    assert refused == [
+        f"{folder}: another run uses this folder; give another --out, or wait for its end"
+    ]
+    assert finished.log.exists()
+    execute(job, folder, force=True)
+
+
+def test_runs_that_start_together_in_one_folder_are_told_apart(tmp_path: Path) -> None:
+    """Each had found the folder free when it checked."""
+    with cleared_folder(tmp_path, force=False):
+        (tmp_path / "log.mcap.part").write_text("first")
+        for force in (True, False):
+            with (
+                pytest.raises(InputError, match="another run uses this folder"),
+                cleared_folder(tmp_path, force),
+            ):
+                pass
+        (tmp_path / "log.mcap.part").rename(tmp_path / "log.mcap")
+    with pytest.raises(InputError, match=r"holds a run"), cleared_folder(tmp_path, force=False):
+        pass
+    assert (tmp_path / "log.mcap").read_text() == "first"
+
+
+def test_report_and_film_of_a_run_that_is_made_anew_are_left_alone(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("mujoco")
+    finished = execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
+    with locked_folder(tmp_path), pytest.raises(InputError, match="another run uses this folder"):
+        write_artifacts(finished.record, tmp_path, film=False)
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.EBADF, errno.EOPNOTSUPP])
+def test_a_disk_without_locks_holds_runs_all_the_same(
+    number: int, tmp_path: Path, mocker: MockerFixture
+) -> None:
+    mocker.patch("fcntl.flock", side_effect=OSError(number, os.strerror(number)))
+    with cleared_folder(tmp_path, force=False):
+        pass
 
 
 def test_a_page_never_stands_beside_the_log_of_another_run(tmp_path: Path) -> None:

@@ -98,7 +98,8 @@ def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(
         execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
     log = tmp_path / "log.mcap"
     assert stop.value.__notes__ == [
-        f"the run is whole: {log}; its page: snakewalk log report {log}"
+        "torque is off",
+        f"the run is whole: {log}; its page: snakewalk log report {log}",
     ]
     assert read_log(log).complete
 
@@ -120,6 +121,87 @@ def test_the_command_line_prints_it(
     assert capsys.readouterr().err.splitlines()[-1] == (
         f"snakewalk: interrupted; torque is off; log: {log}; its page: snakewalk log report {log}"
     )
+
+
+NOT_ON, OFF = "torque was not switched on", "torque is off"
+PHASES = {
+    "plan": ("snakewalk.controller.run.kinds.gait_run.GaitRun.check_plan", NOT_ON, None),
+    "port": ("snakewalk.controller.run.execute._Execution._backend", NOT_ON, None),
+    "log": ("snakewalk.controller.runlog.writer.Writer.start", NOT_ON, None),
+    "header": ("snakewalk.controller.runlog.writer.RunLog.config", NOT_ON, None),
+    "shadow is made": ("snakewalk.controller.run.execute._shadow", NOT_ON, "log"),
+    "cycle": ("snakewalk.controller.console.progress.TimeBar.on_progress", OFF, "log"),
+    "after the last cycle": (
+        "snakewalk.drivers.safety.stop_button.StopButton.report_end",
+        OFF,
+        "the run is whole",
+    ),
+    "result of the shadow": (
+        "snakewalk.controller.studies.shadow.run_shadow.RunShadow.end",
+        OFF,
+        "the run is whole",
+    ),
+    "log is read": ("snakewalk.controller.run.execute.read_log", OFF, "the run is whole"),
+    "report": ("snakewalk.controller.report.artifacts._draw", OFF, "the run is whole"),
+    "film": ("snakewalk.controller.report.artifacts._film", OFF, "the run is whole"),
+    "result": ("snakewalk.controller.run.finish.show", OFF, "the run is whole"),
+}
+"""What a signal interrupts: the function called then, the state of torque, the name of the log."""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("phase", PHASES)
+def test_each_signal_in_each_phase_says_what_became_of_torque_and_log(
+    phase: str,
+    name: str,
+    tmp_path: Path,
+    mocker: MockerFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("mujoco")
+    number = signal.Signals[name]
+    place, torque, what = PHASES[phase]
+    for slow in ("_draw", "_write_page", "_film"):
+        mocker.patch(f"snakewalk.controller.report.artifacts.{slow}")
+    mocker.patch(place, side_effect=lambda *_, **__: signal.raise_signal(number))
+    out = tmp_path / "out"
+    words = ["gait", "run", "lateral-undulation", "--seconds", "0.2", "--shadow", "--out"]
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words, str(out)])
+    before = signal.signal(number, signal.SIG_DFL if name != "SIGINT" else signal.SIG_IGN)
+    try:
+        with pytest.raises(SystemExit) as end:
+            main()
+    finally:
+        signal.signal(number, before)
+    assert end.value.code == 128 + number
+    log = out / "log.mcap"
+    told = [torque]
+    if what is not None:
+        told.append(f"{what}: {log}; its page: snakewalk log report {log}")
+    how = "interrupted" if name == "SIGINT" else f"ended by {name}"
+    assert capsys.readouterr().err.splitlines()[-1] == f"snakewalk: {'; '.join([how, *told])}"
+    if what is None:
+        assert not out.exists()
+    else:
+        record = read_log(log)
+        assert record.complete
+        assert (summary(record).outcome == "interrupted") == (what == "log")
+
+
+def test_a_second_interrupt_while_the_log_is_closed_takes_nothing_away(
+    tmp_path: Path, mocker: MockerFixture
+) -> None:
+    """The second exception has none of the notes of the first."""
+    pytest.importorskip("mujoco")
+    mocker.patch(
+        "snakewalk.controller.runlog.writer.RunLog._restore",
+        side_effect=lambda: signal.raise_signal(signal.SIGINT),
+    )
+    with pytest.raises(KeyboardInterrupt) as stop:
+        run(tmp_path, lambda: signal.raise_signal(signal.SIGINT))
+    part = tmp_path / "log.mcap.part"
+    assert stop.value.__notes__ == [OFF, f"log: {part}; its page: snakewalk log report {part}"]
 
 
 def test_an_interrupt_before_the_first_line_of_a_command_is_one_line(
