@@ -147,6 +147,7 @@ def test_on_the_ground_the_skin_lies_as_deep_as_the_robots_belly(log: Path, tmp_
     assert bind - rest[:, 2].min() == pytest.approx(record.header.robot.body_radius_m, abs=1e-6)
 
 
+@pytest.mark.costs("deforms a mesh")
 def test_a_mesh_keeps_its_corners_and_colours_and_moves(tmp_path: Path) -> None:
     """Written, read back along other axes, animated: at rest the mesh is what was given."""
     made("trout", "-o", str(tmp_path / "trout.glb"))
@@ -176,6 +177,7 @@ def test_an_obj_that_lies_another_way_is_turned(tmp_path: Path) -> None:
     assert body_skin(str(tmp_path / "a.obj"), Cut(forward="-z", curves=12)).skin.length_m > 1.99
 
 
+@pytest.mark.costs("deforms a mesh")
 def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) -> None:
     made("tropical-fish", "-o", str(tmp_path / "f.obj"))
     how = ("--surface", "--curves", "15")

@@ -114,6 +114,7 @@ def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
     assert worst[0] < 0.7 * worst[1]
 
 
+@pytest.mark.costs("synthesises a whole motion")
 def test_the_command_writes_a_recording_that_other_commands_take(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(BEHAVIOUR)
     words = [
@@ -193,6 +194,7 @@ def test_rings_turn_green_when_the_mass_centre_is_there(traverse: SynthesisedWal
         assert np.hypot(*(centre - waypoint)) < run.waypoint_radius_m
 
 
+@pytest.mark.slow
 def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
     words = [
         "animal",
@@ -220,6 +222,7 @@ def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
     assert held.accessors[held.animations[0].samplers[0].input].count == 4
 
 
+@pytest.mark.slow
 def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
     prepared = prepare_walk("jacksboro-traverse", motion="kp", on_paper=True)
     made = SnakeSynthesis(prepared).synthesise()
@@ -230,6 +233,7 @@ def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
     assert made.facts()["bend_k_rad"] > 0.3  # type: ignore[operator]
 
 
+@pytest.mark.costs("synthesises a whole motion")
 @pytest.mark.parametrize("how", [["--motion", "walk"], ["--motion", "kp"], ["--animal", "lizard"]])
 def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_path: Path) -> None:
     """All 600 frames were made, on the height of the border."""
@@ -248,6 +252,7 @@ def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_p
     assert head_m[-1] > 1.5 >= head_m[:-1].max()
 
 
+@pytest.mark.slow
 def test_frames_do_not_end_a_motion_before_the_last_waypoint(tmp_path: Path) -> None:
     """The head left the floor 18 frames before the middle of the body reached the waypoint."""
     words = [
@@ -271,6 +276,7 @@ def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     assert "kp is a motion on paper: snakewalk animal synthesise" in done.stderr
 
 
+@pytest.mark.costs("synthesises a whole motion")
 def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
     out = tmp_path / "lizard"
     run = ["animal", "synthesise", "jacksboro-traverse", "--animal", "lizard", "-o", str(out)]
@@ -293,6 +299,7 @@ def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
     assert "--force" in again.stderr
 
 
+@pytest.mark.slow
 def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> None:
     own = locate("animals", "goat").read_text().replace("length_m = 1.25", "length_m = 0.5")
     (tmp_path / "kid.toml").write_text(own.replace('skin = "goat"', 'skin = "own.toml"'))

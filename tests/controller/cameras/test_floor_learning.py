@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.camera import CameraConfig
@@ -12,6 +13,8 @@ from snakewalk.controller.cameras.overhead_camera import CameraModel, OverheadDe
 from snakewalk.controller.cameras.pose_tracking import BodyPrior
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from tests.oracles.overhead_scene import DrawnView
+
+pytestmark = pytest.mark.costs("draws and learns a floor over many frames")
 
 ROBOT = load_robot("yaw16")
 CAMERA = CameraConfig(width_px=320, height_px=240, field_width_m=3.0, height_m=3.0)

@@ -347,7 +347,16 @@ ROWS = [
 ]
 
 
-@pytest.mark.parametrize(("words", "said"), ROWS, ids=[words for words, _ in ROWS])
+COSTS = {
+    f"run flat-square {words}": pytest.mark.costs("imports what a run on a port or a page needs")
+    for words in ("--view --view-at 192.0.2.1", "--port rfc2217://", "--port /dev/nosuch")
+}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [pytest.param(*row, id=row[0], marks=COSTS.get(row[0], ())) for row in ROWS],
+)
 def test_bad_input_is_told_and_nothing_is_written(
     words: str,
     said: str,

@@ -12,8 +12,8 @@ They are run as printed, in this process, with a budget that the pages do not sh
 
 What a line takes from its reader, a film or a map, is a small one under the printed name. A line
 that stood on an earlier page, and reads nothing of its own page, is not run again: its files are
-put there. ``NOT_RUN`` names what is left out. README, commands.md and docs/start are run always,
-the other pages by ``pytest -m nightly``.
+put there. ``NOT_RUN`` names what is left out. README and docs/start/simulation.md are run always,
+commands.md and the rest of docs/start by ``make slow``, the other pages by ``make nightly``.
 """
 
 import re
@@ -405,19 +405,21 @@ def _run(words: Sequence[str], budget: Budget, left: dict[str, Path]) -> str | N
     return None
 
 
-EVERY_PAGE = pytest.mark.nightly("runs the printed commands of every page, with films and sweeps")
-
-
 def _parameter(page: Path) -> Any:
     name = str(page.relative_to(ROOT))
-    tour = name in {"README.md", "docs/commands.md"} or page.parent.name == "start"
-    return pytest.param(page, id=name, marks=() if tour else EVERY_PAGE)
+    if name in {"README.md", "docs/start/simulation.md"}:
+        marks = pytest.mark.costs("runs the commands of the first page")
+    elif name == "docs/commands.md" or page.parent.name == "start":
+        marks = pytest.mark.slow
+    else:
+        marks = pytest.mark.nightly("runs the commands of every page, with films and sweeps")
+    return pytest.param(page, id=name, marks=marks)
 
 
 RUN_PAGES = [
     _parameter(page) for page in PAGES if printed(page) and not page.name.startswith("add-")
 ]
-"""The tour is run always; all of them need more than a minute. Pages that add something to
+"""All of them need more than a minute. Pages that add something to
 snakewalk have tests of their own in ``tests/docs``."""
 
 

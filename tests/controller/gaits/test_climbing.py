@@ -57,6 +57,7 @@ def test_opposite_hands_are_mirror_images_and_backward_is_reversed(gait: Gait) -
     np.testing.assert_allclose(back, gait.joints_rad(ROBOT, -PHASES), atol=1e-12)
 
 
+@pytest.mark.costs("simulates a climb")
 @pytest.mark.parametrize(
     ("gait", "world", "sign"),
     [
@@ -80,12 +81,14 @@ def test_it_climbs_as_far_a_cycle_as_a_rolling_body_does(
     assert run.plant.contact_count >= 3
 
 
+@pytest.mark.costs("simulates a climb")
 def test_short_links_climb_a_pole_as_rolling_without_slip_does() -> None:
     gait = HelixPole()
     climb = follow(gait, "alternating32", "pole", 8.0, hold_s=1.0).way_m(1)[2]
     assert climb == pytest.approx(gait.advance_m(), rel=0.05)
 
 
+@pytest.mark.costs("simulates a climb")
 def test_a_pipe_that_lies_is_crept_through_and_backward_goes_back() -> None:
     lying = PipeObstacle(radius_m=0.15, upright=False)
     world = load_world("pipe").model_copy(update={"obstacle": lying})
@@ -130,6 +133,7 @@ def test_a_coil_starts_just_clear_of_what_it_will_hold() -> None:
         assert away.max() <= outer
 
 
+@pytest.mark.costs("simulates a climb")
 def test_compiled_and_numpy_steps_agree_at_a_pole() -> None:
     ends = [
         follow(HelixPole(), "alternating16", "pole", 0.5, hold_s=0.2, make_plant=make).centre_m

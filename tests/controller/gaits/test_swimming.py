@@ -79,6 +79,7 @@ def test_printed_standing_wave_is_its_own_reverse_and_has_no_thrust_direction(mo
     assert min(apart) > 0.1 * np.abs(forth).max()
 
 
+@pytest.mark.costs("simulates a swimmer")
 @pytest.mark.parametrize("mode", MODES)
 def test_every_mode_swims_forward_as_the_planar_model_says(mode: str) -> None:
     """The physics against a model that shares no code with it, with the joints as they moved."""
@@ -171,6 +172,7 @@ def test_a_salamander_swims_thrice_as_far_with_its_legs_folded() -> None:
     assert 0.2 < ways[0][0] / 0.63 < 0.5
 
 
+@pytest.mark.costs("simulates a swimmer")
 def test_compiled_and_numpy_water_agree() -> None:
     ends = [
         follow(Anguilliform(), "yaw16", "pool", 0.5, grow_s=0.25, make_plant=make).centre_m

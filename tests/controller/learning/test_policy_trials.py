@@ -33,6 +33,7 @@ def test_a_file_with_a_gait_is_a_set_of_its_parameters(tmp_path: Path) -> None:
     assert not _is_set("wave-cma")
 
 
+@pytest.mark.costs("trials of policies")
 def test_the_table_has_a_row_for_each_motion_and_world(monkeypatch: pytest.MonkeyPatch) -> None:
     work_in_this_process(monkeypatch)
     words = ["wave-cma", "lateral-undulation", "wave-cma", "--seeds", "1", "--first-seed", "40"]

@@ -21,6 +21,7 @@ def ran(folder: Path, *, compliance: bool | None, name: str = "pegs-undulation")
     return execute(replace(prepared, run=with_compliance(prepared.run, compliance)), folder)
 
 
+@pytest.mark.costs("a whole run")
 def test_joints_yield_and_the_log_tells_by_how_much(tmp_path: Path) -> None:
     stiff, soft = ran(tmp_path / "a", compliance=False), ran(tmp_path / "b", compliance=None)
     assert stiff.summary.yield_max_rad is None
@@ -37,6 +38,7 @@ def test_joints_yield_and_the_log_tells_by_how_much(tmp_path: Path) -> None:
     assert soft.summary.lifted_by_current is None
 
 
+@pytest.mark.costs("a whole run")
 def test_lost_replies_hold_the_yield_and_the_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,7 @@ def slalom(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecord, RunSumm
     return walked(tmp_path_factory.mktemp("slalom"), "flat-slalom", **PLANTED)
 
 
+@pytest.mark.costs("a walk until the friction is known")
 @pytest.mark.parametrize("run", ["flat-slalom", "jacksboro-traverse"])
 def test_what_was_planted_is_found_told_and_summarised(
     run: str, slalom: tuple[RunRecord, RunSummary], tmp_path: Path
@@ -43,6 +44,7 @@ def test_what_was_planted_is_found_told_and_summarised(
     assert told[0].startswith("found 0.1")
 
 
+@pytest.mark.slow
 def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> None:
     """Heavier or weaker by a fifth is no other friction."""
     looked, summary = walked(tmp_path / "looked", "flat-slalom")
@@ -59,6 +61,7 @@ def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> N
         assert not [event for event in other.events if event.kind == "friction"]
 
 
+@pytest.mark.costs("a walk until the friction is known")
 def test_the_same_run_finds_the_same(slalom: tuple[RunRecord, RunSummary], tmp_path: Path) -> None:
     one, _ = slalom
     two, _ = walked(tmp_path / "two", "flat-slalom", **PLANTED)
@@ -66,12 +69,14 @@ def test_the_same_run_finds_the_same(slalom: tuple[RunRecord, RunSummary], tmp_p
     np.testing.assert_array_equal(one.cycle.sent_rad, two.cycle.sent_rad)
 
 
+@pytest.mark.costs("a walk until the friction is known")
 def test_a_pose_by_the_joints_tells_nothing_of_friction(tmp_path: Path) -> None:
     """It takes the friction as known."""
     _, summary = walked(tmp_path / "run", "flat-slalom", pose="joints")
     assert summary.friction_found is None
 
 
+@pytest.mark.slow
 def test_a_camera_measures_it_on_paper(tmp_path: Path) -> None:
     _, summary = walked(tmp_path / "run", "flat-square", pose="camera", **PLANTED)
     found = summary.friction_found

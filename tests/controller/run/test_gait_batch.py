@@ -14,6 +14,7 @@ from snakewalk.controller.runlog.reader import read_log
 from tests.oracles.compiled_bodies import CompiledBodies
 
 
+@pytest.mark.costs("compares a batch with runs on a bus")
 def test_robots_of_a_batch_move_as_robots_on_a_bus(tmp_path: Path) -> None:
     runs = [
         prepare_gait(gait, robot="alternating16", world="isotropic", seconds=3.0)

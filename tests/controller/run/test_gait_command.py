@@ -49,6 +49,7 @@ def test_list_names_every_gait_with_its_source_and_the_shipped_sets() -> None:
     assert "sidewinding" in runner.invoke(app, ["gait", "list"]).output
 
 
+@pytest.mark.costs("a command and its run")
 def test_show_tells_ranges_and_draws_the_body(tmp_path: Path) -> None:
     picture = tmp_path / "side.png"
     found = call("gait", "show", "sidewinding", "--picture", str(picture), "--json")
@@ -137,6 +138,7 @@ def test_a_log_of_a_gait_replays_exactly_and_becomes_a_job_again(sidewound, tmp_
     assert isinstance(job, GaitRun)
 
 
+@pytest.mark.costs("a command and its run")
 def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> None:
     prepared = prepare_gait("turn-in-place", seconds=6.0)
     tight = SafetyConfig(current_limit_a=0.5, current_time_s=5.0)
@@ -152,6 +154,7 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
     assert events[0].level == "warning"
 
 
+@pytest.mark.costs("a command and its run")
 def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
     prepared = prepare_gait("lateral-undulation", seconds=6.0, look_heading_rad=0.3)
     record = read_log(execute(prepared, tmp_path).log)
@@ -161,6 +164,7 @@ def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
     assert np.sqrt(np.mean((heading - 0.3) ** 2)) < 0.15
 
 
+@pytest.mark.costs("a command and its run")
 def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
     presses = iter(["right", "down", "m", "n"])
     beat = iter(range(10**6))
@@ -181,6 +185,7 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
     assert kinds == [text for text in said if text in kinds]
 
 
+@pytest.mark.slow
 def test_live_from_a_terminal(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
     command = (  # with a page without pictures

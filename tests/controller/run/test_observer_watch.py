@@ -103,6 +103,7 @@ def serve(line: socket.socket) -> None:
         return
 
 
+@pytest.mark.costs("another process observes")
 @pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
 def test_a_process_that_is_killed_or_stopped_is_lost(name: str) -> None:
     now_s = 0.0

@@ -87,6 +87,7 @@ def served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
         yield SimulatedPort(robot)
 
 
+@pytest.mark.costs("a whole run")
 def test_a_run_keeps_the_order_of_its_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

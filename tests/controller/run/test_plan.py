@@ -21,6 +21,7 @@ def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motio
     assert ahead.joint_speed_rad_s.max() <= 1.1 * prepared.robot.joint_speed_limit_rad_s
 
 
+@pytest.mark.costs("plans a route")
 def test_without_feedback_slip_carries_the_body_off_its_path() -> None:
     prepared = prepare_walk("flat-slalom", motion="walk-blind", time_limit_s=80.0)
     assert prepared.forecast().reached < 5
@@ -40,6 +41,7 @@ def test_a_plan_as_json() -> None:
     assert found["waypoints_reached"] == found["waypoints"] == 5
 
 
+@pytest.mark.costs("plans a route")
 @pytest.mark.parametrize(("program", "warnings"), [("/nosuch/relay", 1), (sys.executable, 0)])
 def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warnings: int) -> None:
     """The run rejected it after a plan without a warning."""
@@ -50,6 +52,7 @@ def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warning
     assert all(f"stop output {program}: no such program" in line for line in found)
 
 
+@pytest.mark.costs("plans a route")
 def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
     done = snakewalk("plan", "ramp-15-up", "--motion", "serpenoid", "--json")
     assert done.returncode == 0, done.stderr

@@ -11,6 +11,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.port.serial_port import SerialPort
 
 
+@pytest.mark.costs("another process serves a robot")
 def test_the_servos_reply_and_the_body_is_drawn() -> None:
     robot = load_robot("yaw16")
     with RealTimeRobot(robot, load_world("flat")) as served:
@@ -30,6 +31,7 @@ def test_the_servos_reply_and_the_body_is_drawn() -> None:
         served.qpos()
 
 
+@pytest.mark.slow
 def test_a_robot_that_cannot_be_served_is_rejected() -> None:
     keys = {
         "name": "two",

@@ -12,11 +12,13 @@ from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
+from tests.helpers.tiers import slow_except
 
 SECONDS = 20.0
 
 
-@pytest.mark.parametrize("pose", ["simulator", "imu"])
+@pytest.mark.costs("a walk over hills")
+@pytest.mark.parametrize("pose", slow_except(["imu"], ["simulator", "imu"]))
 def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
     pose: str, tmp_path: Path, mocker: MockerFixture
 ) -> None:

@@ -57,6 +57,7 @@ def on_core(core: int) -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
+@pytest.mark.costs("a whole run")
 def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
     finished, tmp_path: Path
 ) -> None:
@@ -67,12 +68,14 @@ def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
         assert again.log.read_bytes() == finished.log.read_bytes()
 
 
+@pytest.mark.costs("a whole run")
 def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:
     other = execute(short(seed=5), tmp_path / "other")
     sent = [read_log(f.log).cycle.sent_rad[200:500] for f in (finished, other)]
     assert not np.array_equal(*sent)
 
 
+@pytest.mark.costs("a whole run")
 def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -> None:
     prepared = short(motion="serpenoid", time_limit_s=15.0)
     same = FrictionConfig(along=0.4, across=0.4)
@@ -97,6 +100,7 @@ def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.costs("a whole run")
 def test_the_default_job_starts_over_the_hills(tmp_path: Path) -> None:
     prepared = prepare_walk(DEFAULT_RUN, time_limit_s=4.0)
     assert prepared.ground is not None

@@ -51,6 +51,7 @@ def test_a_key_has_one_value() -> None:
         key_values("--set", ["b=1", "a=1", "b=1"])
 
 
+@pytest.mark.costs("a run and its replay")
 def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

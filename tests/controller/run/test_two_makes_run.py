@@ -25,6 +25,7 @@ from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.command import snakewalk
 from tests.helpers.pty_port import PtyPort, ServedClock
+from tests.helpers.tiers import slow_except
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "how-to" / "feetech.md"
 
@@ -37,6 +38,7 @@ def robot_file(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.costs("a run on two ports")
 def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=3.0)
     finished = execute(gait, tmp_path / "run", stoppable=False)
@@ -54,6 +56,7 @@ def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path)
     assert "STS3215-C018 (yaw_05, pitch_06, yaw_07, pitch_08)" in lacking[0]
 
 
+@pytest.mark.costs("a run on two ports")
 def test_plan_names_the_joints_without_a_watchdog(robot_file: Path) -> None:
     done = snakewalk("plan", "flat-slalom", "--motion", "serpenoid", "--robot", str(robot_file))
     assert done.returncode == 0, done.stderr
@@ -109,6 +112,7 @@ def ports(robot_file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ports]:
         yield Ports(load_robot(str(robot_file)), opened, monkeypatch)
 
 
+@pytest.mark.costs("a run on two ports")
 def test_a_gait_runs_on_both_ports(ports: Ports, robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=1.0)
     finished = execute(gait, tmp_path / "run", "robot", stoppable=False)
@@ -118,7 +122,8 @@ def test_a_gait_runs_on_both_ports(ports: Ports, robot_file: Path, tmp_path: Pat
         assert not line.firmware.drive.torque_on.any()
 
 
-@pytest.mark.parametrize("silent", [2, 7])
+@pytest.mark.costs("a run on two ports")
+@pytest.mark.parametrize("silent", slow_except([7], [2, 7]))
 def test_a_servo_that_dies_stops_the_run_on_both_ports(
     ports: Ports, robot_file: Path, tmp_path: Path, silent: int
 ) -> None:

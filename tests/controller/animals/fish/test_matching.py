@@ -52,6 +52,7 @@ def test_climb_finds_the_top_of_a_ridge_and_never_falls() -> None:
     assert held[0] == 3.0
 
 
+@pytest.mark.costs("fits a body to each frame")
 def test_spine_angles_of_a_rendered_film_are_found() -> None:
     frames = range(20, 150, 20)
     top, _, _ = film(TRUTH, frames, 120.0)
@@ -65,6 +66,7 @@ def test_spine_angles_of_a_rendered_film_are_found() -> None:
     assert np.median(errors.skeleton) < 0.035
 
 
+@pytest.mark.costs("fits a body to each frame")
 @pytest.mark.parametrize("fins", [0.0, 0.12])
 def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
     """[TH] 3.2.2: plates on the body; a model without them took 1.3 px of the fins for width."""
@@ -77,6 +79,7 @@ def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
     assert np.abs(px).max() < 0.8
 
 
+@pytest.mark.costs("fits a body to each frame")
 def test_a_side_view_gives_height_and_pitch() -> None:
     frames = range(20, 80, 20)
     top, model, base = film(TRUTH, frames, 80.0)

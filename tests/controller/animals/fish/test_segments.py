@@ -168,6 +168,7 @@ def test_every_join_is_within_one_class_and_seeds_repeat(seed: int) -> None:
 POINTS = np.array([[3.0, 0.0], [5.0, 3.0], [2.0, 5.0], [-2.0, 2.0]])
 
 
+@pytest.mark.costs("searches a path")
 def test_control_points_are_passed_in_order() -> None:
     stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
     made = sequence_through(stock, POINTS, radius=0.5)
@@ -213,6 +214,7 @@ def test_moments_lost_by_the_side_view_are_bridged_and_without_one_there_is_no_h
         sequence_through(flat, np.array([[3.0, 0.0, 0.2]]), radius=0.5)
 
 
+@pytest.mark.costs("searches a path")
 def test_control_points_in_space_are_passed_at_their_height() -> None:
     stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
     for height in (0.4, -0.4):

@@ -66,6 +66,7 @@ def test_steering_keeps_ends_and_turns_the_head_with_the_way() -> None:
     )
 
 
+@pytest.mark.costs("a fish swims for a minute")
 def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
     other = synthesise_motion(TRUTH, SynthesisOptions(through=((3.0, 0.0),), mirror=True))
     other.save(tmp_path / "other.npz")
@@ -85,6 +86,7 @@ def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
         synthesise_motion(TRUTH, SynthesisOptions(avoid=(tmp_path / "x.npz",)))
 
 
+@pytest.mark.costs("a fish swims for a minute")
 def test_a_fish_stays_in_its_tank() -> None:
     tank = (-2.0, -2.0, 4.0, 3.0)
     options = {"seconds": 9.0, "mirror": True, "seed": 0}

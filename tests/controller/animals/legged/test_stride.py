@@ -131,6 +131,7 @@ def test_what_is_no_walk_is_told() -> None:
         measure_stride(held, feet - spine.mean(axis=1, keepdims=True), (1, 3), 24 / lizard.cycle_s)
 
 
+@pytest.mark.costs("from a table to a walk")
 def test_from_a_tracker_s_table_to_a_walk_on_hills(tmp_path: Path) -> None:
     lizard = read_animal("lizard")
     table(tmp_path / "tracked.csv", lizard)
