@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,18 @@ from tests.docs.test_commands_in_pages import ROOT, printed
 from tests.helpers.command import snakewalk
 
 PAGE = ROOT / "docs" / "start" / "rehearsal.md"
+
+ENOUGH = 20
+"""Poses that tell their noise within a half; the page's second brings 50 on an idle machine."""
+
+
+def poses_of(check: list[str]) -> dict[str, Any]:
+    """Repeat the command until the sender, which a busy machine delays, has sent enough."""
+    for _ in range(30):
+        found: dict[str, Any] = json.loads(snakewalk(*check, "--json").stdout)
+        if found["poses"] >= ENOUGH:
+            return found
+    pytest.fail(f"few poses arrive: {found}")
 
 
 @pytest.mark.costs("runs a page against a simulated robot in real time")
@@ -27,11 +40,10 @@ def test_the_page_works_as_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         try:
             assert server.stdout is not None
             assert server.stdout.readline().startswith("port ")
-            checked = snakewalk(*check, "--json")
+            poses = poses_of(check)
             ran = snakewalk(*run, "--json", "--set", "run.time_limit_s=1")
         finally:
             server.send_signal(signal.SIGINT)
-    poses = json.loads(checked.stdout)
     assert poses["faults"] == [], poses
     assert poses["noise_m"] == pytest.approx(0.01, rel=0.5)
     answer = json.loads(ran.stdout)

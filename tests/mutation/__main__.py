@@ -1,31 +1,37 @@
-"""``python -m tests.mutation``: run the tests on every mutant; writes ``docs/mutation.md``.
+"""``python -m tests.mutation``: run the tests on mutants; writes ``docs/mutation.md``.
 
-Each mutant gets a forked process with the changed module in place of the true one, the tests that
-are about it, and a time limit. A mutant that no test notices must be explained in
-``explained.toml``; without a reason the run ends with exit code 1.
+Without words it tries every mutant of the modules that safety depends on (``TARGETS``). A mutant
+that no test notices must be explained in ``explained.toml``; otherwise the exit code is 1.
+
+``packages`` tries a sample of mutants of one module of each package with the fast tests near it;
+names after it choose packages or modules. The exit code is 1 if a share is below ``SHARE``.
 """
 
-import os
-import signal
+import argparse
 import sys
 import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from types import ModuleType
-
-os.environ["NUMBA_DISABLE_JIT"] = "1"  # a mutant's loops run as they stand: nothing to compile
 
 import hypothesis  # noqa: F401  loaded once, for all forks
 import numpy  # noqa: F401
-import pytest
+import pytest  # noqa: F401
 from rich.console import Console
 from rich.progress import track
 
-from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.mutants import mutants
+from tests.mutation.packages import drawn_modules, nearest_tests, sample
+from tests.mutation.trial import ROOT, path_of, try_mutants
 
-ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / "docs" / "mutation.md"
-BEGIN, END = "<!-- mutation begins -->", "<!-- mutation ends -->"
-TIME_LIMIT_S = 60
+EVERY, PACKAGES = "mutation", "packages"
+SHARE = 0.8
+"""Least share of noticed mutants in a package."""
+SAMPLE = 8
+"""Mutants of a module that are tried."""
+BUDGET_S = 8.0
+"""CPU time of the tests that are run on a mutant of a package."""
+TARGET_BUDGET_S = 600.0
 TARGETS = {
     "snakewalk.drivers.safety.vet": (
         "test_safety_edges.py",
@@ -53,61 +59,97 @@ TARGETS = {
 }
 
 
-def survives(module: str, mutant: Mutant, tests: tuple[str, ...]) -> bool:
-    """Whether no test fails on ``mutant``; a mutant that runs for ever does not."""
-    child = os.fork()
-    if child == 0:
-        os._exit(_try(module, mutant, tests))
-    _, status = os.waitpid(child, 0)
-    return os.waitstatus_to_exitcode(status) == 0
-
-
-def _try(module: str, mutant: Mutant, tests: tuple[str, ...]) -> int:
-    signal.alarm(TIME_LIMIT_S)
-    silent = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silent, 1)
-    os.dup2(silent, 2)
-    changed = ModuleType(module)
-    changed.__file__ = str(ROOT / (module.replace(".", "/") + ".py"))
-    sys.modules[module] = changed
-    try:
-        exec(compile(mutant.source, changed.__file__, "exec"), changed.__dict__)
-        parent, _, name = module.rpartition(".")
-        setattr(__import__(parent, fromlist=[name]), name, changed)
-    except Exception:
-        return 1
-    files = [str(file) for name in tests for file in (ROOT / "tests" / "drivers").rglob(name)]
-    words = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0"]
-    return int(pytest.main([*words, *files]))
-
-
-def main() -> None:
-    """Run all targets, or those named on the command line."""
-    named = sys.argv[1:] or list(TARGETS)
+def try_every(modules: list[str]) -> tuple[list[str], list[str]]:
+    """Try all mutants of the modules of safety; return lines of the page, and unexplained ones."""
     explained = tomllib.loads(Path(__file__).with_name("explained.toml").read_text("utf-8"))
     rows, reasons, unexplained = [], [], []
-    for module in named:
-        source = (ROOT / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8")
-        every = list(mutants(source))
-        left = [
-            mutant
-            for mutant in track(every, module, console=Console(stderr=True))
-            if survives(module, mutant, TARGETS[module])
-        ]
+    for module in track(modules, "modules", console=Console(stderr=True)):
+        every = list(mutants(path_of(module).read_text(encoding="utf-8")))
+        drivers = ROOT / "tests" / "drivers"
+        files = [str(file) for name in TARGETS[module] for file in drivers.rglob(name)]
+        survivors = try_mutants(module, every, files, TARGET_BUDGET_S).survivors
         known = explained.get(module, {})
-        for mutant in left:
+        for mutant in (every[index] for index in survivors):
             reason = known.get(mutant.name)
             reasons.append(f"- `{module}`: `{mutant.name}`: {reason}")
             if reason is None:
                 unexplained.append(f"{module}:{mutant.line}: {mutant.name}")
-        rows.append(f"| `{module}` | {len(every)} | {len(every) - len(left)} | {len(left)} |")
+        noticed = len(every) - len(survivors)
+        rows.append(f"| `{module}` | {len(every)} | {noticed} | {len(survivors)} |")
     head = ["| module | mutants | noticed | surviving, explained |", "| --- | ---: | ---: | ---: |"]
-    shown = "\n".join([*head, *rows, "", *reasons])
-    print(shown)
-    if not sys.argv[1:] and DOC.is_file():
-        text = DOC.read_text(encoding="utf-8")
-        kept = f"{text.split(BEGIN)[0]}{BEGIN}\n{shown}\n{END}{text.split(END)[-1]}"
-        DOC.write_text(kept, encoding="utf-8")
+    return [*head, *rows, "", *reasons], unexplained
+
+
+def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]]:
+    """Try a sample of each drawn module; yield it, its row of the page, and if it passes."""
+    for package, module in drawn_modules():
+        if names and package not in names and module not in names:
+            continue
+        source = path_of(f"snakewalk.{module}").read_text(encoding="utf-8")
+        drawn = sample(list(mutants(source)), count)
+        if not drawn:
+            yield module, f"| `{package}` | `{module}` | 0 | 0 | |", True
+            continue
+        trial = try_mutants(f"snakewalk.{module}", drawn, nearest_tests(module), BUDGET_S)
+        for test in trial.failing:
+            print(f"{module}: fails without a mutant, and is left out: {test}", file=sys.stderr)
+        for index in trial.survivors:
+            print(f"{module}:{drawn[index].line}: {drawn[index].name}", file=sys.stderr)
+        noticed = len(drawn) - len(trial.survivors)
+        share = noticed / len(drawn)
+        row = f"| `{package}` | `{module}` | {len(drawn)} | {noticed} | {100 * share:.0f} % |"
+        yield module, row, share >= SHARE
+
+
+def lines_between(marker: str) -> list[str]:
+    """Return the lines of the page that a marker encloses."""
+    text = DOC.read_text(encoding="utf-8")
+    return (
+        text.split(f"<!-- {marker} begins -->\n")[1]
+        .split(f"<!-- {marker} ends -->")[0]
+        .splitlines()
+    )
+
+
+def write_between(marker: str, lines: list[str]) -> None:
+    """Replace the lines of the page that a marker encloses."""
+    begin, end = f"<!-- {marker} begins -->", f"<!-- {marker} ends -->"
+    text = DOC.read_text(encoding="utf-8")
+    shown = "\n".join(lines)
+    DOC.write_text(
+        f"{text.split(begin)[0]}{begin}\n{shown}\n{end}{text.split(end)[-1]}", encoding="utf-8"
+    )
+
+
+def joined_rows(lines: list[str], rows: Mapping[str, str]) -> list[str]:
+    """Return the table with new rows in place of those of the same modules."""
+    kept = {line.split("|")[2].strip(" `"): line for line in lines[2:]}
+    drawn = [module for _, module in drawn_modules()]
+    every = {**kept, **rows}
+    return [*lines[:2], *(every[module] for module in dict.fromkeys(drawn) if module in every)]
+
+
+def main() -> None:
+    """Try the named modules, or all, and write the tables."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
+    parser.add_argument("names", nargs="*", help="modules; or 'packages', and names of packages")
+    parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants of each package")
+    given = parser.parse_args()
+    if given.names[:1] == [PACKAGES]:
+        rows, failed = {}, []
+        for module, row, passes in try_packages(given.names[1:], given.sample):
+            print(row, flush=True)
+            rows[module] = row
+            failed += [] if passes else [module]
+            write_between(PACKAGES, joined_rows(lines_between(PACKAGES), rows))
+        if failed:
+            print(f"below {100 * SHARE:.0f} %:", *failed, sep="\n", file=sys.stderr)
+            raise SystemExit(1)
+        return
+    lines, unexplained = try_every(given.names or list(TARGETS))
+    print(*lines, sep="\n")
+    if not given.names:
+        write_between(EVERY, lines)
     if unexplained:
         print("not explained:", *unexplained, sep="\n", file=sys.stderr)
         raise SystemExit(1)

@@ -41,8 +41,8 @@ class Mutant:
     before: str
     after: str
     line: int
-    source: str
-    """The whole file, changed."""
+    tree: ast.Module
+    """The whole file, changed; its lines are those of the file."""
 
     @property
     def name(self) -> str:
@@ -63,7 +63,7 @@ def mutants(source: str) -> Iterator[Mutant]:
             ast.fix_missing_locations(changed)
             after = ast.unparse(_statement(changed, path))
             if before != after:
-                yield Mutant(where, *_differ(before, after), statement.lineno, ast.unparse(changed))
+                yield Mutant(where, *_differ(before, after), statement.lineno, changed)
 
 
 Path = tuple[tuple[str, int | None], ...]
