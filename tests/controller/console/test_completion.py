@@ -67,6 +67,7 @@ def test_files_in_folders_and_all_names_are_offered(
     assert completed("snakewalk run ", monkeypatch, capsys) == list(shipped("runs"))
 
 
+@pytest.mark.costs("reads the help of every command")
 def test_help_lists_and_completion_load_nothing_heavy() -> None:
     """Counted, for a time would depend on the machine; in the order of what each may load."""
     program = """
@@ -99,6 +100,7 @@ heavy([], slow, _SNAKEWALK_COMPLETE="complete_bash", **words)
     assert [line for line in lines if not line.endswith(" []")] == []
 
 
+@pytest.mark.costs("reads the help of every command")
 def test_help_loses_no_words_to_markup() -> None:
     """Text in brackets is a style to what draws the help: ``[power]`` would not be shown."""
 

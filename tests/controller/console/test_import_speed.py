@@ -9,6 +9,7 @@ import pytest
 from snakewalk.controller.console.import_speed import without_collections
 
 
+@pytest.mark.costs("starts an interpreter")
 def test_a_gait_on_a_port_imports_no_simulator_and_no_walk() -> None:
     """They needed 0.6 of 1.6 s of processor time until torque."""
     program = (

@@ -36,6 +36,7 @@ def dying(folder: Path, *deaths: int) -> list[tuple[str, int, int]]:
     return [(str(folder), number, many) for number, many in enumerate(deaths)]
 
 
+@pytest.mark.costs("starts processes")
 def test_a_worker_that_is_killed_loses_no_item(tmp_path: Path) -> None:
     items = dying(tmp_path, 0, 0, 0, 1, 0, 0, 0, 0, 0, 2, *[0] * 10)
     found = list(each(square, items, workers=2))
@@ -50,6 +51,7 @@ def test_an_item_that_always_ends_its_worker_is_named(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) in {3, 4}  # maybe once beside the other, then alone
 
 
+@pytest.mark.slow
 def test_a_cluster_whose_worker_is_killed_loses_no_item(tmp_path: Path) -> None:
     items = dying(tmp_path, 0, 0, 1, *[0] * 17)
     with distributed.LocalCluster(
@@ -77,6 +79,7 @@ def test_few_items_are_under_way_at_a_time() -> None:
     assert most <= AHEAD + 2
 
 
+@pytest.mark.costs("starts processes")
 def test_points_travel_to_other_processes() -> None:
     points, _ = points_of(GAITS["rolling"], load_robot("alternating16"), 2, seed=0, seconds=5.0)
     found = {point.number: key for point, key in each(attrgetter("key"), points, workers=1)}

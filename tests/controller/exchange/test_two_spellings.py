@@ -43,6 +43,7 @@ def files_and_output(folder: Path, arguments: list[str]) -> dict[str, bytes]:
     return {"output": done.stdout.encode(), **files}
 
 
+@pytest.mark.costs("runs commands twice")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_gives_the_same_bytes(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

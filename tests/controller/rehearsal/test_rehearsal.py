@@ -62,6 +62,7 @@ def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
     return run
 
 
+@pytest.mark.slow
 def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> None:
     first, truth, _ = rehearsed(NOISY)
     second, again, _ = rehearsed(NOISY, name="again")
