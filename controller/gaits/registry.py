@@ -1,8 +1,9 @@
-"""The gaits by name: every concrete ``Gait`` in a module of this package."""
+"""The gaits by name: every concrete ``Gait`` of this package, and those of other packages."""
 
 import inspect
 from collections.abc import Iterator
 from importlib import import_module
+from importlib.metadata import entry_points
 from pkgutil import iter_modules
 from typing import Any, Final
 
@@ -27,11 +28,32 @@ _FIRST: Final = (
 """Modules whose gaits come first in lists; the other modules follow by name."""
 _WITHOUT_GAITS: Final = ("registry", "backbone", "spine_heading")
 """Modules that define no gait; two of them are slow to import."""
+ENTRY_POINTS: Final = "snakewalk.gaits"
+"""Group of the entry points of other packages, each of which names a gait."""
+BROKEN: Final[dict[str, str]] = {}
+"""Why a gait of another package cannot be used, by the name of its entry point."""
 
 
 def gaits_by_name() -> dict[str, type[Gait]]:
     """Return the gaits by name; ``docs/how-to/add-a-gait.md`` describes how to add one."""
-    return {gait.name: gait for gait in _gaits()}
+    found: dict[str, type[Gait]] = {}
+    for gait in (*_gaits(), *_foreign_gaits()):
+        found.setdefault(gait.name, gait)
+    return found
+
+
+def _foreign_gaits() -> Iterator[type[Gait]]:
+    for entry in entry_points(group=ENTRY_POINTS):
+        try:
+            gait = entry.load()
+            fault = "" if issubclass(gait, Gait) else "is not a Gait"
+        except Exception as error:
+            fault = f"cannot be imported ({type(error).__name__}: {error})"
+        if not fault:
+            yield gait
+            continue
+        package = entry.value if entry.dist is None else entry.dist.name
+        BROKEN[entry.name] = f"gait {entry.name} of {package}: {fault}; repair or uninstall it"
 
 
 def _gaits() -> Iterator[type[Gait]]:
@@ -67,5 +89,5 @@ def make_gait(name: str, values: dict[str, Any] | None = None, source: str = "")
     """
     heading_loop()  # compiled here, not during a run
     if name not in GAITS:
-        raise InputError(f"{name}: no such gait; there are {', '.join(GAITS)}")
+        raise InputError(BROKEN.get(name, f"{name}: no such gait; there are {', '.join(GAITS)}"))
     return GAITS[name].of(values, source)
