@@ -308,3 +308,26 @@ def test_a_command_of_snakewalk_that_has_the_port_open_is_named_with_its_run(
             process.kill()
     assert f"run flat-square {name} (process {process.pid})" in text
     assert text.endswith(f"; end it, a run by: snakewalk stop --port {name}")
+
+
+@pytest.mark.parametrize(("timer_ms", "latency_s"), [(16, 0.019), (1, 0.004), (None, 0.004)])
+def test_the_host_delays_bytes_by_the_adapters_timer_and_its_own_3_ms(
+    timer_ms: int | None, latency_s: float
+) -> None:
+    class Adapter(SerialPort):
+        latency_timer_ms = timer_ms  # type: ignore[assignment]
+
+        def _is_pseudo_terminal(self) -> bool:
+            return False
+
+    assert Adapter.__new__(Adapter).latency_s == pytest.approx(latency_s)
+
+
+def test_another_fault_of_a_terminal_is_told_as_it_is_and_nothing_stays_open() -> None:
+    master, slave = os.openpty()
+    name, error = os.ttyname(slave), OSError(errno.EIO, "broken")
+    before = sorted(os.listdir("/proc/self/fd"))
+    assert open_fault(name, 57_600, error) == f"{name}: cannot be opened: {error}"
+    assert sorted(os.listdir("/proc/self/fd")) == before
+    os.close(master)
+    os.close(slave)

@@ -1,0 +1,68 @@
+"""Which module of each package is mutated, and which tests are near it."""
+
+import json
+import random
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import PurePosixPath
+from typing import Final
+
+import networkx as nx
+
+from tests.architecture.imports import ROOT, module_imports, read_folder, sources
+from tests.architecture.layout import ORDER, package_of
+from tests.mutation.mutants import Mutant
+from tests.tiers.selection import CPU_S, distances, mirrored_folder, texts_of_tests
+
+LINES: Final = 100
+"""A drawn module has more lines."""
+FILES: Final = 6
+"""Test files that are run on a mutant: those nearest to its module."""
+ALWAYS: Final = ("controller.images.silhouette", "controller.track.analysis")
+"""Modules whose evidence once was in expensive tests only."""
+
+
+@cache
+def _imports() -> nx.DiGraph:
+    return module_imports({**sources(), **read_folder("tests")})
+
+
+def drawn_modules() -> Iterator[tuple[str, str]]:
+    """Yield each package with a module of it, without ``snakewalk``."""
+    for module in ALWAYS:
+        yield package_of(module), module
+    large = [
+        module
+        for module in sources()
+        if (file := ROOT / (module.replace(".", "/") + ".py")).is_file()
+        and len(file.read_text(encoding="utf-8").splitlines()) > LINES
+    ]
+    for package in (package for order in ORDER.values() for package in order):
+        modules = sorted(module for module in large if package_of(module) == package)
+        if modules:
+            yield package, random.Random(0).choice(modules)
+
+
+def sample(mutants: Sequence[Mutant], count: int) -> list[Mutant]:
+    """Draw mutants by seed 0; all of them if there are few."""
+    if len(mutants) <= count:
+        return list(mutants)
+    return random.Random(0).sample(mutants, count)
+
+
+def nearest_tests(module: str) -> list[str]:
+    """Return the paths of the test files near a module: of its name, then of its package."""
+    path = module.replace(".", "/") + ".py"
+    stem = PurePosixPath(path).stem
+    by_import = distances([path], _imports(), texts_of_tests())
+    cpu_s = json.loads(CPU_S.read_text(encoding="utf-8"))
+    words = set(stem.split("_"))
+    mirror = mirrored_folder(path, {str(PurePosixPath(test).parent) for test in by_import})
+
+    def rank(test: str) -> tuple[object, ...]:
+        file = PurePosixPath(test)
+        shared = words & set(file.stem.split("_"))
+        is_apart = str(file.parent) != mirror
+        return by_import[test] > 1, -len(shared), is_apart, cpu_s.get(test, 0.0), test
+
+    return sorted(by_import, key=rank)[:FILES]

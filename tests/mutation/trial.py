@@ -1,0 +1,180 @@
+"""Run the tests on mutants of a module: one collection, then a forked process for each mutant."""
+
+import ast
+import gc
+import json
+import os
+import resource
+import signal
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from types import CodeType, FunctionType
+from typing import Final, NamedTuple
+
+import pytest
+
+from tests.mutation.mutants import Mutant
+from tests.tiers.costs import cpu_s
+
+ROOT: Final = Path(__file__).resolve().parents[2]
+STUCK_S: Final = 600
+"""Wall time after which a test that waits for ever has noticed its mutant."""
+TEST_S: Final = 4.0
+"""CPU time of the most expensive test that is run on each mutant."""
+_WORDS: Final = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
+_COMPILED: Final = {"compiled", "njit", "inlined", "vectorize", "guvectorize"}
+
+
+class Trial(NamedTuple):
+    """Result for a module."""
+
+    survivors: list[int]
+    """Indices of the mutants that no test noticed."""
+    tests: int
+    """Number of tests that were run on each mutant."""
+    cpu_s: float
+    """Their CPU time on the module as it is."""
+    failing: list[str]
+    """Tests that fail without a mutant; they are not run."""
+
+
+def path_of(module: str) -> Path:
+    """Return the file of a module, as its functions name it."""
+    return ROOT / (module.replace(".", "/") + ".py")
+
+
+def _has_compiled_loops(tree: ast.AST) -> bool:
+    """Return whether numba would load the loops from its cache, without a mutant."""
+    return any(
+        ast.unparse(decorator).split("(")[0].rpartition(".")[2] in _COMPILED
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef)
+        for decorator in function.decorator_list
+    )
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield constant
+            yield from _codes(constant)
+
+
+def _place(code: CodeType) -> tuple[str, int]:
+    return code.co_qualname, code.co_firstlineno
+
+
+def _functions(file: Path) -> dict[tuple[str, int], list[FunctionType]]:
+    """Return every function of a file, wherever something keeps it."""
+    gc.unfreeze()
+    found: defaultdict[tuple[str, int], list[FunctionType]] = defaultdict(list)
+    for kept in gc.get_objects():
+        if type(kept) is FunctionType and kept.__code__.co_filename == str(file):
+            found[_place(kept.__code__)].append(kept)
+    return found
+
+
+class _Forks:
+    """A plugin of pytest that runs the collected tests once for each mutant."""
+
+    def __init__(self, file: Path, mutants: Sequence[Mutant], budget_s: float) -> None:
+        self._file = file
+        self._mutants = mutants
+        self._budget_s = budget_s
+        self._out: int | None = None
+        self._start_s = 0.0
+        self._used_s = 0.0
+        self._failed: set[str] = set()
+        self.is_child = False
+        self.trial: Trial | None = None
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
+        """Fork; a child returns None, and pytest runs its tests."""
+        functions = _functions(self._file)
+        read, write = os.pipe()
+        if self._fork(10.0 * self._budget_s) == 0:
+            self._out = write
+            session.config.option.maxfail = 0
+            return None
+        os.close(write)
+        with os.fdopen(read) as lines:
+            measured = [json.loads(line) for line in lines]
+        os.wait()
+        kept_s = {name: s for name, s, passed in measured if passed and s <= TEST_S}
+        session.items = [item for item in session.items if item.nodeid in kept_s]
+        survivors = []
+        for index, mutant in enumerate(self._mutants if kept_s else ()):
+            if self._fork(10.0 + 3.0 * sum(kept_s.values())) == 0:
+                self._apply(mutant, functions)
+                return None
+            if os.waitstatus_to_exitcode(os.wait()[1]) == 0:
+                survivors.append(index)
+        failing = [name for name, _, passed in measured if not passed]
+        self.trial = Trial(survivors, len(kept_s), sum(kept_s.values()), failing)
+        return True
+
+    def _fork(self, limit_s: float) -> int:
+        child = os.fork()
+        if child == 0:
+            self.is_child = True
+            signal.alarm(STUCK_S)
+            used_s = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
+            resource.setrlimit(resource.RLIMIT_CPU, (int(used_s + limit_s) + 1,) * 2)
+        return child
+
+    def pytest_runtest_protocol(self) -> bool | None:
+        """Leave out the tests that the budget does not allow."""
+        return True if self._out is not None and self._used_s > self._budget_s else None
+
+    def pytest_runtest_logstart(self) -> None:
+        self._start_s = cpu_s()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self._failed.add(report.nodeid)
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        if self._out is not None:
+            spent_s = cpu_s() - self._start_s
+            self._used_s += spent_s
+            line = json.dumps([nodeid, spent_s, nodeid not in self._failed])
+            os.write(self._out, f"{line}\n".encode())
+
+    def _apply(self, mutant: Mutant, functions: dict[tuple[str, int], list[FunctionType]]) -> None:
+        for code in _codes(compile(mutant.tree, str(self._file), "exec")):
+            for function in functions.get(_place(code), ()):
+                if len(code.co_freevars) == len(function.__code__.co_freevars):
+                    function.__code__ = code
+
+
+def try_mutants(
+    module: str, mutants: Sequence[Mutant], files: Sequence[str], budget_s: float
+) -> Trial:
+    """Run the tests of ``files`` on each mutant, in processes of their own.
+
+    Tests are left out after ``budget_s`` of CPU. A module with compiled loops is tested as Python.
+    """
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        silent = os.open(os.devnull, os.O_WRONLY)
+        if not os.environ.get("MUTATION_LOUD"):
+            os.dup2(silent, 1)
+            os.dup2(silent, 2)
+        if _has_compiled_loops(ast.parse(path_of(module).read_text(encoding="utf-8"))):
+            os.environ["NUMBA_DISABLE_JIT"] = "1"
+        forks = _Forks(path_of(module), mutants, budget_s)
+        code = pytest.main([*_WORDS, *files], plugins=[forks])
+        if not forks.is_child and forks.trial is not None:
+            with os.fdopen(write, "w") as out:
+                json.dump(forks.trial, out)
+        os._exit(int(code))
+    os.close(write)
+    with os.fdopen(read) as lines:
+        said = lines.read()
+    os.waitpid(child, 0)
+    if not said:
+        raise RuntimeError(f"{module}: pytest ended before a mutant was tried")
+    return Trial(*json.loads(said))
