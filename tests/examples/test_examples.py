@@ -52,6 +52,7 @@ def test_what_the_training_takes_of_the_library_is_there() -> None:
         assert hasattr(import_module(str(module)), name)
 
 
+@pytest.mark.costs("runs an example in a process of its own")
 @pytest.mark.parametrize("name", NAMES)
 def test_it_runs_and_leaves_nothing(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]

@@ -183,6 +183,7 @@ def test_a_wheel_holds_every_file_and_one_top_level_name(source: Path, wheel: Pa
     assert {name for name in names if ".dist-info/" not in name} == shipped(source)
 
 
+@pytest.mark.slow
 def test_a_wheel_built_from_the_sdist_is_the_same(
     source: Path, wheel: Path, tmp_path: Path
 ) -> None:
@@ -199,11 +200,13 @@ def test_what_is_installed_at_the_top(installed: Installed) -> None:
     assert {name for name in ours if not name.startswith("snakewalk-")} == {"snakewalk"}
 
 
+@pytest.mark.costs("installs a wheel")
 def test_the_command_runs_in_a_users_project(installed: Installed) -> None:
     assert "Usage: snakewalk" in installed.run("snakewalk", "--help")
     assert "flat-slalom" in installed.run("snakewalk", "list", "--json")
 
 
+@pytest.mark.costs("installs a wheel")
 def test_a_users_suite_keeps_its_packages_and_has_the_fixture(installed: Installed) -> None:
     # started as a module, the user's project comes first on the path, also for our plugin
     found = installed.run("python", "-c", "import snakewalk; print(snakewalk.__file__)")
@@ -255,6 +258,7 @@ def lightly(light: Path, folder: Path, *words: str) -> "subprocess.CompletedProc
     )
 
 
+@pytest.mark.costs("installs a wheel")
 def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Path) -> None:
     (tmp_path / "test_light.py").write_text(LIGHT_TEST)
     done = lightly(light, tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider")

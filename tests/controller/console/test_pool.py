@@ -149,6 +149,7 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
                 os.killpg(parent.pid, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     def forked() -> int:
         raise AssertionError("forked: a worker must be a fresh interpreter")

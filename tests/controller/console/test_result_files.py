@@ -305,6 +305,7 @@ def writes(call: ast.Call) -> bool:
     return opened or name in WRITERS | EXPORTS or name.startswith("savez")
 
 
+@pytest.mark.costs("reads every source file")
 def test_every_result_is_written_atomically() -> None:
     found = {
         f"{file.relative_to(CONTROLLER)}:{line}"

@@ -88,6 +88,7 @@ def folder(tmp_path: Path) -> Folder:
     return Folder(tmp_path)
 
 
+@pytest.mark.costs("starts a program in a folder of planted files")
 @pytest.mark.parametrize("words", COMMANDS)
 def test_a_command_executes_no_file_of_the_working_folder(
     folder: Folder, words: tuple[str, ...]
@@ -101,6 +102,7 @@ def test_a_command_executes_no_file_of_the_working_folder(
     assert ended.returncode == 0, ended.stderr
 
 
+@pytest.mark.slow
 def test_the_ros_node_executes_no_file_of_the_working_folder(folder: Folder) -> None:
     pytest.importorskip("rclpy")
     ended = folder.run(folder.script, "ros", "--seconds", "0.1", "--out", "run")
@@ -119,6 +121,7 @@ def test_studies_of_logs_execute_no_file_of_the_working_folder(folder: Folder) -
         assert ended.returncode in {0, 1}, ended.stderr
 
 
+@pytest.mark.slow
 def test_the_drawing_of_a_served_bus_executes_no_file_of_the_working_folder(
     folder: Folder,
 ) -> None:
@@ -138,6 +141,7 @@ def test_the_drawing_of_a_served_bus_executes_no_file_of_the_working_folder(
     assert "drawn" in ended.stderr
 
 
+@pytest.mark.costs("starts a program in a folder of planted files")
 def test_the_main_process_drops_the_working_folder(folder: Folder) -> None:
     """``python -c`` puts it first; what is imported before the command runs is Python's matter."""
     code = (

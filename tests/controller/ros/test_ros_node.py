@@ -123,6 +123,7 @@ def point(time_s: float, *angles: float, **more: Any) -> JointTrajectoryPoint:
     return JointTrajectoryPoint(positions=angles, time_from_start=duration, **more)
 
 
+@pytest.mark.costs("starts a ROS client in another process")
 def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_path: Path) -> None:
     states = client.listen(JointState, "/robot_joint_states")
     sent = client.listen(JointState, "/robot_joint_goals")
@@ -350,6 +351,7 @@ def test_what_the_middleware_says_is_told_in_a_line() -> None:
     assert "\n" not in said["fault"]
 
 
+@pytest.mark.slow
 def test_no_message_ends_the_run_or_silences_the_stop_service(
     graph: Graph, client: Client, tmp_path: Path
 ) -> None:

@@ -77,6 +77,7 @@ def test_an_unknown_covariance_and_a_lost_body() -> None:
             decode_pose(pose_of(message, 0, has_covariance=False))
 
 
+@pytest.mark.costs("starts a ROS client in another process")
 def test_poses_arrive_over_dds(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, value in {**LOOPBACK, "ROS_DOMAIN_ID": str(DOMAIN)}.items():
         monkeypatch.setenv(key, value)
@@ -124,6 +125,7 @@ def test_the_transforms_of_one_frame_become_poses() -> None:
     )
 
 
+@pytest.mark.costs("starts a ROS client in another process")
 @pytest.mark.skipif(find_spec("tf2_msgs") is not None, reason="tf2_msgs is installed")
 def test_transforms_without_their_messages_name_the_package() -> None:
     with pytest.raises(InputError, match="tf2_msgs is not installed; install ros-jazzy-tf2-msgs"):
