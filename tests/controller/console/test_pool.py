@@ -168,7 +168,7 @@ def test_processes_are_started_in_one_place_and_spawned() -> None:
         p for top in ("config", "controller", "drivers", "sim") for p in (root / top).rglob("*.py")
     ]
     names = (
-        "get_context", "subprocess", "set_start_method", "multiprocessing.pool", "os.fork",
+        "get_context(", "subprocess", "set_start_method", "multiprocessing.pool", "os.fork",
         "os.spawn", "os.posix_spawn", "os.exec", "os.system", "os.popen", "pty.spawn", "runpy",
         "LocalCluster",
     )  # fmt: skip

@@ -18,7 +18,8 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
 from snakewalk.controller.motion.commanded import Commanded
-from snakewalk.controller.ros.ros_link import RosLink, _decoded
+from snakewalk.controller.ros.command_codec import decode_command
+from snakewalk.controller.ros.ros_link import RosLink
 from snakewalk.controller.ros.ros_node import RobotNode, _make_node, _spinning
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.execute import Finished, execute
@@ -49,7 +50,8 @@ class Graph:
         """It has none."""
 
     def commands(self) -> list[Any]:
-        return [_decoded(line) for line in self._end.commands()]
+        """Return the commands; on a busy machine they may wait for longer than on a robot."""
+        return [decode_command(line, late_s=60.0) for line in self._end.commands()]
 
     def stop(self) -> None:
         self.robot._button.press("the test")  # type: ignore[union-attr]
