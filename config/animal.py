@@ -17,8 +17,12 @@ class SectionConfig(Strict):
     """An ellipse across the body; lengths over the body's."""
 
     at: Place = Field(description="place along the body, 0 the head's tip")
-    half_width: float = Field(ge=0.0, le=0.5)
-    half_height: float = Field(ge=0.0, le=0.5)
+    half_width: float = Field(
+        ge=0.0, le=0.5, description="half of the width of the body here, in body lengths"
+    )
+    half_height: float = Field(
+        ge=0.0, le=0.5, description="half of the height of the body here, in body lengths"
+    )
     lift: float = Field(0.0, ge=-0.5, le=0.5, description="of its middle above the body's axis")
 
 
@@ -43,15 +47,22 @@ class FinConfig(Strict):
 class SkinConfig(Strict):
     """A body to be covered by PDE patches."""
 
-    name: str
+    name: str = Field(description="name of the body")
     source: str = Field(description="where the figures come from")
     sections: tuple[SectionConfig, ...] = Field(min_length=4, description="head to tail")
-    fins: tuple[FinConfig, ...] = ()
-    back_rgb: tuple[Channel, Channel, Channel] = (0.66, 0.48, 0.20)
-    band_rgb: tuple[Channel, Channel, Channel] = (0.36, 0.22, 0.11)
+    fins: tuple[FinConfig, ...] = Field((), description="fins on the body")
+    back_rgb: tuple[Channel, Channel, Channel] = Field(
+        (0.66, 0.48, 0.20), description="colour of the back: red, green and blue from 0 to 1"
+    )
+    band_rgb: tuple[Channel, Channel, Channel] = Field(
+        (0.36, 0.22, 0.11),
+        description="colour of the bands across the back: red, green and blue from 0 to 1",
+    )
     bands: int = Field(0, ge=0, le=60, description="dark bands across the back")
     eye_at: Place = Field(0.05, description="place of the eyes along the body")
-    eye_radius: float = Field(0.006, gt=0.0, le=0.05)
+    eye_radius: float = Field(
+        0.006, gt=0.0, le=0.05, description="radius of the eyes in body lengths"
+    )
 
     @model_validator(mode="after")
     def _from_tip_to_tip(self) -> Self:
@@ -150,7 +161,9 @@ class OrnamentConfig(Strict):
 
     at: Place = Field(description="place along the body that carries it")
     root: Point = Field(description="ahead of that place, to the left and above the axis")
-    tip: Point
+    tip: Point = Field(
+        description="place of the tip in body lengths, from the base of the ornament"
+    )
     thick: float = Field(gt=0.0, le=0.1, description="radius at the root")
     bow: Point = Field((0.0, 0.0, 0.0), description="of its middle, off the line to the tip")
     swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="to and fro, once a step")
@@ -167,7 +180,7 @@ class OrnamentConfig(Strict):
 class AnimalConfig(Strict):
     """An animal on four legs that goes straight: prototype of a motion along a path."""
 
-    name: str
+    name: str = Field(description="name of the animal")
     source: str = Field(description="where the figures come from")
     skin: str = Field(
         description="skin of the body: a shipped skin, or a .toml in the folder of this file"
@@ -186,7 +199,9 @@ class AnimalConfig(Strict):
         0.0, ge=0.0, le=1.0, description="how far the body rides on legs as on pendulums"
     )
     tail_swing_rad: float = Field(0.0, ge=0.0, le=1.5, description="of the tail's tip")
-    ornaments: tuple[OrnamentConfig, ...] = ()
+    ornaments: tuple[OrnamentConfig, ...] = Field(
+        (), description="horns, ears and beard of the animal"
+    )
 
     @model_validator(mode="after")
     def _front_before_hind(self) -> Self:

@@ -16,8 +16,8 @@ Place = tuple[float, float]
 class CameraConfig(Strict):
     """A camera above known ground, or one that sees tags (docs/overhead-camera.md)."""
 
-    width_px: int = Field(640, ge=64, le=4096)
-    height_px: int = Field(480, ge=64, le=4096)
+    width_px: int = Field(640, ge=64, le=4096, description="width of the camera's picture")
+    height_px: int = Field(480, ge=64, le=4096, description="height of the camera's picture")
     rate_hz: float = Field(30.0, gt=0.0, le=240.0, description="frames a second")
     field_width_m: float = Field(
         6.0, gt=0.1, le=100.0, description="width of the floor that an image shows"
@@ -130,8 +130,12 @@ class StereoHeadConfig(Strict):
     )
     tilt_rad: float = Field(0.5, ge=-0.5, le=1.5, description="by which they look down")
     baseline_m: float = Field(0.095, gt=0.01, le=0.5, description="between the lenses")
-    width_px: int = Field(320, ge=160, le=2048)
-    height_px: int = Field(240, ge=120, le=2048)
+    width_px: int = Field(
+        320, ge=160, le=2048, description="width of the picture of each camera of the head"
+    )
+    height_px: int = Field(
+        240, ge=120, le=2048, description="height of the picture of each camera of the head"
+    )
     focal_px: float = Field(200.0, gt=20.0, le=10_000.0, description="focal length")
     disparities: int = Field(80, ge=16, le=512, description="that are tried, from infinity on")
     exposure_s: float = Field(0.005, ge=0.0, le=0.1, description="how long a picture is exposed")

@@ -14,6 +14,7 @@ from pydantic_core import PydanticUndefined
 
 from snakewalk.config.animal import AnimalConfig, SkinConfig
 from snakewalk.config.faults import FaultPlan
+from snakewalk.config.field_facts import bounds_in, bounds_text, description_of
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import Kind, locate, shipped
 from snakewalk.config.playback import ScheduleConfig
@@ -172,8 +173,7 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
                 inner += _tables(_title(title, name, one, len(nested)), one)
             continue
         default = "required" if field.is_required() else f"`{_text(field.default)}`"
-        description = field.description or ""
-        lines.append(f"| `{name}` | {value_kind(field)} | {default} | {description} |")
+        lines.append(f"| `{name}` | {value_kind(field)} | {default} | {description_of(field)} |")
     return [*lines, "", *inner]
 
 
@@ -211,7 +211,9 @@ def table_models(annotation: Any) -> list[type[BaseModel]]:
 def _kind(annotation: Any) -> str:
     if get_origin(annotation) is Annotated:
         inner, *rules = get_args(annotation)
-        bounds = [_bounds(rule).removeprefix(", ") for rule in rules if isinstance(rule, FieldInfo)]
+        bounds = [
+            bounds_text(bounds_in(rule.metadata)) for rule in rules if isinstance(rule, FieldInfo)
+        ]
         return _kind(inner) + "".join(f" ({told})" for told in bounds if told)
     if get_origin(annotation) is Literal:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
@@ -232,18 +234,8 @@ def _kind(annotation: Any) -> str:
 
 def value_kind(field: FieldInfo) -> str:
     """Kind and bounds of a key's value, as text."""
-    return f"{_kind(field.annotation)}{_bounds(field)}"
-
-
-def _bounds(field: FieldInfo) -> str:
-    signs = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
-    found = [
-        f"{sign} {getattr(rule, name):g}"
-        for name, sign in signs
-        for rule in field.metadata
-        if getattr(rule, name, None) is not None
-    ]
-    return f", {', '.join(found)}" if found else ""
+    bounds = bounds_text(bounds_in(field.metadata))
+    return f"{_kind(field.annotation)}{bounds and ', '}{bounds}"
 
 
 def _text(value: Any) -> str:

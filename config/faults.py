@@ -24,10 +24,15 @@ class _Lasting(_Fault):
 class NoiseFault(_Lasting):
     """Packets that a bad cable or a busy host changes; each packet has ``chance``."""
 
-    kind: Literal["drop", "corrupt", "truncate", "duplicate", "delay", "late"]
-    chance: float = Field(1.0, gt=0.0, le=1.0)
+    kind: Literal["drop", "corrupt", "truncate", "duplicate", "delay", "late"] = Field(
+        description="change of a packet; late: a reply that the host no longer waits for"
+    )
+    chance: float = Field(1.0, gt=0.0, le=1.0, description="share of the packets that change")
     ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
-    of: Literal["answers", "questions", "both"] = "answers"
+    of: Literal["answers", "questions", "both"] = Field(
+        "answers",
+        description="packets that change: those of the servos, those of the host, or both",
+    )
     by_s: float | None = Field(None, gt=0.0, description="delay and late: by how much")
 
     @model_validator(mode="after")
@@ -49,25 +54,36 @@ class ServoFault(_Lasting):
     the alert bit without an error.
     """
 
-    kind: Literal["mute", "stuck", "brown_out", "no_output", "deaf", "alert"]
-    ids: tuple[ServoId, ...] = Field(min_length=1)
+    kind: Literal["mute", "stuck", "brown_out", "no_output", "deaf", "alert"] = Field(
+        description="failure: no reply (mute), no motion (stuck), no supply (brown_out), no torque "
+        "(no_output), sync writes ignored (deaf), or an alert bit without an error (alert)"
+    )
+    ids: tuple[ServoId, ...] = Field(min_length=1, description="IDs of the servos that fail")
 
 
 class ClashFault(_Lasting):
     """One servo changes to the ID of another, which keeps it or gets that of the first."""
 
-    kind: Literal["clash", "exchange"]
-    id: ServoId
-    takes: ServoId
+    kind: Literal["clash", "exchange"] = Field(
+        description="whether the other servo keeps its ID (clash) or gets the first one's"
+    )
+    id: ServoId = Field(description="ID of the servo that changes")
+    takes: ServoId = Field(description="ID that the servo changes to")
 
 
 class WriteFault(_Lasting):
     """Another program writes to a register of servos, by its name in the control table."""
 
     kind: Literal["write"]
-    ids: tuple[ServoId, ...] = Field(min_length=1)
-    register_name: str = Field(min_length=1, alias="register")
-    value: int
+    ids: tuple[ServoId, ...] = Field(
+        min_length=1, description="IDs of the servos that are written to"
+    )
+    register_name: str = Field(
+        min_length=1,
+        alias="register",
+        description="register that is written to, named as in the control table",
+    )
+    value: int = Field(description="raw value that is written")
     every_s: float | None = Field(
         None, ge=1e-3, description="it writes again and again; not given: once"
     )
@@ -83,31 +99,43 @@ class ReadingFault(_Lasting):
     """A dead sensor: servos report a constant value in a register (``Present Temperature``)."""
 
     kind: Literal["reading"]
-    ids: tuple[ServoId, ...] = Field(min_length=1)
-    register_name: str = Field(min_length=1, alias="register")
+    ids: tuple[ServoId, ...] = Field(
+        min_length=1, description="IDs of the servos with the dead sensor"
+    )
+    register_name: str = Field(
+        min_length=1,
+        alias="register",
+        description="register with the constant value, named as in the control table",
+    )
     value: int | None = Field(None, description="not given: the value at the beginning")
 
 
 class TripFault(_Fault):
     """Servos detect an error (Hardware Error Status(70)), reboot, or get hot."""
 
-    kind: Literal["reboot", "overload", "overheating", "voltage", "encoder", "shock"]
-    ids: tuple[ServoId, ...] = Field(min_length=1)
+    kind: Literal["reboot", "overload", "overheating", "voltage", "encoder", "shock"] = Field(
+        description="error that the servos detect, or reboot"
+    )
+    ids: tuple[ServoId, ...] = Field(
+        min_length=1, description="IDs of the servos that detect the error"
+    )
 
 
 class HeatFault(_Fault):
     """The housing of servos has a temperature, from which they cool down or trip."""
 
     kind: Literal["heat"]
-    ids: tuple[ServoId, ...] = Field(min_length=1)
-    celsius: float = Field(ge=-20.0, le=200.0)
+    ids: tuple[ServoId, ...] = Field(min_length=1, description="IDs of the servos that are hot")
+    celsius: float = Field(
+        ge=-20.0, le=200.0, description="temperature of the housing when the fault begins"
+    )
 
 
 class SupplyFault(_Lasting):
     """The supply of some servos, or of the whole bus, has another voltage."""
 
     kind: Literal["supply"]
-    volts: float = Field(ge=0.0, le=40.0)
+    volts: float = Field(ge=0.0, le=40.0, description="voltage of the supply during the fault")
     ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
 
 
@@ -115,14 +143,14 @@ class UnplugFault(_Lasting):
     """The cable behind one servo is out: all that follow in the chain lose bus and supply."""
 
     kind: Literal["unplug"]
-    behind: ServoId
+    behind: ServoId = Field(description="ID of the last servo that is still connected")
 
 
 class StallFault(_Fault):
     """The host does not run for a while; its packets go out later."""
 
     kind: Literal["stall"]
-    for_s: float = Field(gt=0.0)
+    for_s: float = Field(gt=0.0, description="time for which the host does not run")
 
 
 class PortFault(_Lasting):
@@ -150,4 +178,6 @@ class FaultPlan(Strict):
     """A fault file."""
 
     seed: int = Field(0, ge=0, description="of every chance and every wrong bit")
-    fault: tuple[Fault, ...] = ()
+    fault: tuple[Fault, ...] = Field(
+        (), description="faults in the order of the file; each has a start and an end"
+    )

@@ -2,17 +2,27 @@
 
 from collections.abc import Iterator
 from types import UnionType
-from typing import Annotated, Any, Final, Union, get_args, get_origin
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 _SIGNS: Final = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
 def description_of(field: FieldInfo) -> str:
-    """Return the description of a field, of its named type, or of the option that it is."""
+    """Return the description of a field, of its named type, or of the option that it is.
+
+    A table has that of its model, and the ``kind`` of a table says so.
+    """
     if field.description:
         return field.description
+    model = _model(field.annotation)
+    if model is not None:
+        text = (model.__doc__ or "").partition("\n")[0].rstrip(".")
+        return f"{text[:1].lower()}{text[1:]}"
+    if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
+        return "kind of this table; selects its other keys"
     for rule in (*field.metadata, *_rules(field.annotation)):
         text = getattr(rule, "description", None) or getattr(rule, "help", None)
         if text:
@@ -41,6 +51,16 @@ def bounds_in(rules: list[Any]) -> dict[str, float]:
 def bounds_text(bounds: dict[str, float]) -> str:
     """Return bounds as a reader sees them: ``≥ 0, ≤ 1``."""
     return ", ".join(f"{_SIGNS[name]} {value:g}" for name, value in bounds.items())
+
+
+def _model(annotation: Any) -> type[BaseModel] | None:
+    """Return the only model of a table, of a table that may be left out, or of a list of tables."""
+    parts = [each for each in get_args(annotation) if each not in {type(None), Ellipsis}]
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    if get_origin(annotation) in {Union, UnionType, tuple} and len(parts) == 1:
+        return _model(parts[0])
+    return None
 
 
 def _rules(annotation: Any) -> Iterator[Any]:

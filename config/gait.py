@@ -14,7 +14,7 @@ class GaitChange(Strict):
     """Another gait at a time."""
 
     at_s: float = Field(gt=0.0, description="since the beginning")
-    name: str
+    name: str = Field(description="gait that the robot changes to; `snakewalk gait list` shows all")
     parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
 
 
@@ -61,8 +61,10 @@ class GaitSetConfig(Strict):
     """A shipped set of parameters for one robot."""
 
     name: Name
-    gait: str
-    robot: str
+    gait: str = Field(
+        description="gait whose parameters this file has; `snakewalk gait list` shows all"
+    )
+    robot: str = Field(description="shipped robot that the parameters are for")
     world: str | None = Field(None, description="default: the gait's own")
     parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
     compliance: ComplianceConfig | None = Field(

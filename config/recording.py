@@ -17,18 +17,20 @@ class EpisodeConfig(Strict):
 class RecordingConfig(Strict):
     """A travelling wave of tangent angle with an envelope, and the episodes it goes through."""
 
-    name: str
+    name: str = Field(description="name of the recording")
     source: str = Field(description="the animal, and who recorded it")
     licence: str = Field(description="of the recording that was measured")
-    rate_hz: float = Field(gt=0.0)
+    rate_hz: float = Field(gt=0.0, description="frames per second")
     length_m: float = Field(gt=0.0, description="of the animal")
     waves: float = Field(gt=0.1, le=5.0, description="on the body")
-    frequency_hz: float = Field(gt=0.0)
+    frequency_hz: float = Field(gt=0.0, description="waves per second")
     travel: float = Field(ge=0.0, le=1.0, description="speed of the head over speed of the wave")
     envelope_rad: tuple[float, ...] = Field(
         min_length=2, description="amplitude of tangent angle at equal stations, head to tail"
     )
-    episodes: tuple[EpisodeConfig, ...] = Field(min_length=1)
+    episodes: tuple[EpisodeConfig, ...] = Field(
+        min_length=1, description="parts of the recording, one after the other"
+    )
 
     @model_validator(mode="after")
     def _long_enough(self) -> "RecordingConfig":

@@ -38,8 +38,15 @@ Place = Annotated[float, Field(ge=-1000.0, le=1000.0)]
 class StatesConfig(Strict):
     """The library of body shapes ([PT] 2.5)."""
 
-    coefficients: int = Field(4, ge=1, le=20)
-    random_count: int = Field(200, ge=0, le=100_000)
+    coefficients: int = Field(
+        4, ge=1, le=20, description="number of principal components that describe a body shape"
+    )
+    random_count: int = Field(
+        200,
+        ge=0,
+        le=100_000,
+        description="number of random body shapes in addition to the recorded ones",
+    )
     gain_limit: float = Field(0.6, ge=0.0, le=1.0, description="least quasi-static eta_q kept")
     turn_limit_rad: float = Field(
         1.5, gt=0.0, description="largest angle kept between a shape's tail and its mean"
@@ -90,7 +97,11 @@ class WalkConfig(Strict):
         2.4, ge=0.0, description="turn of the mean line over a body length, at most"
     )
     carrot_m: float = Field(0.6, gt=0.05, description="ahead on the path: where states aim")
-    heading_tolerance_rad: float = Field(0.5, gt=0.0)
+    heading_tolerance_rad: float = Field(
+        0.5,
+        gt=0.0,
+        description="largest angle between a body shape and the wanted direction",
+    )
     nearest_count: int = Field(12, ge=1, description="taken when no state is within tolerance")
     ramp_limit_rad: float = Field(
         0.8, ge=0.0, description="walk-blind: heading error that a ramp cancels on a piece"
@@ -121,7 +132,12 @@ class WalkConfig(Strict):
 class BehaviourConfig(Strict):
     """Behaviour that a user may change ([PT] 2.6.6)."""
 
-    pulse_body_lengths_s: float = Field(0.25, gt=0.0, le=3.0)
+    pulse_body_lengths_s: float = Field(
+        0.25,
+        gt=0.0,
+        le=3.0,
+        description="speed of the walk: body lengths that the wave travels in a second",
+    )
     sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
     curvature: float | None = Field(
         None,
@@ -135,7 +151,9 @@ class BehaviourConfig(Strict):
 class SafetyConfig(Strict):
     """Limits below the controller; a command beyond them is clamped, or vetoed and latched."""
 
-    goal_rate_rad_s: float = Field(4.0, gt=0.0)
+    goal_rate_rad_s: float = Field(
+        4.0, gt=0.0, description="largest speed at which a joint's goal may move"
+    )
     goal_lead_rad: float = Field(0.8, gt=0.0, description="goal minus measured")
     following_limit_rad: float = Field(
         0.4,
@@ -148,7 +166,9 @@ class SafetyConfig(Strict):
         None, gt=0.0, description="default: the robot's servo.over_current_a"
     )
     current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
-    temperature_limit_c: float = Field(70.0, gt=0.0)
+    temperature_limit_c: float = Field(
+        70.0, gt=0.0, description="temperature of a servo's housing at which torque goes off"
+    )
     winding_limit_c: float = Field(
         125.0,
         gt=0.0,
@@ -269,20 +289,31 @@ class RunConfig(Strict):
     )
     start_m: tuple[Place, Place] = Field((0.0, 0.0), description="where the head starts")
     start_heading_rad: float | None = Field(None, description="default: towards the path")
-    waypoint_radius_m: float = Field(0.3, gt=0.0)
-    seed: int = Field(0, ge=0, lt=2**63)
-    cycle_hz: float = Field(50.0, gt=0.0, le=1000.0)
+    waypoint_radius_m: float = Field(
+        0.3, gt=0.0, description="distance from a waypoint at which it counts as reached"
+    )
+    seed: int = Field(0, ge=0, lt=2**63, description="seed of every random choice")
+    cycle_hz: float = Field(50.0, gt=0.0, le=1000.0, description="control cycles per second")
     physics_step_s: float | None = Field(
         None, ge=2e-5, le=0.01, description="default: 0.002 on a floor, 0.001 on a height field"
     )
-    time_limit_s: float = Field(240.0, gt=0.0)
+    time_limit_s: float = Field(
+        240.0, gt=0.0, description="time after which the run ends, although waypoints are left"
+    )
     states: StatesConfig = StatesConfig()
     walk: WalkConfig = WalkConfig()
     behaviour: BehaviourConfig = BehaviourConfig()
     safety: SafetyConfig = SafetyConfig()
-    gait: GaitConfig | None = None
-    playback: PlaybackConfig | None = None
-    repertoire: RepertoireConfig | None = None
+    gait: GaitConfig | None = Field(
+        None, description='a table [gait], for motion = "gait": the gait and its parameters'
+    )
+    playback: PlaybackConfig | None = Field(
+        None, description='a table [playback], for motion = "playback": how a recording is replayed'
+    )
+    repertoire: RepertoireConfig | None = Field(
+        None,
+        description='a table [repertoire], for motion = "repertoire": recorded actions',
+    )
     compliance: ComplianceConfig | None = Field(
         None, description="joint goals that yield to measured current; default: they do not"
     )

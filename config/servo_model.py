@@ -70,7 +70,7 @@ _OF_FEETECH: Final = (
 class RegisterRow(Strict):
     """Row of a control table."""
 
-    address: int = Field(ge=0, lt=TABLE_BYTES)
+    address: int = Field(ge=0, lt=TABLE_BYTES, description="address of the register's first byte")
     size: Literal[1, 2, 4] = Field(description="bytes, in the model's byte order")
     signed: bool = Field(False, description="two's complement")
     sign_bit: int | None = Field(
@@ -101,7 +101,9 @@ class RegisterRow(Strict):
 class UnitsRow(Strict):
     """Meaning of the raw values."""
 
-    positions_per_turn: float = Field(gt=1.0)
+    positions_per_turn: float = Field(
+        gt=1.0, description="raw positions in a turn of the output shaft"
+    )
     zero_position: int = Field(description="raw position of 0 rad")
     velocity_rpm: float = Field(gt=0.0, description="rev/min of one unit of velocity")
     acceleration_rpm2: float | None = Field(
@@ -123,10 +125,16 @@ class MotorRow(Strict):
 
     nominal_v: float = Field(gt=0.0, le=60.0, description="recommended supply")
     voltage_v: tuple[float, float] = Field(description="lowest and highest supply")
-    stall_torque_n_m: float = Field(gt=0.0, le=1000.0)
-    stall_current_a: float = Field(gt=0.0, le=100.0)
-    no_load_rpm: float = Field(gt=0.0, le=1000.0)
-    standby_a: float = Field(0.04, ge=0.0, le=2.0)
+    stall_torque_n_m: float = Field(
+        gt=0.0, le=1000.0, description="torque at which the servo does not turn"
+    )
+    stall_current_a: float = Field(gt=0.0, le=100.0, description="current at the stall torque")
+    no_load_rpm: float = Field(
+        gt=0.0, le=1000.0, description="speed without load in turns per minute"
+    )
+    standby_a: float = Field(
+        0.04, ge=0.0, le=2.0, description="current of the servo without torque"
+    )
     p_gain_divisor: float = Field(
         _P_GAIN_DIVISOR,
         gt=0.0,
@@ -153,7 +161,7 @@ class FrictionRow(Strict):
 
     armature_kg_m2: float = Field(ge=0.0, le=1.0, description="inertia of rotor and gears")
     dry_n_m: float = Field(0.0, ge=0.0, description="friction without load")
-    viscous_n_m_s: float = Field(0.0, ge=0.0)
+    viscous_n_m_s: float = Field(0.0, ge=0.0, description="friction torque per rad/s of speed")
     stribeck_n_m: float = Field(0.0, ge=0.0, description="additional friction of a slow shaft")
     stribeck_rad_s: float = Field(0.3, gt=0.0, description="speed at which that has faded")
     by_motor: float = Field(0.0, ge=0.0, lt=1.0, description="share of the motor's torque")

@@ -15,6 +15,7 @@ from snakewalk.config.document import (
     table_models,
     value_kind,
 )
+from snakewalk.config.field_facts import description_of
 from snakewalk.config.robot import RobotConfig
 
 _COLUMN: Final = 42
@@ -98,7 +99,7 @@ def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
     shown = "" if value is None or value is PydanticUndefined else toml_value(value)
     left = f"{key} = {shown}" if is_given else f"# {key} = {shown}".rstrip()
     kind = re.sub(r"`(-?\d+)`", r"\1", value_kind(field)).replace("`", '"')
-    words = [kind, field.description or ""]
+    words = [kind, description_of(field)]
     return f"{left:<{_COLUMN}} # {'; '.join(word for word in words if word)}"
 
 

@@ -12,7 +12,7 @@ class FrictionConfig(Strict):
     """Coulomb ellipse of the belly: along the body, forward and back, and across it."""
 
     along: float = Field(0.1, gt=0.0, le=5.0, description="sliding forward")
-    across: float = Field(0.7, gt=0.0, le=5.0)
+    across: float = Field(0.7, gt=0.0, le=5.0, description="friction coefficient across the body")
     back: float | None = Field(
         None, gt=0.0, le=5.0, description="sliding backward, as scales resist; default: as forward"
     )
@@ -37,8 +37,8 @@ class ElevationGround(Strict):
     source: str = Field("jacksboro", description="'jacksboro' (packaged with matplotlib) or a .npz")
     row: int = Field(ge=0, description="first row of the crop")
     column: int = Field(ge=0, description="first column of the crop")
-    rows: int = Field(ge=8, le=512)
-    columns: int = Field(ge=8, le=512)
+    rows: int = Field(ge=8, le=512, description="rows of the crop")
+    columns: int = Field(ge=8, le=512, description="columns of the crop")
     spacing_m: float = Field(
         ge=0.005, le=1.0, description="distance between samples in the robot's world"
     )
@@ -68,7 +68,7 @@ class RampGround(Strict):
     """A plane that rises along x, between a level run-in and a level top; its middle at x = 0."""
 
     kind: Literal["ramp"] = "ramp"
-    slope_rad: float = Field(gt=0.0, le=1.0)
+    slope_rad: float = Field(gt=0.0, le=1.0, description="angle of the ramp from the horizontal")
     length_m: float = Field(4.0, gt=0.0, le=50.0, description="of the slope, measured level")
     level_m: float = Field(2.0, ge=0.1, le=50.0, description="of the run-in, and of the top")
     width_m: float = Field(8.0, gt=0.5, le=50.0, description="across, along y")
@@ -146,7 +146,7 @@ class GapsGround(Strict):
 
     kind: Literal["gaps"] = "gaps"
     width_m: float = Field(gt=0.0, le=2.0, description="of each trench, edge to edge")
-    depth_m: float = Field(gt=0.0, le=2.0)
+    depth_m: float = Field(gt=0.0, le=2.0, description="depth of a trench")
     distance_m: float = Field(gt=0.0, le=10.0, description="from a trench's middle to the next")
     count: int = Field(ge=1, le=100, description="number of trenches")
     level_m: float = Field(2.0, ge=0.1, le=50.0, description="of each level end")
@@ -174,7 +174,7 @@ class Water(Strict):
     """
 
     depth_m: float = Field(0.6, gt=0.1, description="of the water, where it is deepest")
-    density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0)
+    density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0, description="density of the water")
     drag_across: float = Field(2.0, ge=0.0, le=5.0, description="coefficient of the cross-flow")
     drag_along: float = Field(0.03, ge=0.0, le=1.0, description="coefficient of the skin")
     buoyancy: float = Field(
@@ -211,8 +211,8 @@ class PoleObstacle(Strict):
     """A round pole to climb."""
 
     kind: Literal["pole"] = "pole"
-    radius_m: float = Field(gt=0.005, le=1.0)
-    length_m: float = Field(3.0, gt=0.1, le=50.0)
+    radius_m: float = Field(gt=0.005, le=1.0, description="radius of the pole")
+    length_m: float = Field(3.0, gt=0.1, le=50.0, description="length of the pole")
     upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
     at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
@@ -227,7 +227,7 @@ class PipeObstacle(Strict):
 
     kind: Literal["pipe"] = "pipe"
     radius_m: float = Field(gt=0.02, le=1.0, description="inner")
-    length_m: float = Field(4.0, gt=0.1, le=50.0)
+    length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the pipe")
     upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
@@ -285,7 +285,7 @@ class CorridorObstacle(Strict):
 
     kind: Literal["corridor"] = "corridor"
     width_m: float = Field(gt=0.01, le=50.0, description="between the walls")
-    length_m: float = Field(4.0, gt=0.1, le=50.0)
+    length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the walls")
     height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
     friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
@@ -303,11 +303,13 @@ class PlannerConfig(Strict):
     variance_window_m: float = Field(
         0.3, gt=0.0, le=10.0, description="radius of the elevation variance"
     )
-    variance_limit_m2: float = Field(4e-4, gt=0.0)
+    variance_limit_m2: float = Field(
+        4e-4, gt=0.0, description="largest variance of height on a path"
+    )
     slope_window_m: float = Field(
         0.1, gt=0.0, le=10.0, description="radius of the plane fitted for slope"
     )
-    slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5)
+    slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5, description="steepest slope on a path")
     length_weight: float = Field(3e-3, gt=0.0, description="metres of path against variance")
     footprint_m: float = Field(
         0.6,
@@ -328,7 +330,9 @@ class PlannerConfig(Strict):
     clearance_weight: float = Field(
         1.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
     )
-    node_spacing_m: float = Field(0.15, ge=0.02)
+    node_spacing_m: float = Field(
+        0.15, ge=0.02, description="distance between places that a path may join"
+    )
     bend_radius_m: float = Field(
         0.4, ge=0.0, le=100.0, description="wanted of every bend, where possible"
     )
@@ -345,8 +349,8 @@ class WorldConfig(Strict):
     """One world."""
 
     name: Name
-    ground: Annotated[FlatGround | ReliefGround | WaterGround, Field(discriminator="kind")] = (
-        FlatGround()
+    ground: Annotated[FlatGround | ReliefGround | WaterGround, Field(discriminator="kind")] = Field(
+        FlatGround(), description="shape of the ground; its kind selects the other keys"
     )
     friction: FrictionConfig = FrictionConfig()
     obstacle: (
@@ -355,7 +359,7 @@ class WorldConfig(Strict):
             Field(discriminator="kind"),
         ]
         | None
-    ) = None
+    ) = Field(None, description="object on the ground; its kind selects the other keys")
     planner: PlannerConfig = PlannerConfig()
 
     def with_relief(self, factor: float) -> Self:

@@ -41,7 +41,9 @@ class RobotKeys(Strict):
         (), description="one for each link of the spine, or none: then all are alike"
     )
     link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
-    body_radius_m: float = Field(0.03, gt=0.002, le=0.5)
+    body_radius_m: float = Field(
+        0.03, gt=0.002, le=0.5, description="radius of the body, from its axis to the ground"
+    )
     body_profile: tuple[float, ...] | None = Field(
         None,
         min_length=2,
@@ -51,8 +53,12 @@ class RobotKeys(Strict):
     )
     belly: BellyConfig = BellyConfig()
     link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")
-    yaw_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
-    pitch_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
+    yaw_limit_rad: float = Field(
+        1.5, gt=0.05, le=3.1, description="largest angle of a yaw joint to each side"
+    )
+    pitch_limit_rad: float = Field(
+        1.2, gt=0.05, le=3.1, description="largest angle of a pitch joint up and down"
+    )
     joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="limit of a plan")
     joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="limit of a plan")
     torque_limit_n_m: float = Field(2.0, gt=0.0, description="torque limit of a joint in a plan")

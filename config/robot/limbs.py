@@ -26,13 +26,21 @@ class LimbsConfig(Strict):
     segments_m: tuple[float, ...] = Field(
         (0.035, 0.09), description="lengths from joint to joint, the last to the middle of the foot"
     )
-    segment_mass_kg: float = Field(0.09, gt=0.001, le=20.0)
-    foot_radius_m: float = Field(0.012, gt=0.002, le=0.2)
+    segment_mass_kg: float = Field(
+        0.09, gt=0.001, le=20.0, description="mass of each segment of a leg"
+    )
+    foot_radius_m: float = Field(
+        0.012, gt=0.002, le=0.2, description="radius of the ball at the end of a leg"
+    )
     foot_friction: float = Field(
         0.8, gt=0.0, le=3.0, description="friction coefficient in all directions; default: rubber"
     )
-    yaw_limit_rad: float = Field(1.2, gt=0.05, le=3.1)
-    roll_limit_rad: float = Field(1.5, gt=0.05, le=3.1)
+    yaw_limit_rad: float = Field(
+        1.2, gt=0.05, le=3.1, description="largest angle of a leg's yaw joint to each side"
+    )
+    roll_limit_rad: float = Field(
+        1.5, gt=0.05, le=3.1, description="largest angle of a leg's roll joint up and down"
+    )
 
     @model_validator(mode="after")
     def _a_segment_a_joint(self) -> Self:

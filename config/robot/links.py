@@ -10,7 +10,9 @@ from snakewalk.config.base import Strict
 class BellyConfig(Strict):
     """Shape with which a link meets the ground: a ball, a capsule along it, or two rails."""
 
-    shape: Literal["ball", "capsule", "rails"] = "capsule"
+    shape: Literal["ball", "capsule", "rails"] = Field(
+        "capsule", description="shape of the part of a link that touches the ground"
+    )
     width_m: float | None = Field(
         None, gt=0.002, le=1.0, description="width of rails, from outside to outside"
     )

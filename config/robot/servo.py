@@ -20,8 +20,8 @@ class ServoConfig(Strict):
         "(docs/how-to/add-a-servo-model.md)",
     )
     first_id: int = Field(1, ge=0, le=LAST_ID, description="ID of the joint next to the head")
-    baud: Baud = 1_000_000
-    supply_v: float = Field(12.0, ge=3.0, le=26.0)
+    baud: Baud = Field(1_000_000, description="baud rate of the bus")
+    supply_v: float = Field(12.0, ge=3.0, le=26.0, description="voltage of the servos' supply")
     supply_min_v: float | None = Field(
         None, gt=0.0, description="a run stops below this; default: 10/12 of supply_v"
     )

@@ -29,16 +29,18 @@ _IDENTITY = (
 class ServoBackup(Strict):
     """One servo."""
 
-    id: int = Field(ge=0, le=252)
-    model: str
-    registers: dict[str, int]
+    id: int = Field(ge=0, le=252, description="ID of the servo")
+    model: str = Field(description="model of the servo")
+    registers: dict[str, int] = Field(
+        description="raw value of each register that survives a power cycle, by its name"
+    )
     """Raw values of the EEPROM, by the names of the e-manual."""
 
 
 class BackupFile(Strict):
     """All servos of a bus."""
 
-    servos: tuple[ServoBackup, ...] = Field(min_length=1)
+    servos: tuple[ServoBackup, ...] = Field(min_length=1, description="servos of the bus")
 
 
 def back_up(

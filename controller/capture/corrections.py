@@ -30,23 +30,29 @@ _LONGEST: Final = 4.0
 class RedrawnFrame(Strict):
     """One frame whose points a person has drawn."""
 
-    frame: int = Field(ge=0)
-    points_px: tuple[tuple[float, float], ...] = Field(min_length=4, max_length=10_000)
+    frame: int = Field(ge=0, description="number of the frame")
+    points_px: tuple[tuple[float, float], ...] = Field(
+        min_length=4,
+        max_length=10_000,
+        description="points along the midline in pixels, head first",
+    )
     """x, y in the picture, head first, y downwards."""
 
 
 class Corrections(Strict):
     """Corrections by the user; frames count from 0."""
 
-    track: str
+    track: str = Field(description="file of the track that is corrected")
     """``CaptureFile.fingerprint`` of the reviewed track."""
-    frames: int = Field(ge=1)
+    frames: int = Field(ge=1, description="number of frames of the track")
     """Number of frames of that track."""
-    flipped: tuple[int, ...] = ()
+    flipped: tuple[int, ...] = Field((), description="frames in which head and tail are exchanged")
     """Frames whose head is at the other end."""
-    left_out: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = Field((), description="frames that are not used")
     """Unused frames."""
-    redrawn: tuple[RedrawnFrame, ...] = ()
+    redrawn: tuple[RedrawnFrame, ...] = Field(
+        (), description="frames whose points a person has drawn"
+    )
     """Frames with points of their own, head first even if ``flipped``."""
 
 

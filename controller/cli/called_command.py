@@ -143,7 +143,7 @@ def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
 
 
 def _model(group: Any, options: dict[str, Any]) -> Any:
-    """Return a model from its options, which it takes out of the others."""
+    """Return a model from its options, and remove these from the others."""
     from snakewalk.controller.console.option import from_words  # noqa: PLC0415  --help has no models
 
     return from_words(group, {name: options.pop(name) for name in group.model_fields})

@@ -11,6 +11,7 @@ from importlib.metadata import version
 
 import cma
 import numpy as np
+from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
@@ -26,14 +27,16 @@ _SIGMA = 0.3
 class SearchProgress(Strict):
     """Rewards of the generations so far; with its arguments they determine the rest of a search."""
 
-    robot: str
-    world: str
-    population: int
-    steps: int
-    seed: int
-    software: str
+    robot: str = Field(description="robot that the search moves")
+    world: str = Field(description="world that the search uses")
+    population: int = Field(description="candidates in a generation")
+    steps: int = Field(description="control steps of a trial")
+    seed: int = Field(description="seed of the search")
+    software: str = Field(description="version that made the file")
     """Names and versions; others may draw other candidates."""
-    rewards_m: tuple[tuple[float, ...], ...] = ()
+    rewards_m: tuple[tuple[float, ...], ...] = Field(
+        (), description="distance that each candidate travelled, by generation"
+    )
     """Rewards of each generation, one for each candidate."""
 
 

@@ -36,7 +36,7 @@ def test_each_commented_key_of_a_run_can_be_taken_into_use_where_it_stands() -> 
 
 def test_a_template_shows_every_key_with_its_meaning() -> None:
     text = template(load_world("flat"), "")
-    assert re.search(r"^# across = 0.7 +# number, > 0, ≤ 5$", text, re.MULTILINE)
+    assert re.search(r"^# across = 0.7 +# number, > 0, ≤ 5; friction", text, re.MULTILINE)
     assert (
         "# kinds of ground: flat, elevation, map, ramp, random, steps, gaps, shore, water;" in text
     )

@@ -17,31 +17,37 @@ from snakewalk.controller.console.result_files import atomic_write
 class SeenBend(Strict):
     """The joint that moved when a servo was wiggled."""
 
-    joint: int
+    joint: int = Field(description="number of the joint, from 0 at the head")
     """Which joint moved, counted from 0 at the head."""
-    direction: Literal[1, -1]
+    direction: Literal[1, -1] = Field(
+        description="1 if the joint turns like the servo, -1 if it turns the other way"
+    )
     """1: first it bent the head side to the left (yaw), or lifted it (pitch); -1: the other way."""
 
 
 class JointRange(Strict):
     """Angles at which a joint met its stops."""
 
-    low_rad: float | None
+    low_rad: float | None = Field(description="lowest angle; none: not measured")
     """None: not within ``BEYOND_RAD`` of the robot's limit."""
-    high_rad: float | None
+    high_rad: float | None = Field(description="highest angle; none: not measured")
 
 
 class CalibrationProgress(Strict):
     """Everything that is known of a chain so far; all tables are by servo ID."""
 
-    joint_axes: str
+    joint_axes: str = Field(
+        description="axis of each joint from head to tail: y for yaw, p for pitch"
+    )
     """Axes of the robot that the chain is compared with."""
-    servos: dict[int, str] = Field({})
+    servos: dict[int, str] = Field({}, description="model of each servo")
     """Models of the servos on the bus."""
-    bends: dict[int, SeenBend] = Field({})
-    zeros_rad: dict[int, float] = Field({})
+    bends: dict[int, SeenBend] = Field({}, description="joint that each servo moves")
+    zeros_rad: dict[int, float] = Field({}, description="angle of each servo in the straight body")
     """Positions of the straight body; empty until it was laid straight."""
-    ranges: dict[int, JointRange] = Field({})
+    ranges: dict[int, JointRange] = Field(
+        {}, description="angles at which each joint meets its stops"
+    )
 
     def check_servos(self, servos: dict[int, str], source: str) -> None:
         """Compare with the servos on the bus.

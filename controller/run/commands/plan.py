@@ -118,6 +118,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "waypoints_reached": ahead.reached,
         "passed_by": ahead.missed,
         "path_m": round(prepared.path.length_m, 3),
+        "speed_of_the_wave": f"{prepared.pulse_m_s:.2f} m/s (behaviour.pulse_body_lengths_s)",
         "duration_s": round(ahead.duration_s, 2),
         "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
         "joint_speed_rad_s": round(float(ahead.joint_speed_rad_s.max()), 3),

@@ -277,15 +277,21 @@ class WalkRun(PathRun):
         return self.run.walk.rolls and carried_a >= _ROLLING_A
 
     @property
+    def pulse_m_s(self) -> float:
+        """Speed at which the wave travels along the body, without its sliding."""
+        behaviour = self.run.behaviour
+        return behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Surprising properties of the path and the shapes, one line each."""
-        behaviour, lines = self.run.behaviour, []
-        pulse_m_s = behaviour.pulse_body_lengths_s * (1.0 - behaviour.sliding) * self.robot.length_m
+        pulse_m_s, lines = self.pulse_m_s, []
         if self.path.length_m > pulse_m_s * self.run.time_limit_s:
             lines.append(
                 f"path: {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s need at "
                 f"least {self.path.length_m / pulse_m_s:.0f} s, but time_limit_s is "
-                f"{self.run.time_limit_s:g}; the run will not reach its end"
+                f"{self.run.time_limit_s:g}; the run will not reach its end; set the speed "
+                "of the walk with behaviour.pulse_body_lengths_s"
             )
         if self.run.mapping is not None:
             lines.append(

@@ -115,4 +115,5 @@ def test_a_path_that_the_time_cannot_hold_is_told() -> None:
     far = prepare_walk("flat-square", motion="serpenoid", keys={"run.waypoints_m": [[100.0, 0.0]]})
     (told,) = far.warnings
     assert told.startswith("path: 100.0 m at a pulse of 0.30 m/s need at least 336 s"), told
+    assert "speed of the walk with behaviour.pulse_body_lengths_s" in told
     assert prepare_walk("flat-square", motion="serpenoid").warnings == ()
