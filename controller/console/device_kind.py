@@ -6,7 +6,6 @@ import stat
 from pathlib import Path
 from typing import Final
 
-from snakewalk.config.robot.ports import port_fault
 from snakewalk.drivers.errors import PortError
 
 try:
@@ -40,6 +39,8 @@ def check_port_name(port: str | None) -> str | None:
 
 
 def _fault(name: str) -> str | None:
+    from snakewalk.config.robot.ports import port_fault  # noqa: PLC0415  --help loads no schema
+
     if (fault := port_fault(name)) is not None:
         return f"{name}: {fault}"
     if termios is None or name in _NO_DEVICES:
