@@ -1,8 +1,8 @@
 """Folders of compiled loops: numba's own, and others for accounts that cannot write there.
 
-A loop is loaded from next to its module if ``snakewalk tools compile`` has stored it there. Else it is
-compiled, and stored in the first folder that this account may write to: next to its module, in the
-cache of its home folder, or in the folder for temporary files.
+A loop is loaded from next to its module if ``snakewalk tools compile`` has stored it there. Else
+it is compiled, and stored in the first folder that this account may write to: next to its module,
+in the cache of its home folder, or in the folder for temporary files.
 """
 
 import os

@@ -3,8 +3,8 @@
 import importlib.util
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.bench.loop_compiler import compile_loops
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.loop_compiler import compile_loops
 from snakewalk.controller.console.options import Json, show
 from snakewalk.controller.console.progress import ProgressBar
 
