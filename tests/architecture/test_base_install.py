@@ -11,6 +11,8 @@ import pytest
 
 from tests.helpers.command import command_words
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "helpers" / "base_install.py"
 
@@ -154,7 +156,6 @@ def test_help_of_every_command(results: dict[tuple[str, ...], Result]) -> None:
         assert "Usage: " in results[words].out
 
 
-@pytest.mark.costs("starts an installation without extras")
 def test_servos_move_without_the_compiler_at_a_rate_that_it_sustains(tmp_path: Path) -> None:
     fast = (*GAIT[:3], "--out", "fast", "--set", "run.cycle_hz=100", *ON_SERVOS)
     scanned, examined, moved, rejected = call(

@@ -26,17 +26,18 @@ from tests.campaign.scenarios import (
     WRITES,
     plan,
 )
+from tests.helpers.tiers import slow_after
 from tests.oracles.raw_positions import raw_positions
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slow_after(14, KINDS))
 def test_each_kind_of_fault(kind: str) -> None:
     whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)
     assert whole.complaints == []
     assert whole.violations == 0
 
 
-@pytest.mark.parametrize("kind", CHANGES)
+@pytest.mark.parametrize("kind", slow_after(4, CHANGES))
 def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
     tally = run_scenario((kind,), 1, 130)
     assert tally.noticed

@@ -12,7 +12,7 @@ from snakewalk.controller.cli.command_line import app
 from tests.helpers.command import snakewalk
 from tests.helpers.program import command
 
-pytestmark = pytest.mark.costs("serves a bus in another process")
+pytestmark = pytest.mark.slow
 
 PAGE = Path(__file__).resolve().parents[2] / "docs/how-to/add-a-servo-model.md"
 TEXT = PAGE.read_text(encoding="utf-8")

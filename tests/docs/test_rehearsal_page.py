@@ -28,7 +28,7 @@ def poses_of(check: list[str]) -> dict[str, Any]:
     pytest.fail(f"few poses arrive: {found}")
 
 
-@pytest.mark.costs("runs a page against a simulated robot in real time")
+@pytest.mark.slow
 def test_the_page_works_as_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The motion is cut after a second: the body cannot have arrived, and nobody claims it."""
     monkeypatch.chdir(tmp_path)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.helpers.in_process import InProcessExecutor
+from tests.helpers.tiers import slow_after
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples"
 NAMES = (
@@ -53,7 +54,7 @@ def test_what_the_training_takes_of_the_library_is_there() -> None:
 
 
 @pytest.mark.costs("runs an example in a process of its own")
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", slow_after(2, NAMES))
 def test_it_runs_and_leaves_nothing(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

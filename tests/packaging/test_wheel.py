@@ -19,6 +19,8 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = ("config", "drivers", "sim", "controller")
 BUILD = "import sys; from setuptools import build_meta as b; b.build_{kind}(sys.argv[1])"
@@ -200,13 +202,11 @@ def test_what_is_installed_at_the_top(installed: Installed) -> None:
     assert {name for name in ours if not name.startswith("snakewalk-")} == {"snakewalk"}
 
 
-@pytest.mark.costs("installs a wheel")
 def test_the_command_runs_in_a_users_project(installed: Installed) -> None:
     assert "Usage: snakewalk" in installed.run("snakewalk", "--help")
     assert "flat-slalom" in installed.run("snakewalk", "list", "--json")
 
 
-@pytest.mark.costs("installs a wheel")
 def test_a_users_suite_keeps_its_packages_and_has_the_fixture(installed: Installed) -> None:
     # started as a module, the user's project comes first on the path, also for our plugin
     found = installed.run("python", "-c", "import snakewalk; print(snakewalk.__file__)")
@@ -258,7 +258,6 @@ def lightly(light: Path, folder: Path, *words: str) -> "subprocess.CompletedProc
     )
 
 
-@pytest.mark.costs("installs a wheel")
 def test_the_fixture_needs_no_more_than_the_page_says(light: Path, tmp_path: Path) -> None:
     (tmp_path / "test_light.py").write_text(LIGHT_TEST)
     done = lightly(light, tmp_path, "-m", "pytest", "-q", "-p", "no:cacheprovider")

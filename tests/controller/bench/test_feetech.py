@@ -25,6 +25,7 @@ from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.servo.bench import BenchPlant
+from tests.helpers.tiers import slow_after
 
 ROBOT = load_robot("sts3215-12")
 
@@ -42,6 +43,7 @@ def doctor(line: FeetechLine) -> Sequence[Finding]:
 SLOW = pytest.mark.slow  # a scan of all rates needs 5 s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "model", ["STS3215", pytest.param("SCS0009", marks=SLOW), pytest.param("HLS3606", marks=SLOW)]
 )
@@ -52,6 +54,7 @@ def test_a_scan_finds_feetech_servos_at_their_rate(model: str) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_scan_does_not_take_an_ax12_for_a_feetech_servo() -> None:
     assert scan(Ax12Line(Ax12Servos((1, 2), BenchPlant(2)))).servos == ()
 
@@ -83,6 +86,7 @@ def test_a_bus_of_another_make_is_named_as_a_cause() -> None:
     )
 
 
+@pytest.mark.costs("the doctor examines a chain")
 def test_the_doctor_finds_nothing_on_a_new_chain_and_names_no_dynamixel() -> None:
     findings = doctor(a_line())
     assert {each.grade for each in findings} == {"ok"}
@@ -106,21 +110,25 @@ def register(name: str, value: int) -> Callable[[FeetechLine], None]:
     return plant
 
 
+@pytest.mark.costs("the doctor examines a chain")
 @pytest.mark.parametrize(
     ("plant", "check", "found"),
-    [
-        (register("ID", 99), "servo IDs", "3"),
-        (detect("overload"), "alarms", "overload"),
-        (detect("encoder"), "alarms", "motor encoder"),
-        (register("Torque Enable", 1), "torque", "on"),
-        (register("PWM Limit", 500), "PWM limit", "a PWM Limit(16) below 1000"),
-        (register("Shutdown", 4), "shutdown", "Shutdown(19) is masked"),
-        (register("Min Position Limit", 2000), "position limits", "position limits (11, 9)"),
-        (register("Homing Offset", 100), "homing offset", "the zero is moved: joint yaw_03"),
-        (register("Status Return Level", 0), "status return level", "does not reply to writes"),
-        (register("Operating Mode", 1), "operating mode", "Operating Mode 1"),
-        (register("Baud Rate", 1), "baud rate", "500000"),
-    ],
+    slow_after(
+        2,
+        [
+            (register("ID", 99), "servo IDs", "3"),
+            (detect("overload"), "alarms", "overload"),
+            (detect("encoder"), "alarms", "motor encoder"),
+            (register("Torque Enable", 1), "torque", "on"),
+            (register("PWM Limit", 500), "PWM limit", "a PWM Limit(16) below 1000"),
+            (register("Shutdown", 4), "shutdown", "Shutdown(19) is masked"),
+            (register("Min Position Limit", 2000), "position limits", "position limits (11, 9)"),
+            (register("Homing Offset", 100), "homing offset", "the zero is moved: joint yaw_03"),
+            (register("Status Return Level", 0), "status return level", "does not reply to writes"),
+            (register("Operating Mode", 1), "operating mode", "Operating Mode 1"),
+            (register("Baud Rate", 1), "baud rate", "500000"),
+        ],
+    ),
 )
 def test_the_doctor_names_a_fault(
     plant: Callable[[FeetechLine], None], check: str, found: str
@@ -161,6 +169,7 @@ def test_settings_of_a_feetech_servo_outlast_power_off() -> None:
     assert line.servos["Lock"].tolist() == [1, 1]
 
 
+@pytest.mark.slow
 def test_a_backup_of_feetech_servos_is_restored() -> None:
     line = a_line("1-2:STS3215")
     before = back_up(line, 0.004)
@@ -189,6 +198,7 @@ def test_one_port_has_one_make() -> None:
         RobotConfig.model_validate({"name": "two", "joints": joints, "servo": servo})
 
 
+@pytest.mark.slow
 def test_the_doctor_measures_the_supply_under_load() -> None:
     line = a_line()
     findings = examine(

@@ -99,6 +99,7 @@ def test_calibrate_finds_joints_signs_and_zeros(trio: Trio) -> None:
     assert not trio.line.servos["Torque Enable"].any()
 
 
+@pytest.mark.slow
 def test_zeros_in_the_servos_outlast_power_off(trio: Trio) -> None:
     result = trio.calibrate("--homing-offset", "--yes", "--no-sweep")
     assert result.exit_code == 0, result.output

@@ -21,6 +21,7 @@ from tests.helpers.bus import a_line
 PING = encode_instruction(InstructionPacket(1, Instruction.PING))
 
 
+@pytest.mark.slow
 def test_a_screen_that_hangs_is_sent_nothing_more() -> None:
     with LiveScreen(partial(Decoder, "XM430-W350")) as screen:
         assert screen._line.poll(120.0)  # it has started

@@ -49,7 +49,7 @@ def test_a_failed_child_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
         compile_loops(lambda done, total, name: None)
 
 
-@pytest.mark.costs("compiles a loop")
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [2])
 def test_only_a_loop_that_is_not_cached_is_reported(tmp_path: Path, runs: int) -> None:
     """The first process compiles; the second one uses the cache and reports nothing."""

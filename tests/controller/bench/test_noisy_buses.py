@@ -17,6 +17,7 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 from tests.controller.bench.test_broken_buses import TestLine, burst, every
+from tests.helpers.tiers import slow_after
 
 ROBOT = RobotConfig(name="six", joint_axes="ypypyp")
 BOUND_S = 15.0
@@ -103,7 +104,7 @@ def test_a_few_bytes_of_noise_are_a_warning() -> None:
 
 
 @pytest.mark.parametrize("of", ["answers", "both"])
-@pytest.mark.parametrize("kind", ["corrupt", "truncate", "drop"])
+@pytest.mark.parametrize("kind", slow_after(2, ["corrupt", "truncate", "drop"]))
 def test_a_scan_of_a_bad_line_finds_nearly_all_and_each_at_its_own_rate(kind: str, of: str) -> None:
     """One broadcast ping lost half of six servos at noise in 30 % of the packets."""
     truth = dict.fromkeys((1, 2, 3, 4), 1_000_000) | dict.fromkeys((5, 6), 57_600)

@@ -56,6 +56,7 @@ def three() -> OpenedLine:
     return OpenedLine(ServoBank(range(1, 4)), BenchPlant(3))
 
 
+@pytest.mark.slow
 def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
     tmp_path: Path,
 ) -> None:
@@ -117,6 +118,7 @@ def test_a_port_where_nobody_answers_ends_with_exit_code_1(
     assert "no servo replies; check the power" in out
 
 
+@pytest.mark.costs("a line that loses requests")
 def test_torque_goes_off_on_a_line_that_loses_every_third_request(
     stop: Callable[..., tuple[int, str, str]],
 ) -> None:

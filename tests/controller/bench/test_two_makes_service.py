@@ -62,6 +62,7 @@ def service() -> Iterator[TwoMakes]:
         yield TwoMakes((one, two), first, other)
 
 
+@pytest.mark.costs("the doctor examines two chains")
 def test_scan_finds_the_servos_of_both_makes(service: TwoMakes) -> None:
     found = json.loads(service("bus", "scan", "--baud", 1_000_000, "--json").stdout)["servos"]
     assert [(each["servo_id"], each["port"]) for each in found] == [
@@ -70,6 +71,7 @@ def test_scan_finds_the_servos_of_both_makes(service: TwoMakes) -> None:
     assert [each["model"][:3] for each in found] == 3 * ["XM4"] + 3 * ["STS"]
 
 
+@pytest.mark.slow
 def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_path: Path) -> None:
     robot = service.robot(tmp_path)
     told = json.loads(service("doctor", "--robot", robot, "--wiggle", "--json").stdout)
@@ -91,6 +93,7 @@ def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_pa
         )
 
 
+@pytest.mark.costs("the doctor examines two chains")
 @pytest.mark.parametrize(("servo_id", "limit"), [(2, "PWM Limit(36)"), (5, "PWM Limit(16)")])
 def test_the_doctor_names_the_registers_of_the_port(
     service: TwoMakes, tmp_path: Path, servo_id: int, limit: str
@@ -122,6 +125,7 @@ def test_a_setting_is_written_on_the_port_of_its_servo(service: TwoMakes) -> Non
         assert line.bank["Return Delay Time"].tolist() == [0, 10, 0]
 
 
+@pytest.mark.costs("the doctor examines two chains")
 def test_identify_writes_a_robot_of_two_makes(service: TwoMakes, tmp_path: Path) -> None:
     file = tmp_path / "found.toml"
     done = service("bus", "inventory", "--baud", 1_000_000, "-o", file)

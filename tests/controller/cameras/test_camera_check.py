@@ -86,7 +86,7 @@ def test_frames_markers_light_and_a_bump_are_reported() -> None:
     assert found.latency is None
 
 
-@pytest.mark.costs("follows a body through a film")
+@pytest.mark.slow
 def test_the_body_is_followed_in_a_window_from_frame_to_frame() -> None:
     """Drawn frames, 80 ms late."""
     view = replace(VIEW, noise=2.0, markers_m={})

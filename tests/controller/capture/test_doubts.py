@@ -55,7 +55,7 @@ def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
     assert head_end(points[::-1], even, 15.0, None, fixed=True)[0] < -0.9
 
 
-@pytest.mark.costs("a film of a slow animal")
+@pytest.mark.slow
 def test_a_slow_larva_with_a_faint_tail_is_seen_whole() -> None:
     scene = replace(SCENE, head=1.8, faint=0.15, tip=0.05, taper=0.6, slender=18.0)
     frames, truth = list(film(scene)), true_midlines(scene)

@@ -48,6 +48,7 @@ def test_identities_are_kept_through_crossings(seed: int) -> None:
     assert count.swapped_silently == 0
 
 
+@pytest.mark.slow
 def test_animals_that_hardly_move_are_not_part_of_the_background() -> None:
     """In 24 frames each worm crawls 0.7 of its length: most of its pixels stay covered."""
     scene = replace(PLATE, animals=10, rows=420, columns=520, roam=0.38, frames=24, seed=3101)
@@ -60,6 +61,7 @@ def test_animals_that_hardly_move_are_not_part_of_the_background() -> None:
     assert count.short <= 1
 
 
+@pytest.mark.slow
 def test_stains_do_not_replace_a_background_that_shows_the_animals() -> None:
     scene = replace(PLATE, animals=4, rows=300, columns=300, frames=90, seed=3102)
     images = list(crossing_film(scene, crossing_midlines(scene)))
@@ -185,6 +187,7 @@ def test_two_animals_in_a_film_of_one_are_rejected() -> None:
         capture(images, make_detector(images), 15.0)
 
 
+@pytest.mark.costs("rejects films after they are read")
 def test_what_does_not_fit_several_animals_is_rejected(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path
 ) -> None:
@@ -203,6 +206,7 @@ def test_what_does_not_fit_several_animals_is_rejected(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_an_interrupted_capture_of_several_animals_is_continued(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,6 +26,7 @@ from snakewalk.controller.images.medial_axis import no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.thin_body_fit import fitted
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.tiers import slow_after
 from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
@@ -46,13 +47,16 @@ def watch(scene: SnakeScene) -> tuple[Capture, np.ndarray]:
 
 @pytest.mark.parametrize(
     "change",
-    [
-        {},
-        {"blur_px": 2.0},
-        {"shadow": 0.3},
-        {"noise": 6.0, "blur_px": 1.2, "light": 0.3, "shadow": 0.25},
-        {"taper": 0.12},
-    ],
+    slow_after(
+        1,
+        [
+            {},
+            {"blur_px": 2.0},
+            {"shadow": 0.3},
+            {"noise": 6.0, "blur_px": 1.2, "light": 0.3, "shadow": 0.25},
+            {"taper": 0.12},
+        ],
+    ),
     ids=["plain", "blurred", "shadow", "all", "blunt"],
 )
 def test_corresponding_points_are_within_a_hundredth(change: dict[str, Any]) -> None:
@@ -64,6 +68,7 @@ def test_corresponding_points_are_within_a_hundredth(change: dict[str, Any]) -> 
     )
 
 
+@pytest.mark.costs("a film of small bodies")
 def test_a_body_too_blurred_and_noisy_for_its_size_is_told_rough_and_keeps_its_points() -> None:
     scene = replace(SMALL, length_px=20.0, noise=8.0, blur_px=1.5)
     seen, errors = watch(scene)

@@ -79,7 +79,7 @@ def test_few_items_are_under_way_at_a_time() -> None:
     assert most <= AHEAD + 2
 
 
-@pytest.mark.costs("starts processes")
+@pytest.mark.slow
 def test_points_travel_to_other_processes() -> None:
     points, _ = points_of(GAITS["rolling"], load_robot("alternating16"), 2, seed=0, seconds=5.0)
     found = {point.number: key for point, key in each(attrgetter("key"), points, workers=1)}

@@ -33,6 +33,7 @@ from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.studies.tune import Tuned
+from tests.helpers.tiers import slow_after
 
 CONTROLLER = Path(__file__).resolve().parents[3] / "controller"
 WRITERS = {
@@ -232,6 +233,7 @@ def arguments(command: str, out: Path) -> list[str]:
     }[command]
 
 
+@pytest.mark.costs("starts commands on a full disk")
 @pytest.mark.parametrize(
     ("command", "name"),
     [
@@ -239,7 +241,7 @@ def arguments(command: str, out: Path) -> list[str]:
         *(("gait", "g.png"), ("analysis", "a.png"), ("skin", "s.glb")),
     ],
 )
-@pytest.mark.parametrize("old", [b"old", None])
+@pytest.mark.parametrize("old", slow_after(1, [b"old", None]))
 def test_commands_leave_nothing_on_a_full_disk(
     command: str,
     name: str,

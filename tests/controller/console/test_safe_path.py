@@ -34,11 +34,13 @@ MODEL = f"""<mujoco><compiler angle="radian"/><worldbody><body pos="0 0 0.1"><fr
 GAIT = "lateral-undulation"
 SHORT = ("--seconds", "5", "--seeds", "1", "--workers", "1")
 PAGE = ("--view", "--view-at", "127.0.0.1:0")
-SLOW = pytest.mark.slow  # they use the pool of trials, which is the only one
+SLOW = pytest.mark.slow  # each needs a run or the pool of trials
 COMMANDS = [
     pytest.param(("robot", "import", "model.xml", "-o", "robot.toml"), id="import"),
-    pytest.param(("gait", "run", GAIT, "--seconds", "0.1", "--no-film", *PAGE), id="page"),
-    pytest.param(("trials", "run", GAIT, *SHORT), id="trials"),
+    pytest.param(
+        ("gait", "run", GAIT, "--seconds", "0.1", "--no-film", *PAGE), id="page", marks=SLOW
+    ),
+    pytest.param(("trials", "run", GAIT, *SHORT), id="trials", marks=SLOW),
     pytest.param(
         ("gait", "sweep", GAIT, "--robot", "yaw16", "--points", "1"), id="sweep", marks=SLOW
     ),

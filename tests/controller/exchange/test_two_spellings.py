@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.report import artifacts
+from tests.helpers.tiers import slow_after
 
 CASES = Path(__file__).resolve().parents[2] / "config/two_spellings"
 ROBOT = "tiny.toml"
@@ -44,7 +45,7 @@ def files_and_output(folder: Path, arguments: list[str]) -> dict[str, bytes]:
 
 
 @pytest.mark.costs("runs commands twice")
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", slow_after(2, COMMANDS))
 def test_a_command_gives_the_same_bytes(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -10,6 +10,7 @@ from snakewalk.controller.gaits.helix import HelixPipe, HelixPole, helix_joints_
 from snakewalk.sim.physics.obstacles import fit_coil
 from snakewalk.sim.physics.plant import MujocoPlant
 from tests.helpers.swimming import follow
+from tests.helpers.tiers import slow_after
 from tests.oracles.numpy_steps import numpy_plant
 
 ROBOT = load_robot("alternating16")
@@ -60,12 +61,15 @@ def test_opposite_hands_are_mirror_images_and_backward_is_reversed(gait: Gait) -
 @pytest.mark.costs("simulates a climb")
 @pytest.mark.parametrize(
     ("gait", "world", "sign"),
-    [
-        (HelixPole(), "pole", 1.0),
-        (HelixPole.of({"left_handed": True}), "pole", 1.0),
-        (HelixPipe(), "pipe", 1.0),
-        (HelixPipe.of({"left_handed": True}), "pipe", 1.0),
-    ],
+    slow_after(
+        1,
+        [
+            (HelixPole(), "pole", 1.0),
+            (HelixPole.of({"left_handed": True}), "pole", 1.0),
+            (HelixPipe(), "pipe", 1.0),
+            (HelixPipe.of({"left_handed": True}), "pipe", 1.0),
+        ],
+    ),
 )
 def test_it_climbs_as_far_a_cycle_as_a_rolling_body_does(
     gait: HelixPole | HelixPipe, world: str, sign: float
@@ -81,7 +85,7 @@ def test_it_climbs_as_far_a_cycle_as_a_rolling_body_does(
     assert run.plant.contact_count >= 3
 
 
-@pytest.mark.costs("simulates a climb")
+@pytest.mark.slow
 def test_short_links_climb_a_pole_as_rolling_without_slip_does() -> None:
     gait = HelixPole()
     climb = follow(gait, "alternating32", "pole", 8.0, hold_s=1.0).way_m(1)[2]

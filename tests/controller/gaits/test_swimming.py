@@ -11,6 +11,7 @@ from snakewalk.controller.gaits.spine import Anguilliform, SpineParameters, offs
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.physics.water import floating_height_m, immersed
 from tests.helpers.swimming import a_still_drive, follow
+from tests.helpers.tiers import slow_after
 from tests.oracles.numpy_steps import numpy_plant
 from tests.oracles.planar_swimmer import swim
 
@@ -80,7 +81,7 @@ def test_printed_standing_wave_is_its_own_reverse_and_has_no_thrust_direction(mo
 
 
 @pytest.mark.costs("simulates a swimmer")
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", slow_after(1, MODES))
 def test_every_mode_swims_forward_as_the_planar_model_says(mode: str) -> None:
     """The physics against a model that shares no code with it, with the joints as they moved."""
     run = follow(make_gait(mode), "yaw16", "pool", 6.0, grow_s=2.0)

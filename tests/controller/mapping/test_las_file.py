@@ -236,6 +236,7 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_process")
 def test_broken_files_end_with_a_line(tmp_path: Path) -> None:
     """They are read in another process with limits: damaged counts ask for any memory."""

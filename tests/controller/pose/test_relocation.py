@@ -10,6 +10,7 @@ from snakewalk.config.pose import PoseConfig
 from snakewalk.controller.pose.sample import ArrivedPose, PoseSample
 from snakewalk.drivers.attitude import rotation_by
 from tests.controller.pose.scene import CYCLE_S, Scene, joint_state, moved
+from tests.helpers.tiers import slow_after
 
 BEFORE_S = 6.0
 SLIDE_M, SLIDE_RAD, SLIDE_S = 1.3, 1.5, 0.7
@@ -100,7 +101,7 @@ def test_markers_that_swap_after_a_slide_change_nothing() -> None:
     slide.assert_found(scene)
 
 
-@pytest.mark.parametrize("gap_s", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize("gap_s", slow_after(1, [0.0, 0.3, 2.0]))
 def test_markers_that_swap_for_ever_are_never_believed(gap_s: float) -> None:
     """The run holds after a second, so the joints rest."""
     scene = walked()

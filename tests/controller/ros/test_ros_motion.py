@@ -121,7 +121,7 @@ def test_a_dead_reckoned_pose_is_never_published_as_measured(
     assert np.abs(np.array(at) - logged).max(axis=2).min(axis=0).max() < 1e-9
 
 
-@pytest.mark.costs("starts a ROS client in another process")
+@pytest.mark.slow
 def test_velocities_move_the_body_and_stop_it_when_they_are_stale(
     client: Client, tmp_path: Path
 ) -> None:
@@ -161,6 +161,7 @@ def test_velocities_move_the_body_and_stop_it_when_they_are_stale(
     assert moved_m[0] > 0.1
 
 
+@pytest.mark.costs("starts a ROS client in another process")
 def test_a_goal_pose_leads_a_live_run_elsewhere(client: Client, tmp_path: Path) -> None:
     graph = Graph(goals=True)
     goals = client.node.create_publisher(PoseStamped, "/goal_pose", 10)

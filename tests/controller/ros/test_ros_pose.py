@@ -125,7 +125,7 @@ def test_the_transforms_of_one_frame_become_poses() -> None:
     )
 
 
-@pytest.mark.costs("starts a ROS client in another process")
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("tf2_msgs") is not None, reason="tf2_msgs is installed")
 def test_transforms_without_their_messages_name_the_package() -> None:
     with pytest.raises(InputError, match="tf2_msgs is not installed; install ros-jazzy-tf2-msgs"):

@@ -138,7 +138,7 @@ def test_a_log_of_a_gait_replays_exactly_and_becomes_a_job_again(sidewound, tmp_
     assert isinstance(job, GaitRun)
 
 
-@pytest.mark.costs("a command and its run")
+@pytest.mark.slow
 def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> None:
     prepared = prepare_gait("turn-in-place", seconds=6.0)
     tight = SafetyConfig(current_limit_a=0.5, current_time_s=5.0)

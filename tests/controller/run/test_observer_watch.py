@@ -18,6 +18,7 @@ from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.run.watchers import Watchers
 from snakewalk.controller.runlog.row_line import WatcherEnd
 from snakewalk.controller.runtime.drive import Progress
+from tests.helpers.tiers import slow_after
 
 
 class Observer:
@@ -104,7 +105,7 @@ def serve(line: socket.socket) -> None:
 
 
 @pytest.mark.costs("another process observes")
-@pytest.mark.parametrize("name", ["SIGKILL", "SIGSTOP"])
+@pytest.mark.parametrize("name", slow_after(1, ["SIGKILL", "SIGSTOP"]))
 def test_a_process_that_is_killed_or_stopped_is_lost(name: str) -> None:
     now_s = 0.0
     with WatcherProcess(serve, what="page", fault="page") as observer:

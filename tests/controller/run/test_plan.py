@@ -65,6 +65,7 @@ def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
     assert climb == "the path climbs 15.0 deg; the world's climb limit is 11.5 deg"
 
 
+@pytest.mark.slow
 def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> None:
     keys = {"world.ground.slope_deg": 18.0, "world.planner.variance_limit_m2": 0.01}
     words = [word for key, value in keys.items() for word in ("--set", f"{key}={value}")]

@@ -11,7 +11,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.port.serial_port import SerialPort
 
 
-@pytest.mark.costs("another process serves a robot")
+@pytest.mark.slow
 def test_the_servos_reply_and_the_body_is_drawn() -> None:
     robot = load_robot("yaw16")
     with RealTimeRobot(robot, load_world("flat")) as served:

@@ -17,7 +17,7 @@ from tests.helpers.tiers import slow_except
 SECONDS = 20.0
 
 
-@pytest.mark.costs("a walk over hills")
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", slow_except(["imu"], ["simulator", "imu"]))
 def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
     pose: str, tmp_path: Path, mocker: MockerFixture

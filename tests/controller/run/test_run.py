@@ -75,7 +75,7 @@ def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:
     assert not np.array_equal(*sent)
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -> None:
     prepared = short(motion="serpenoid", time_limit_s=15.0)
     same = FrictionConfig(along=0.4, across=0.4)

@@ -171,7 +171,7 @@ def test_a_servo_is_found_on_its_port(service: Service) -> None:
     assert "has no ID 40; say which port it is on" in done.stderr
 
 
-@pytest.mark.costs("a walk on several ports")
+@pytest.mark.slow
 def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,6 +26,7 @@ from snakewalk.drivers.protocol.registers import ServoUnits
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.sim.servo.register_rules import simulated_models
 from tests.helpers.in_process import leave_out_pages, work_in_this_process
+from tests.helpers.tiers import slow_after
 
 _DOCS = Path(__file__).resolve().parents[3] / "docs"
 _RUN = """
@@ -68,15 +69,18 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize("robot", ["xl330.toml", "xl430.toml"])
 @pytest.mark.parametrize(
     "words",
-    [
-        "run short.toml --no-film",
-        "gait run lateral-undulation --seconds 2 --no-film",
-        "play bends.npz --no-film",
-        "gait sweep lateral-undulation --points 1 --seconds 4 -o sweep.csv",
-        "gait tune lateral-undulation --budget 16 --seconds 4 --seeds 1",
-        "gait repertoire record",
-        "trials run short.toml --motion serpenoid --seeds 1 -o t.csv",
-    ],
+    slow_after(
+        1,
+        [
+            "run short.toml --no-film",
+            "gait run lateral-undulation --seconds 2 --no-film",
+            "play bends.npz --no-film",
+            "gait sweep lateral-undulation --points 1 --seconds 4 -o sweep.csv",
+            "gait tune lateral-undulation --budget 16 --seconds 4 --seeds 1",
+            "gait repertoire record",
+            "trials run short.toml --motion serpenoid --seeds 1 -o t.csv",
+        ],
+    ),
 )
 def test_a_robot_from_the_pages_goes_through_every_command(
     words: str,

@@ -38,7 +38,7 @@ def robot_file(tmp_path: Path) -> Path:
     return file
 
 
-@pytest.mark.costs("a run on two ports")
+@pytest.mark.slow
 def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=3.0)
     finished = execute(gait, tmp_path / "run", stoppable=False)
@@ -122,7 +122,7 @@ def test_a_gait_runs_on_both_ports(ports: Ports, robot_file: Path, tmp_path: Pat
         assert not line.firmware.drive.torque_on.any()
 
 
-@pytest.mark.costs("a run on two ports")
+@pytest.mark.slow
 @pytest.mark.parametrize("silent", slow_except([7], [2, 7]))
 def test_a_servo_that_dies_stops_the_run_on_both_ports(
     ports: Ports, robot_file: Path, tmp_path: Path, silent: int

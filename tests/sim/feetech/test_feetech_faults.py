@@ -19,6 +19,7 @@ from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain
+from tests.helpers.tiers import slow_after
 from tests.sim.faults.test_faults import fault
 
 PERIOD_S = 0.02
@@ -174,7 +175,9 @@ NOISE = {
 }
 
 
-@pytest.mark.parametrize(("kind", "seed"), [(kind, seed) for seed, kind in enumerate(NOISE)])
+@pytest.mark.parametrize(
+    ("kind", "seed"), slow_after(2, [(kind, seed) for seed, kind in enumerate(NOISE)])
+)
 def test_no_late_or_damaged_reply_is_taken_for_a_new_value(kind: str, seed: int) -> None:
     text = f"seed = {seed}\n" + fault(kind, at_s=2.0, **{"for_s": 9.0, **NOISE[kind]})
     line = scripted(text, "1-12:STS3215")

@@ -79,7 +79,7 @@ def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
     assert np.abs(px).max() < 0.8
 
 
-@pytest.mark.costs("fits a body to each frame")
+@pytest.mark.slow
 def test_a_side_view_gives_height_and_pitch() -> None:
     frames = range(20, 80, 20)
     top, model, base = film(TRUTH, frames, 80.0)

@@ -23,6 +23,7 @@ from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.track.readers.keypoints import choice_of
 from snakewalk.controller.track.readers.load import load_keypoints
 from tests.helpers.command import snakewalk
+from tests.helpers.tiers import slow_after
 from tests.oracles.tracked_animal import NOISE, table, tracked
 
 pytestmark = pytest.mark.usefixtures("legible_figures")
@@ -83,7 +84,7 @@ def walker(
     return spine, feet, height + rng.normal(0.0, noise, height.shape)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", slow_after(3, range(20)))
 def test_contact_is_known_to_a_fiftieth_of_a_cycle(seed: int) -> None:
     """One fixed shape of the way in the air was 0.05 to 0.14 wrong for two of these four."""
     swing = list(SWINGS)[seed % 4]
@@ -131,7 +132,7 @@ def test_what_is_no_walk_is_told() -> None:
         measure_stride(held, feet - spine.mean(axis=1, keepdims=True), (1, 3), 24 / lizard.cycle_s)
 
 
-@pytest.mark.costs("from a table to a walk")
+@pytest.mark.slow
 def test_from_a_tracker_s_table_to_a_walk_on_hills(tmp_path: Path) -> None:
     lizard = read_animal("lizard")
     table(tmp_path / "tracked.csv", lizard)

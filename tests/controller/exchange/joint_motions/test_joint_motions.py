@@ -229,7 +229,7 @@ def test_a_run_logs_the_mapping(tmp_path: Path) -> None:
     assert ("recording", prepared.notes[0]) in events
 
 
-@pytest.mark.costs("damages a file of each reader at many places")
+@pytest.mark.slow
 def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path) -> None:
     table(tmp_path / "a.csv", ["time", *(f"{name}_rad" for name in NAMES)])
     bag(tmp_path / "b.mcap")
