@@ -6,6 +6,8 @@ from typing import Final, NamedTuple
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.gaits.gait import Gait
 
+LATE_S: Final = 1.0
+"""An operator's command that is older is dropped (ours): its user no longer expects it."""
 TIMEOUT_S: Final = 1.0
 """How long joints go on towards goals that nobody renews (ours)."""
 POINTS_MAX: Final = 500

@@ -13,6 +13,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.kinematics.links import BodyView
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.motion.source import Pace
@@ -45,7 +46,7 @@ class Operator(MotionWrapper):
         self,
         motion: GaitMotion,
         robot: RobotConfig,
-        keys: Callable[[], Iterable[str]],
+        keys: Callable[[], Iterable[str | Refused]],
         on_event: Callable[[str, str], None],
         held: Callable[[], bool] = lambda: True,
     ) -> None:
@@ -55,8 +56,8 @@ class Operator(MotionWrapper):
             motion: the first gait.
             robot: gaits must suit it.
             keys: names of ``KEYS`` pressed since the last call, ``PARAMETER=VALUE`` and
-                ``gait=NAME``; others are ignored, also ``t``, which the owner of the torque
-                handles.
+                ``gait=NAME``, and reasons for dropped ones; others are ignored, also ``t``, which
+                the owner of the torque handles.
             on_event: called with ("operator", text) for an action that was done or refused.
             held: whether the dead man's button is held; otherwise the body stands in its shape,
                 whatever else is pressed.
@@ -105,7 +106,10 @@ class Operator(MotionWrapper):
         self._rate += min(max(target - self._rate, -change), change)
         return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
 
-    def _press(self, key: str) -> None:
+    def _press(self, key: str | Refused) -> None:
+        if isinstance(key, Refused):
+            self._refuse(key.why)
+            return
         name, equals, value = key.partition("=")
         if equals:
             self._assign(name, value)

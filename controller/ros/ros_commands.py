@@ -2,6 +2,7 @@
 
 import math
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import cache
@@ -17,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.motion.command import (
     JOINTS_MAX,
+    LATE_S,
     POINTS_MAX,
     TIMEOUT_S,
     Command,
@@ -36,6 +38,25 @@ _PENDING_MAX: Final = 16
 """Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
 newer ones of the same joints follow, and velocities and goal poses that newer ones follow."""
 QUEUE: Final = QoSProfile(depth=10)
+_WINDOW_S: Final = 120.0
+"""The fastest message of this time has no delay (ours), so that clocks need not agree."""
+
+
+class Delays:
+    """Delays of the messages of a topic, from the publisher's time in the message's envelope.
+
+    A delay is counted from the fastest message of the last two minutes.
+    """
+
+    def __init__(self) -> None:
+        self._offsets_s: deque[tuple[float, float]] = deque(maxlen=10_000)
+
+    def delay_s(self, source_s: float, now_s: float) -> float:
+        """Return the delay of a message that was sent at ``source_s`` of the publisher's clock."""
+        self._offsets_s.append((now_s, now_s - source_s))
+        while now_s - self._offsets_s[0][0] > _WINDOW_S:
+            self._offsets_s.popleft()
+        return now_s - source_s - min(offset_s for _, offset_s in self._offsets_s)
 
 
 class CommandTopics:
@@ -45,6 +66,8 @@ class CommandTopics:
         self._node, self._options = node, options
         self.pending: deque[Command] = deque(maxlen=_PENDING_MAX)
         self._lock = threading.Lock()
+        self._delay_s = 0.0
+        """Delay of the message that is being read."""
         self.has_begun = False
         """Whether the run has begun; commands that come before are rejected."""
         self.frame = ""
@@ -80,11 +103,14 @@ class CommandTopics:
         callback = self._guarded(topic, take)
         self._node.create_subscription(message_type(kind), topic, callback, QUEUE)
 
-    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any, Any], None]:
         """Return a callback that rejects a message on which ``take`` fails."""
+        delays = Delays()
 
-        def taken(message: Any) -> None:
+        def taken(message: Any, info: Any) -> None:
             try:
+                source_s = 1e-9 * info["source_timestamp"]
+                self._delay_s = delays.delay_s(source_s, time.monotonic()) if source_s else 0.0
                 take(message)
             except Exception as fault:  # else the thread ends, and the stop service with it
                 self.reject(f"{topic}: {in_words(fault)}")
@@ -198,6 +224,11 @@ class CommandTopics:
         """Keep a command for the run; a stamp of 0 says nothing."""
         if not self.has_begun:
             command = Refused(f"{what}: the run has not begun")
+        elif self._delay_s > LATE_S and not _is_halt(command):
+            command = Refused(
+                f"{what}: came {self._delay_s:.1f} s late and is dropped; at most {LATE_S:g} s is "
+                "accepted; send it again"
+            )
         elif stamp is not None and (stamp.sec or stamp.nanosec):
             age_s = 1e-9 * self._node.get_clock().now().nanoseconds - (
                 stamp.sec + 1e-9 * stamp.nanosec
@@ -215,6 +246,11 @@ class CommandTopics:
             if last is not None and _replaces(command, last):
                 self.pending.pop()
             self.pending.append(command)
+
+
+def _is_halt(command: Command) -> bool:
+    """Whether a command ends a motion, or is none; such a command is never too late."""
+    return isinstance(command, HoldStill | Refused) or command == Velocity(0.0, 0.0)
 
 
 def _replaces(command: Command, last: Command) -> bool:

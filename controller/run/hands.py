@@ -1,9 +1,11 @@
 """Devices by which an operator changes a gait during its run."""
 
 import sys
+import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import cast
+from typing import Final, cast
 
 from rich.columns import Columns
 
@@ -12,22 +14,33 @@ from snakewalk.controller.console.gamepad import Gamepad
 from snakewalk.controller.console.keyboard import Keyboard
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.plain_console import PlainConsole
+from snakewalk.controller.motion.command import LATE_S, Refused
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.operator import KEYS, Operator
+from snakewalk.controller.motion.refusals import NAME_MAX
 from snakewalk.controller.run.observer_watch import ADVICE
 from snakewalk.controller.run.watchers import PageControls
 from snakewalk.controller.runtime.drive import OnEvent
+
+_ENDS: Final = ("q", "t")
+"""Keys that are never too late."""
 
 
 class Hands:
     """Devices of an operator: keyboard, gamepad, page."""
 
     def __init__(
-        self, devices: list[Keyboard | Gamepad | PageControls], page: PageControls | None
+        self,
+        devices: list[Keyboard | Gamepad | PageControls],
+        page: PageControls | None,
+        now_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._devices = devices
         self._page = page
-        self._waiting: list[str] = []
+        self._now_s = now_s
+        self._polled_s: float | None = None
+        self._waiting: list[tuple[float, str | Refused]] = []
+        """Earliest time and key of each press that the motion has not received."""
         self._off = False
         self._motion: GaitMotion | None = None
         self._lost: str | None = None
@@ -41,9 +54,13 @@ class Hands:
 
     def torque_off(self) -> str | None:
         """Reason for torque off, requested in every read and write; it stays."""
+        now_s = self._now_s()
+        since_s = now_s if self._polled_s is None else self._polled_s
+        self._polled_s = now_s
         for device in self._devices:
-            self._waiting += device.pressed()
-        self._off = self._off or "t" in self._waiting
+            keys = device.pressed()
+            self._waiting += [(since_s, key) for key in keys]
+            self._off = self._off or "t" in keys
         return "the operator switched torque off" if self._off else self._lost_device()
 
     def _lost_device(self) -> str | None:
@@ -75,12 +92,26 @@ class Hands:
         tell_page()
         return Operator(motion, robot, self._take, on_change, self._held)
 
-    def _take(self) -> list[str]:
+    def _take(self) -> list[str | Refused]:
+        """Return the keys; late ones, other than for the end, as a reason why they are dropped."""
         taken, self._waiting = self._waiting, []
-        return taken
+        now_s = self._now_s()
+        return [
+            key if now_s - since_s <= LATE_S or key in _ENDS else _late(key, now_s - since_s)
+            for since_s, key in taken
+        ]
 
     def _held(self) -> bool:
         return all(device.is_enabled for device in self._devices)
+
+
+def _late(key: str | Refused, age_s: float) -> Refused:
+    if isinstance(key, Refused):
+        return key
+    return Refused(
+        f"{key[:NAME_MAX]} came up to {age_s:.1f} s late and is dropped; at most {LATE_S:g} s is "
+        "accepted; press it again"
+    )
 
 
 def open_hands(

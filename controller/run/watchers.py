@@ -25,8 +25,8 @@ class PageControls(Watcher, OffersStop, Protocol):
         """Whether the dead man's button is held; True without one."""
         ...
 
-    def pressed(self) -> list[str]:
-        """Return the settings changed since the last call."""
+    def pressed(self) -> Sequence[str | Refused]:
+        """Return the settings changed since the last call, and reasons for dropped ones."""
         ...
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:

@@ -132,7 +132,7 @@ def _joined(kind: type[T], parts: Sequence[T], last: T) -> T:
     if not parts:
         return last
     cells: dict[str, Any] = {}
-    for name in (each.name for each in fields(kind)):
+    for name in (each.name for each in fields(kind)):  # type: ignore[arg-type]
         values = [getattr(part, name) for part in parts]
         if len(getattr(last, name)):
             values.append(getattr(last, name))

@@ -15,6 +15,7 @@ from typing import Any, Final
 from websockets.exceptions import ConnectionClosed
 
 from snakewalk.config.archive import parse_json
+from snakewalk.controller.motion.command import LATE_S
 from snakewalk.controller.view.dead_man import STALE_S, hold_command
 
 KEYS: Final = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
@@ -160,9 +161,13 @@ class BrowserGamepad:
     def _is_free(self) -> bool:
         return self._steers is None or self.is_stale
 
-    def take(self, source: Hashable, message: str | bytes) -> bool:
-        """Process a message from a browser; return whether its line may stay open."""
+    def take(self, source: Hashable, message: str | bytes, since_s: float | None = None) -> bool:
+        """Process a message from a browser; return whether its line may stay open.
+
+        A message that began at ``since_s`` and is late may only stop the run.
+        """
         now_s = self._now_s()
+        is_late = since_s is not None and now_s - since_s > LATE_S
         with self._lock:
             browser = self._sources.setdefault(source, _Source())
             times_s = browser.times_s
@@ -176,7 +181,8 @@ class BrowserGamepad:
             before, browser.state = browser.state, state
             was_down = before.pressed if before is not None else frozenset[int]()
             stops = state is not None and not (state.pressed - was_down).isdisjoint(STOP)
-            if source == self._steers or (state is not None and self._is_free):
+            is_first = state is not None and self._is_free
+            if not is_late and (source == self._steers or is_first):
                 self._keys += _pressed(before, state)
                 self._steers = source if state is not None else None
                 self.state, self._told_s, self._is_new = state, now_s, True
@@ -206,7 +212,7 @@ class BrowserGamepad:
         """Process the messages of one browser, one after another, until it leaves."""
         try:
             async for message in connection:
-                if not self.take(connection, message):
+                if not self.take(connection, message, connection.beginnings_s.popleft()):
                     break
                 await connection.send("taken")
         except ConnectionClosed:

@@ -9,13 +9,15 @@ STALE_S: Final = 0.3
 """A gamepad that sends nothing for this time is not held (ours)."""
 _AHEAD_S: Final = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
+HOLD: Final = "pad="
+"""Begins a state of a gamepad."""
 WITHOUT: Final = "pad=none"
 """Says that nobody has to hold a gamepad any more."""
 
 
 def hold_command(held: bool, at_s: float) -> str:
     """Say that a gamepad was held, or was not, at a time of the machine's clock."""
-    return f"pad={held:d}@{at_s:.3f}"
+    return f"{HOLD}{held:d}@{at_s:.3f}"
 
 
 class DeadMan:
@@ -38,12 +40,12 @@ class DeadMan:
         return [
             command
             for command in commands
-            if not command.startswith("pad=") or not self._process(command)
+            if not command.startswith(HOLD) or not self._process(command)
         ]
 
     def _process(self, command: str) -> bool:
         """Whether a command of a gamepad is valid; a time in the future is not."""
-        down, _, text = command.removeprefix("pad=").partition("@")
+        down, _, text = command.removeprefix(HOLD).partition("@")
         try:
             at_s = float(text) if text else 0.0
         except ValueError:

@@ -5,13 +5,15 @@ every user of this machine reaches 127.0.0.1. So a request must name an expected
 come from our page, and both need the token, which a cookie keeps.
 """
 
+import asyncio
 import hmac
 import http
 import ipaddress
 import re
 import secrets
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from html import escape
 from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final, Protocol
@@ -20,6 +22,8 @@ from urllib.parse import parse_qs, urlsplit
 import websockets.asyncio.server
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
+
+from snakewalk.controller.view.fresh_line import FreshConnection, Freshness
 
 _LOCAL: Final = frozenset({"127.0.0.1", "localhost", "::1"})
 _ANY: Final = frozenset({"0.0.0.0", "::"})
@@ -49,8 +53,9 @@ class Insert(Protocol):
 class Gate:
     """Lets requests pass, or answers them itself."""
 
-    def __init__(self, host: str, insert: Insert | None = None) -> None:
-        self._insert = insert
+    def __init__(self, host: str, *inserts: Insert, freshness: Freshness | None = None) -> None:
+        self._inserts = {each.path: each for each in inserts}
+        self._freshness = Freshness() if freshness is None else freshness
         self._host = host
         self.token = secrets.token_urlsafe(16)
         """Asked for once in each browser."""
@@ -98,9 +103,10 @@ class Gate:
     def guard(self, serve: Serve) -> Serve:
         """Return a ``websockets`` server that asks this gate before its own ``process_request``.
 
-        It has the insert's script in its page, and leads its socket to the insert.
+        It has the scripts of the inserts in its page, leads their sockets to them, and drops late
+        messages to viser.
         """
-        insert = self._insert
+        inserts = self._inserts
 
         def guarded(handler: Serve, *args: Any, process_request: Any = None, **options: Any) -> Any:
             def ask(connection: Any, request: Request) -> Response | None:
@@ -108,20 +114,25 @@ class Gate:
                 refusal = self.answer(request, port)
                 if refusal is not None or process_request is None:
                     return refusal
-                has_script = insert is not None and urlsplit(request.path).path in _PAGES
+                has_script = bool(inserts) and urlsplit(request.path).path in _PAGES
                 if has_script:  # the page is changed, so it must come as it is
                     _ask_for_plain(request)
                 passed: Response | None = process_request(connection, request)
-                if insert is not None and has_script and passed is not None:
-                    _add_script(passed, insert.script)
+                if has_script and passed is not None:
+                    _add_scripts(passed, [each.script for each in inserts.values()])
                 return passed
 
             async def handle(connection: Any) -> None:
-                if insert is not None and urlsplit(connection.request.path).path == insert.path:
-                    await insert.serve(connection)
-                else:
-                    await handler(connection)
+                insert = inserts.get(urlsplit(connection.request.path).path)
+                proof = asyncio.create_task(connection.prove())
+                try:
+                    await (handler if insert is None else insert.serve)(connection)
+                finally:
+                    proof.cancel()
 
+            options["create_connection"] = partial(
+                FreshConnection, freshness=self._freshness, late_paths=inserts
+            )
             return serve(handle, *args, process_request=ask, **options)
 
         return guarded
@@ -175,10 +186,10 @@ def _ask_for_plain(request: Request) -> None:
         del request.headers["Accept-Encoding"]
 
 
-def _add_script(response: Response, script: str) -> None:
-    """Put a script into a page, before everything else."""
-    head = b"<head>"
-    response.body = response.body.replace(head, head + f"<script>{script}</script>".encode(), 1)
+def _add_scripts(response: Response, scripts: Sequence[str]) -> None:
+    """Put scripts into a page, before everything else."""
+    head = "<head>" + "".join(f"<script>{each}</script>" for each in scripts)
+    response.body = response.body.replace(b"<head>", head.encode(), 1)
     del response.headers["Content-Length"]
     response.headers["Content-Length"] = str(len(response.body))
 

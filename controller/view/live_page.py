@@ -26,11 +26,14 @@ from snakewalk.controller.runlog.topics import (
     WaypointTable,
 )
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
+from snakewalk.controller.view.command_line import timed
 from snakewalk.controller.view.dashboard import SPAN_S, Dashboard
+from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gait_panel import GaitPanel
 from snakewalk.controller.view.gamepad_panel import GamepadPanel
-from snakewalk.controller.view.page_server import StopPanel, open_page
+from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.scene import BodyScene
+from snakewalk.controller.view.stop_element import StopElement
 from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.priority import give_way
@@ -51,13 +54,14 @@ def serve(line: socket.socket, host: str, port: int) -> None:
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
     give_way()
     try:
-        gamepad = BrowserGamepad()
-        server, url = open_page(host, port, gamepad)
+        gamepad, freshness = BrowserGamepad(), Freshness()
+        stop = StopElement(freshness)
+        server, url = open_page(host, port, gamepad, stop, freshness=freshness)
     except OSError as fault:
         line.sendall(json.dumps({"fault": str(fault)}).encode() + b"\n")
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
-    page = _LivePage(server, WatcherEnd(line), gamepad)
+    page = _LivePage(server, WatcherEnd(line), gamepad, stop, freshness)
     with suppress(EOFError):
         while True:
             try:
@@ -72,12 +76,21 @@ def serve(line: socket.socket, host: str, port: int) -> None:
 class _LivePage:
     """State of the page between two steps."""
 
-    def __init__(self, server: viser.ViserServer, end: WatcherEnd, gamepad: BrowserGamepad) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        end: WatcherEnd,
+        gamepad: BrowserGamepad,
+        stop: StopElement,
+        freshness: Freshness,
+    ) -> None:
         self._server, self._end, self._gamepad = server, end, gamepad
         gamepad.on_stop = lambda: self._stop.show(self._press("E-STOP of a gamepad"))
         self._gamepad_panel: GamepadPanel | None = None
         self._clock = WallClock()
-        self._stop = StopPanel(server, self._press)
+        self._stop, self._freshness = stop, freshness
+        stop.press = self._press
+        self._collected_s = freshness.now_s()
         self._button: PressedButton | None = None
         self._rows: dict[str, deque[dict[str, Any]]] = defaultdict(lambda: deque(maxlen=_ROWS))
         self._header: Header | None = None
@@ -98,8 +111,7 @@ class _LivePage:
             self._clock.sleep_until_s(self._asked_s + _PERIOD_S)
             self._asked_s = self._clock.now_s()
             self._end.ask()
-            for command in self._commands():
-                self._end.command(command)
+            self._send_commands()
         for topic, row in self._end.rows(_PERIOD_S):
             self._take(topic, row)
             if topic == PoseTable.topic.name:
@@ -120,6 +132,15 @@ class _LivePage:
         if text not in self._faults:
             self._faults.add(text)
             print(f"snakewalk: {plain(text)}", file=sys.stderr, flush=True)
+
+    def _send_commands(self) -> None:
+        """Send inputs with the earliest time at which they can have begun."""
+        since_s = min(self._collected_s, self._freshness.take())
+        self._collected_s = self._freshness.now_s()
+        for command in self._commands():
+            self._end.command(timed(command, since_s))
+        for late_s in self._stop.late_s():
+            self._end.command(timed("an input", late_s))
 
     def _commands(self) -> list[str]:
         """Inputs that were set in the page since the last call."""

@@ -5,6 +5,7 @@ import json
 import math
 import socket
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
@@ -13,9 +14,11 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.watcher import WatcherProcess
 from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
 from snakewalk.controller.runlog.topics import PoseTable
+from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dead_man import DeadMan
 
 _PICTURE_S: Final = 0.5
@@ -45,9 +48,9 @@ class LiveView(WatcherProcess):
         """Whether the dead man's button of a browser's gamepad is held; True without a gamepad."""
         return self._dead_man.is_enabled
 
-    def pressed(self) -> list[str]:
+    def pressed(self) -> list[str | Refused]:
         """Inputs set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
-        return self._dead_man.sort_out(self._end.commands())
+        return fresh_commands(self._end.commands(), self._dead_man, time.monotonic)
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Show in the page the sliders of the gait that an operator runs."""

@@ -1,25 +1,25 @@
-"""viser behind a gate, and what every page has: a look, and the E-STOP always in sight."""
+"""viser behind a gate, with the look of every page."""
 
 import logging
 import socket
-from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
-from html import escape
 from io import StringIO
 
 import viser
 
-from snakewalk.config import colours
+from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gate import Gate, Insert
 
 _LEFT_PX, _TOP_PX, _WIDTH_PX = 16.0, 170.0, 300.0
 """Where a window floats over the scene: below the browser's own notices."""
 
 
-def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser.ViserServer, str]:
+def open_page(
+    host: str, port: int, *inserts: Insert, freshness: Freshness | None = None
+) -> tuple[viser.ViserServer, str]:
     """Serve an empty page; returns it with its address, which contains the token.
 
-    ``insert`` is something of our own in it.
+    ``inserts`` are elements of our own in it; ``freshness`` learns the age of its messages.
 
     Raises:
         OSError: nothing can be served there, or not behind the gate.
@@ -31,7 +31,7 @@ def open_page(host: str, port: int, insert: Insert | None = None) -> tuple[viser
             "0.0.0.0 (all of its addresses)"
         )
     logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # each refusal is a trace
-    gate = Gate(host, insert)
+    gate = Gate(host, *inserts, freshness=freshness)
     with redirect_stdout(StringIO()):  # viser prints its address without the token
         server: viser.ViserServer = gate.install(
             lambda: viser.ViserServer(host=host, port=port, label="snakewalk", verbose=False)
@@ -65,39 +65,3 @@ def _is_here(host: str) -> bool:
 def float_above(panel: viser.PanelHandle) -> None:
     """Let a panel float over the scene, where no other panel moves it out of sight."""
     panel.float(x=_LEFT_PX, y=_TOP_PX, width=_WIDTH_PX)
-
-
-class StopPanel:
-    """The E-STOP in a window of its own, always in sight."""
-
-    def __init__(self, server: viser.ViserServer, press: Callable[[str], str]) -> None:
-        self._press = press
-        panel = server.gui.add_panel()
-        with panel.add_tab("stop"):
-            self._button = server.gui.add_button("E-STOP  (Esc)", color="red", disabled=True)
-            self._text = server.gui.add_html("")
-        float_above(panel)
-        self._button.on_click(self._pressed)
-        command = server.gui.add_command(
-            "E-STOP", hotkey="escape", description="torque off, latched"
-        )
-        command.on_trigger(self._pressed)
-        self.show("waiting for the run")
-
-    def arm(self) -> None:
-        """The run has begun: from now on it can be stopped."""
-        self._button.disabled = False
-        self.show("torque off at once, latched")
-
-    def show(self, text: str, color: str = "inherit") -> None:
-        """Show a line below the button."""
-        style = f"padding:.2em .8em .6em;font-size:13px;color:{color}"
-        self._text.content = f"<div style='{style}'>{escape(text)}</div>"
-
-    def ended(self, text: str) -> None:
-        """The run is over."""
-        self._button.disabled = True
-        self.show(f"the run has ended: {text}", colours.FAULT)
-
-    def _pressed(self, event: object) -> None:
-        self.show(self._press("E-STOP of the page"))

@@ -30,7 +30,9 @@ from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from snakewalk.config.loader import load_robot, load_run, load_world
+from snakewalk.controller.motion.command import HoldStill, Refused, StartGait
 from snakewalk.controller.motion.commanded import Commanded
+from snakewalk.controller.ros.ros_commands import Delays
 from snakewalk.controller.ros.ros_link import _decoded
 from snakewalk.controller.ros.ros_node import (
     ClockOffset,
@@ -322,6 +324,29 @@ def test_of_goals_of_the_same_joints_the_newest_waits_for_the_run(graph: Graph) 
     assert [list(each.position_rad) for each in graph.robot.commands.pending] == [[0.99]]
 
 
+def test_a_command_that_waited_in_the_network_is_dropped_but_a_halt_is_not(
+    graph: Graph, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clocks of the publisher and of this machine differ by an hour."""
+    commands = graph.robot.commands
+    commands.has_begun = True
+    now_s = [50.0]
+    monkeypatch.setattr("time.monotonic", lambda: now_s[0])
+    taken = commands._guarded("robot_gait", commands.on_gait)
+
+    def send(text: str, sent_s: float) -> Any:
+        taken(String(data=text), {"source_timestamp": int(1e9 * (3600.0 + sent_s))})
+        return commands.take()[-1]
+
+    assert isinstance(send("lateral-undulation", 49.9), StartGait)
+    now_s[0] = 70.0
+    assert send("rolling", 54.0) == Refused(
+        "gait: came 15.9 s late and is dropped; at most 1 s is accepted; send it again"
+    )
+    assert send("", 54.0) == HoldStill()
+    assert isinstance(send("rolling", 69.5), StartGait)
+
+
 def test_rows_that_come_late_by_chance_do_not_shift_the_stamps() -> None:
     offset = ClockOffset(span_s=2.0)
     for k in range(200):
@@ -353,8 +378,10 @@ def test_what_the_middleware_says_is_told_in_a_line() -> None:
 
 @pytest.mark.slow
 def test_no_message_ends_the_run_or_silences_the_stop_service(
-    graph: Graph, client: Client, tmp_path: Path
+    graph: Graph, client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # messages of megabytes keep a busy machine for seconds
+    monkeypatch.setattr(Delays, "delay_s", lambda *times: 0.0)
     goals = client.node.create_publisher(JointState, "/robot_joint_command", 10)
     trajectories = client.node.create_publisher(JointTrajectory, "/robot_joint_trajectory", 10)
     gaits = client.node.create_publisher(String, "/robot_gait", 10)

@@ -24,6 +24,7 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
+from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.hands import Hands
@@ -33,13 +34,16 @@ from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
+from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dashboard import Dashboard
 from snakewalk.controller.view.dead_man import DeadMan
+from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gait_panel import GaitPanel
 from snakewalk.controller.view.live_page import _LivePage
 from snakewalk.controller.view.live_view import LiveView
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.scene import BodyScene
+from snakewalk.controller.view.stop_element import StopElement
 from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import PATIENT
@@ -97,11 +101,13 @@ class View:
         self.end = RunEnd(ours)
         self._picture: bytes | None = None
         self._picture_s = -1.0
-        server, _ = open_page("127.0.0.1", 0)
         self.now_s = 100.0
+        freshness = Freshness(lambda: self.now_s)
+        stop = StopElement(freshness)
+        server, self.url = open_page("127.0.0.1", 0, stop, freshness=freshness)
         self.gamepad = BrowserGamepad(lambda: self.now_s)
         self.dead_man = DeadMan(lambda: self.now_s)
-        self.page = _LivePage(server, WatcherEnd(far), self.gamepad)
+        self.page = _LivePage(server, WatcherEnd(far), self.gamepad, stop, freshness)
 
     def on_row(self, topic: str, row: bytes) -> None:
         LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
@@ -117,8 +123,8 @@ class View:
 
     is_enabled = property(lambda self: self.dead_man.is_enabled)
 
-    def pressed(self) -> list[str]:
-        return self.dead_man.sort_out(self.end.commands())
+    def pressed(self) -> list[str | Refused]:
+        return fresh_commands(self.end.commands(), self.dead_man, lambda: self.now_s)
 
     _end = property(lambda self: self.end)
 
@@ -141,7 +147,7 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
             assert view.shown("_bars").count("(ID ") == 16
             assert view.page._scene is not None
             assert np.ptp(view.page._scene._body.batched_positions, axis=0).max() > 0.5
-            view.page._stop._pressed(None)
+            view.page._stop.pressed()
 
     finished = execute(
         prepare_gait("lateral-undulation", seconds=10.0),
@@ -153,9 +159,9 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     view.page._server.stop()
     assert finished.outcome.tripped == "stop requested by E-STOP of the page"
     assert len(seen) == 41  # the cycle in which it latched
-    said = view.page._stop._text.content
+    said = view.page._stop._state
     assert "the run has ended: stop requested by E-STOP of the page" in said
-    assert view.page._stop._button.disabled
+    assert not json.loads(said)["armed"]
     assert "trip: stop requested" in view.shown("_events")
 
 
@@ -276,7 +282,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
         prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),)),
         tmp_path / "run",
         view=view,
-        waypoint_commands=view.end.commands,
+        waypoint_commands=view.pressed,
         on_progress=on_progress,
     )
     view.page._server.stop()

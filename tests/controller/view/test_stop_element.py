@@ -1,0 +1,203 @@
+"""Our own element in the page: E-STOP in sight at every width, and no late input."""
+
+import asyncio
+import json
+import shutil
+import threading
+from collections.abc import Iterator
+from concurrent.futures import Future
+from typing import Any
+
+import pytest
+
+pytest.importorskip("viser")
+
+from websockets.sync.client import connect
+
+from snakewalk.controller.view.fresh_line import Freshness
+from snakewalk.controller.view.page_server import open_page
+from snakewalk.controller.view.stop_element import StopElement
+from tests.controller.view.test_fresh_line import Proxy
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+IN_A_BROWSER = pytest.mark.skipif(
+    CHROMIUM is None, reason="there is no Chromium to open the page with"
+)
+PATIENCE_S = 60.0
+
+
+class Page:
+    """A page with a slider, without a run."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.freshness = Freshness(lambda: self.now_s)
+        self.stop = StopElement(self.freshness)
+        self.server, self.url = open_page("127.0.0.1", 0, self.stop, freshness=self.freshness)
+        self.presses: list[str] = []
+        self.is_pressed = threading.Event()
+        self.moved = threading.Event()
+        self.slider = self.server.gui.add_slider("speed", 0, 10, 1, 5)
+        self.slider.on_update(lambda event: self.moved.set())
+        self.server.gui.add_html("<div style='height:3000px'>tall</div>")
+        self.stop.press = self.press
+
+    def press(self, who: str) -> str:
+        self.presses.append(who)
+        self.is_pressed.set()
+        return "stop requested"
+
+
+@pytest.fixture
+def page() -> Iterator[Page]:
+    served = Page()
+    yield served
+    served.server.stop()
+
+
+def test_its_socket_shows_the_state_and_presses_the_button_once_for_each_message(
+    page: Page,
+) -> None:
+    port, token = page.server.get_port(), page.url.rpartition("=")[2]
+    headers = {"Cookie": f"snakewalk-{port}={token}", "Origin": f"http://127.0.0.1:{port}"}
+    with connect(f"ws://127.0.0.1:{port}/stop", additional_headers=headers) as line:
+        state = json.loads(line.recv(PATIENCE_S))
+        assert (state["armed"], state["text"]) == (False, "waiting for the run")
+        page.stop.arm()
+        assert json.loads(line.recv(PATIENCE_S))["armed"]
+        page.now_s += 50.0  # a stop is never too late
+        line.send("stop")
+        assert json.loads(line.recv(PATIENCE_S))["text"] == "stop requested"
+        assert page.presses == ["E-STOP of the page"]
+        line.send("late 2500")
+        page.stop.ended("done")
+        assert json.loads(line.recv(PATIENCE_S))["text"] == "the run has ended: done"
+        assert page.stop.late_s() == [147.5]
+        line.send("late x")  # nothing of our script: the line is closed
+        assert list(line) == []
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(
+            executable_path=CHROMIUM,
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+        )
+        yield browser
+        browser.close()
+
+
+ON_TOP = """() => {
+    const host = document.getElementById("snakewalk-stop"), box = host.getBoundingClientRect();
+    const inside = box.left >= 0 && box.top >= 0 && box.right <= innerWidth
+        && box.bottom <= innerHeight;
+    const at = document.elementFromPoint(box.left + 20, box.top + 20);
+    return inside && at === host;
+}"""
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_e_stop_is_in_sight_at_every_width_and_needs_one_tap(page: Page, chromium: Any) -> None:
+    context = chromium.new_context(has_touch=True, viewport={"width": 390, "height": 844})
+    tab = context.new_page()
+    tab.set_default_timeout(60_000.0)
+    tab.goto(page.url)
+    tab.get_by_text("speed").wait_for()
+    button = tab.get_by_role("button", name="E-STOP")
+    assert button.is_disabled()
+    page.stop.arm()
+    tab.get_by_text("torque off at once, latched").wait_for()
+    for width, height in ((390, 844), (768, 1024), (1400, 900)):
+        tab.set_viewport_size({"width": width, "height": height})
+        assert tab.evaluate(ON_TOP), width
+        page.is_pressed.clear()
+        box = button.bounding_box()
+        assert min(box["width"], box["height"]) >= 48.0  # a finger
+        tab.touchscreen.tap(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        assert page.is_pressed.wait(PATIENCE_S), width
+    page.is_pressed.clear()
+    tab.get_by_role("slider").first.focus()
+    tab.keyboard.press("Escape")
+    assert page.is_pressed.wait(PATIENCE_S)
+    tab.evaluate("document.getElementById('snakewalk-stop').remove()")  # by viser's own script
+    tab.wait_for_function("document.getElementById('snakewalk-stop') !== null")
+    context.close()
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_slider_that_was_set_while_the_connection_stalled_moves_nothing(
+    page: Page, chromium: Any
+) -> None:
+    loop = asyncio.new_event_loop()
+    proxy = Proxy(page.server.get_port())
+    thread = threading.Thread(target=loop.run_forever, daemon=True)
+    thread.start()
+    listener = run_in(loop, asyncio.start_server(proxy.pass_on, "127.0.0.1", 0)).result()
+    port = listener.sockets[0].getsockname()[1]
+    tab = chromium.new_page()
+    tab.set_default_timeout(60_000.0)
+    tab.goto(page.url.replace(str(page.server.get_port()), str(port)))
+    slider = tab.get_by_role("slider").first
+    slider.focus()
+    tab.keyboard.press("ArrowRight")
+    assert page.moved.wait(PATIENCE_S)
+    assert page.slider.value == 6
+    page.moved.clear()
+    loop.call_soon_threadsafe(proxy.flows.clear)
+    tab.keyboard.press("ArrowRight")
+    tab.wait_for_function("document.querySelector('[role=slider]').ariaValueNow === '7'")
+    run_in(loop, asyncio.wait_for(proxy.waiting.wait(), PATIENCE_S)).result()
+    page.now_s += 15.0
+    loop.call_soon_threadsafe(proxy.flows.set)
+    tab.wait_for_function("document.querySelector('[role=slider]').ariaValueNow === '6'")
+    assert page.slider.value == 6
+    assert not page.moved.is_set()
+    assert page.stop.late_s()[0] <= 100.0
+    tab.close()
+    run_in(loop, ended(asyncio.all_tasks(loop))).result()
+    loop.call_soon_threadsafe(loop.stop)
+    thread.join()
+
+
+async def ended(tasks: set[asyncio.Task[Any]]) -> None:
+    for task in tasks:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def run_in(loop: asyncio.AbstractEventLoop, work: Any) -> "Future[Any]":
+    return asyncio.run_coroutine_threadsafe(work, loop)
+
+
+LATE_INPUT = """() => {
+    const tried = [];
+    document.body.addEventListener("click", () => tried.push("click"));
+    const sent = window.performance.now;
+    window.late = (ms) => { window.performance.now = () => sent.call(performance) + ms; };
+    window.tried = tried;
+}"""
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_click_that_waited_in_the_browser_is_dropped(page: Page, chromium: Any) -> None:
+    tab = chromium.new_page()
+    tab.set_default_timeout(60_000.0)
+    tab.goto(page.url)
+    tab.get_by_text("speed").wait_for()
+    page.stop.arm()
+    tab.get_by_text("torque off at once, latched").wait_for()
+    tab.evaluate(LATE_INPUT)
+    tab.mouse.click(300, 300)
+    assert tab.evaluate("window.tried.length") == 1
+    tab.evaluate("window.late(5000)")
+    tab.mouse.click(300, 300)
+    assert tab.evaluate("window.tried.length") == 1
+    tab.get_by_role("button", name="E-STOP").click()  # which is accepted at any age
+    assert page.is_pressed.wait(PATIENCE_S)
+    assert max(page.stop.late_s()) <= 95.1
+    tab.close()
