@@ -46,7 +46,7 @@ types: setup
 # Each process takes whole files in their order, so that a file's fixtures are made once. Byte code is kept,
 # also where the environment says that it is not: forty tests start a program of their own.
 unit: loops
-	$(PYTEST) --most-expensive 30
+	$(PYTEST) --most-expensive 30 --limit-costs
 
 quick: setup
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.tiers

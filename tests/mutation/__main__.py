@@ -18,10 +18,10 @@ import numpy  # noqa: F401
 import pytest  # noqa: F401
 from rich.console import Console
 from rich.progress import track
-from tests.mutation.packages import drawn_modules, nearest_tests, sample
-from tests.mutation.trial import ROOT, path_of, try_mutants
 
 from tests.mutation.mutants import mutants
+from tests.mutation.packages import drawn_modules, nearest_tests, sample
+from tests.mutation.trial import ROOT, path_of, try_mutants
 
 DOC = ROOT / "docs" / "mutation.md"
 EVERY, PACKAGES = "mutation", "packages"

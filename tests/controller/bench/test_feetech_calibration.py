@@ -128,6 +128,7 @@ def test_servos_without_homing_offset_keep_their_zeros_in_the_file(trio: Trio) -
     assert load_robot(str(trio.out)).zeros_rad == pytest.approx(trio.robot.zeros_rad, abs=0.01)
 
 
+@pytest.mark.costs("identifies servos at all rates")
 def test_bus_identify_lists_the_servos_and_writes_a_robot_file(trio: Trio) -> None:
     words = ["bus", "inventory", "--baud", "1000000", "--json", "-o", str(trio.out)]
     result = trio(*words)

@@ -45,6 +45,7 @@ def watch(scene: SnakeScene) -> tuple[Capture, np.ndarray]:
     return seen, errors
 
 
+@pytest.mark.costs("a film of small bodies")
 @pytest.mark.parametrize(
     "change",
     slow_after(

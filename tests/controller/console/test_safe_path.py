@@ -199,6 +199,7 @@ def test_starting_a_child_leaves_the_environment_as_it_was(
     assert dict(os.environ) == before
 
 
+@pytest.mark.costs("starts a program in a folder of planted files")
 def test_numba_takes_no_cache_from_a_file_of_the_working_folder(tmp_path: Path) -> None:
     pytest.importorskip("yaml")
     (tmp_path / ".numba_config.yaml").write_text("cache_dir: /nowhere\n")

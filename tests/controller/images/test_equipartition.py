@@ -203,6 +203,7 @@ def test_a_hundred_chords_divide_a_zigzag(seed: int) -> None:
     assert on_curve(curve, found.points) < 1e-9
 
 
+@pytest.mark.costs("the hardest zigzag")
 def test_a_hundred_chords_divide_a_zigzag_with_too_many_branches_to_visit() -> None:
     """Turns of 1.5 rad: no branch was found for 13 of 60 before."""
     for seed in (3002, 3019):

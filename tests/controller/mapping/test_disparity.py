@@ -109,6 +109,7 @@ def test_filled_gaps_are_interpolated_or_belong_to_the_farther_side() -> None:
     assert np.array_equal(_filled(row, 0), row, equal_nan=True)
 
 
+@pytest.mark.costs("matches a whole pair of images")
 def test_filled_gaps_lead_a_real_pair_in_both_columns() -> None:
     left, right, truth = skimage.data.stereo_motorcycle()
     has_truth = np.isfinite(truth)

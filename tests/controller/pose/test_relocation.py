@@ -73,6 +73,7 @@ def test_a_slide_is_reported_to_the_estimate_of_friction() -> None:
     assert not scene.pose.take_measured().has_slid
 
 
+@pytest.mark.costs("a simulated run")
 def test_a_body_that_slides_on_is_not_placed() -> None:
     slide = Slide()
 
@@ -101,6 +102,7 @@ def test_markers_that_swap_after_a_slide_change_nothing() -> None:
     slide.assert_found(scene)
 
 
+@pytest.mark.costs("a simulated run")
 @pytest.mark.parametrize("gap_s", slow_after(1, [0.0, 0.3, 2.0]))
 def test_markers_that_swap_for_ever_are_never_believed(gap_s: float) -> None:
     """The run holds after a second, so the joints rest."""
@@ -120,6 +122,7 @@ def mirrored_place(time_s: float, sample: PoseSample) -> list[ArrivedPose | Pose
     return [moved(sample, MIRROR @ sample.position_m - sample.position_m)]
 
 
+@pytest.mark.costs("a simulated run")
 @pytest.mark.parametrize("rest_s", [np.inf, 4.5])
 def test_a_mirrored_feed_is_never_believed(rest_s: float) -> None:
     scene = Scene(PoseConfig(latency_s=0.06), rest_s=rest_s)

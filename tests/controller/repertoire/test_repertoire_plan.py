@@ -97,6 +97,7 @@ def test_joints_go_from_action_to_action_within_the_limits(repertoire: Repertoir
     assert not speed[-10:].any()
 
 
+@pytest.mark.slow
 def test_a_plan_reaches_its_waypoints_on_the_bus_though_each_action_misses_a_little(
     file: Path, tmp_path: Path
 ) -> None:

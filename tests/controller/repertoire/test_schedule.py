@@ -31,6 +31,7 @@ WANTED = ScheduleConfig(
 )
 
 
+@pytest.mark.costs("records and repeats actions")
 @pytest.mark.parametrize("size", [1.0, 1.4])
 def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(
     file: Path, tmp_path: Path, size: float

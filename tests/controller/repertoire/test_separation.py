@@ -26,6 +26,7 @@ def gap_m(one: Floats, other: Floats) -> float:
     return float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
 
 
+@pytest.mark.costs("a crowd wanders")
 def test_two_bodies_that_meet_head_on_stop_before_they_touch(repertoire: Repertoire) -> None:
     fast = repertoire.index("forward-fast")
     free, apart = (Crowd(repertoire, 2) for _ in range(2))
@@ -97,6 +98,7 @@ def test_an_interrupted_body_goes_on_from_its_own_shape(repertoire: Repertoire) 
     assert moved < -0.2
 
 
+@pytest.mark.costs("a crowd wanders")
 def test_a_crowd_wanders_without_intersections(repertoire: Repertoire) -> None:
     ground = HeightField(np.zeros((9, 9)), 1.0, -4.0, -4.0)
     sizes = np.full(40, 0.4)

@@ -44,6 +44,7 @@ def test_what_is_refused_before_its_first_cycle_leaves_no_log(
     assert path.exists() == bool(cycles)
 
 
+@pytest.mark.costs("cuts a log at many places")
 def test_cut_anywhere_gives_a_prefix_and_says_so(
     whole: tuple[bytes, RunRecord], tmp_path: Path
 ) -> None:
@@ -79,6 +80,7 @@ def holds_only(part: RunRecord, full: RunRecord) -> int:
     return int((~kept).sum())
 
 
+@pytest.mark.costs("cuts a log at many places")
 def test_a_flipped_bit_is_noticed_and_costs_the_rows_of_its_chunk(
     whole: tuple[bytes, RunRecord], tmp_path: Path
 ) -> None:
@@ -135,6 +137,7 @@ def test_a_complete_mcap_of_another_program_is_named(
         read_log(path)
 
 
+@pytest.mark.costs("cuts a log at many places")
 def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
     conftest = Path(__file__).with_name("conftest.py")
     path = tmp_path / "run.mcap"

@@ -48,6 +48,7 @@ def test_four_gaps_do_not_change_the_wave(gap: int, rate_hz: float, noise: float
     assert track.absent == 4 * gap
 
 
+@pytest.mark.costs("analyses a recording several times")
 def test_four_gaps_hardly_change_the_other_figures() -> None:
     gap = 50
     track = cut(four_gaps(gap), 25.0, 0.002)
@@ -117,6 +118,7 @@ def test_figures_just_below_a_limit_have_the_digits_that_show_it() -> None:
     assert "2.0 cycles" not in str(brief.unknown_reason)
 
 
+@pytest.mark.costs("analyses a recording several times")
 def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: Path) -> None:
     track = cut(four_gaps(37), 25.0)
     rows = ["t,frame,point,x_m,y_m"]

@@ -204,6 +204,7 @@ def test_who_holds_station_in_a_flow_has_no_sliding_told(travel: float) -> None:
     assert facts["wave_not_told"] is None
 
 
+@pytest.mark.slow
 def test_what_is_not_told_is_no_number_anywhere(tmp_path: Path) -> None:
     """Frames too far apart, and noise: null with the reason in JSON, words in the table."""
     coarse = wave_track(0.8, rate_hz=2.6, frames=60)

@@ -148,6 +148,7 @@ def test_what_is_stuffed_is_left_to_the_parser() -> None:
     assert seen[0] == seen[1]
 
 
+@pytest.mark.costs("hypothesis tries whole lines")
 @given(
     goals=st.lists(st.integers(-(2**31), 2**31 - 1), min_size=4, max_size=4),
     address=st.integers(0, 140),

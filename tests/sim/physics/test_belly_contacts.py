@@ -106,6 +106,7 @@ def test_a_run_by_parts_is_the_run_by_whole_steps_to_the_bit(
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.costs("builds bodies with contacts")
 def test_links_that_touch_each_other_are_found_by_mujoco() -> None:
     """A body that closes to a ring, and beyond."""
     plant, drive = MujocoPlant(ROBOT, FLAT), a_drive(ROBOT)

@@ -13,7 +13,8 @@ from tests.sim.physics.test_gear_friction import FLAT, TERMS, drive_of, robot_wi
 DEGREE = math.radians(1.0)
 
 
-@pytest.mark.parametrize("terms", [pytest.param({}, marks=pytest.mark.slow), TERMS])
+@pytest.mark.slow
+@pytest.mark.parametrize("terms", [{}, TERMS])
 def test_the_public_steps_have_the_same_bits(terms: dict[str, float]) -> None:
     robot = robot_with("yaw16", **terms, backlash_rad=DEGREE)
     bodies = [MujocoPlant(robot, FLAT) for _ in range(2)]

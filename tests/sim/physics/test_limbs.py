@@ -127,6 +127,7 @@ ROBOT_SHARES = np.array(
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 
 
+@pytest.mark.costs("the steps in plain numpy")
 @pytest.mark.parametrize("world", ["isotropic", "pool"])
 def test_compiled_and_numpy_steps_agree_with_legs(world: str) -> None:
     ends = []

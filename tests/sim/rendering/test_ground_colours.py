@@ -37,6 +37,7 @@ def test_a_colour_is_drawn_at_its_place(x_m: float, y_m: float, channel: int) ->
     assert sum(seen) - seen[channel] < 60
 
 
+@pytest.mark.costs("renders ground")
 def test_high_ground_has_the_colour_of_high_ground() -> None:
     rise = np.linspace(0.0, 0.3, 41)[:, None] * np.ones(41)
     ground = HeightField(rise, 0.1, -2.0, -2.0)

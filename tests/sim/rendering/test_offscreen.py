@@ -26,6 +26,7 @@ def shows_the_body(top: TopView) -> bool:
     return bool(cv2.absdiff(top.picture(AT_REST), top.empty_floor()).max() > 100)
 
 
+@pytest.mark.costs("opens several renderers")
 def test_a_view_still_draws_after_another_was_collected_unclosed() -> None:
     unclosed, kept = view(), view()
     assert shows_the_body(kept)
@@ -35,6 +36,7 @@ def test_a_view_still_draws_after_another_was_collected_unclosed() -> None:
     kept.close()
 
 
+@pytest.mark.costs("opens several renderers")
 @pytest.mark.parametrize("closed_first", [0, 1])
 def test_two_views_draw_by_turns_and_one_outlives_the_other(closed_first: int) -> None:
     views = [view(), view()]

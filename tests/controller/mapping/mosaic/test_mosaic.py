@@ -32,6 +32,7 @@ def seam(depth: np.ndarray, edge: np.ndarray) -> float:
     return float(np.median(np.abs(depth[rows, columns + 1] / depth[rows, columns] - 1.0)))
 
 
+@pytest.mark.costs("joins whole images")
 def test_the_views_meet_without_a_step(views: list[LocalModel]) -> None:
     plain, joined = mosaic(views, rectified=False), mosaic(views)
     for found, angle in zip(joined.rotations, ANGLES_RAD, strict=True):

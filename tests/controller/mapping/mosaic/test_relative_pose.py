@@ -57,6 +57,7 @@ def test_a_reduced_picture_has_its_pixels_where_they_belong() -> None:
         )
 
 
+@pytest.mark.costs("matches whole images")
 def test_matches_over_scale_find_what_one_scale_does_not() -> None:
     """Fig. 3: from 2.0 m to 0.9 m the wall grows by 2.2."""
     far = wall()
@@ -75,6 +76,7 @@ def test_matches_over_scale_find_what_one_scale_does_not() -> None:
     assert -pose.rotation.T @ pose.translation_m == pytest.approx([0, 0, 1.1], abs=0.02)
 
 
+@pytest.mark.costs("matches whole images")
 def test_the_pose_survives_matches_that_are_wrong() -> None:
     model = wall()
     rng = np.random.default_rng(3)

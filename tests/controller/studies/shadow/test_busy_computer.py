@@ -79,6 +79,7 @@ def alarms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Alarms:
     return run
 
 
+@pytest.mark.costs("a run with its shadow")
 @pytest.mark.parametrize("seed", slow_except([0], range(3)))
 @pytest.mark.parametrize(("host_s", "line_s"), [(5e-3, 0.0), (0.0, 2e-3), (2e-3, 4e-3)])
 def test_a_busy_computer_gives_no_alarm(
@@ -88,6 +89,7 @@ def test_a_busy_computer_gives_no_alarm(
     assert alarms(seed, host_s, line_s) == []
 
 
+@pytest.mark.costs("a run with its shadow")
 @pytest.mark.parametrize(
     ("host_s", "line_s"), slow_except([(5e-3, 0.0)], [(0.0, 0.0), (5e-3, 0.0), (3e-3, 3e-3)])
 )
@@ -99,6 +101,7 @@ def test_a_weak_servo_gives_an_alarm_on_a_busy_computer(
     assert text.startswith("joint yaw_02 (ID 2) differs from its shadow")
 
 
+@pytest.mark.costs("a run with its shadow")
 def test_a_smaller_fault_gives_an_alarm_if_only_the_host_is_late(alarms: Alarms) -> None:
     """The host measures its own delays, so they cost no sensitivity."""
     weak = Deviation(torque=np.array([1.0, 0.6, 1.0]))
