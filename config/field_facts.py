@@ -24,9 +24,9 @@ def description_of(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
         return "kind of this table; selects its other keys"
     for rule in (*field.metadata, *_rules(field.annotation)):
-        text = getattr(rule, "description", None) or getattr(rule, "help", None)
-        if text:
-            return str(text)
+        found = getattr(rule, "description", None) or getattr(rule, "help", None)
+        if found:
+            return str(found)
     return ""
 
 

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
+from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
@@ -273,8 +274,8 @@ class RunConfig(Strict):
     """One run of the main job."""
 
     name: Name
-    robot: str = Field("yaw16", description="a shipped robot's name or a TOML path")
-    world: str = Field("flat", description="a shipped world's name or a TOML path")
+    robot: str = Field(DEFAULT_ROBOT, description="a shipped robot's name or a TOML path")
+    world: str = Field(DEFAULT_WORLD, description="a shipped world's name or a TOML path")
     track: str = Field("worm-like", description="a shipped recording's name or a file")
     motion: MotionName = Field(
         "walk",

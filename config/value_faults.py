@@ -1,5 +1,6 @@
 """Faults of a value, of a file or of the command line, in words."""
 
+import math
 import re
 from typing import Any, Final
 
@@ -24,6 +25,8 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
 
     """
     context = fault.get("ctx", {})
+    if "than" in str(fault["type"]) and not _is_finite(fault.get("input")):
+        return "must be a finite number"
     bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
     tag, known = context.get("tag"), context.get("expected_tags")
     said = {
@@ -58,6 +61,14 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
         "string_pattern_mismatch": _pattern_in_words(str(context.get("pattern"))),
     }
     return said.get(str(fault["type"]), str(fault["msg"]).removeprefix("Value error, "))
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether a number, which may be text of the command line, is neither NaN nor infinite."""
+    try:
+        return math.isfinite(float(value))
+    except (TypeError, ValueError, OverflowError):
+        return True
 
 
 def given(fault: dict[str, Any]) -> str:

@@ -5,6 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.constants import DEFAULT_BAUD, DEFAULT_SERVO_MODEL
 from snakewalk.config.motor import MotorConfig
 
 Baud = Literal[9600, 57600, 115200, 1_000_000, 2_000_000, 3_000_000, 4_000_000, 4_500_000]
@@ -15,12 +16,12 @@ class ServoConfig(Strict):
     """Settings of all servos of the chain."""
 
     model: str = Field(
-        "XM430-W350",
+        DEFAULT_SERVO_MODEL,
         description="name as printed on the servo, or a file that describes the model "
         "(docs/how-to/add-a-servo-model.md)",
     )
     first_id: int = Field(1, ge=0, le=LAST_ID, description="ID of the joint next to the head")
-    baud: Baud = Field(1_000_000, description="baud rate of the bus")
+    baud: Baud = Field(DEFAULT_BAUD, description="baud rate of the bus")
     supply_v: float = Field(12.0, ge=3.0, le=26.0, description="voltage of the servos' supply")
     supply_min_v: float | None = Field(
         None, gt=0.0, description="a run stops below this; default: 10/12 of supply_v"

@@ -1,6 +1,7 @@
 """Shared parts of the commands: options, and the display of a result."""
 
 import json
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -245,6 +246,8 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
             values[key] = parse_json(value)
         except ValueError:  # not JSON, too long a number, or too deep a list
             values[key] = value
+        if re.search(r"\b(NaN|Infinity)\b", value) and values[key] is not value:
+            raise InputError(f"{option} {text}: must be a finite number")
     return values
 
 

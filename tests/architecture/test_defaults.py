@@ -4,7 +4,7 @@ from typing import Final
 
 from tests.architecture.defaults import repeated
 
-_LEFT: Final = 45
+_LEFT: Final = 28
 """Commands with plain signatures whose defaults are declared twice; lower it with each one."""
 
 

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.animals.fish.film_options import FishFilmOptions
 from snakewalk.controller.animals.fish.model import FishModel, fish_model
 from snakewalk.controller.animals.fish.postures import Postures, postures_of_track, save_postures
 from snakewalk.controller.animals.fish.rendered_fish import FishScene
@@ -18,51 +19,41 @@ from snakewalk.controller.track.readers.load import load_track
 
 def render(
     folder: Path,
+    options: FishFilmOptions,
     *,
-    motion: str | None = None,
-    build: str = "carp",
-    length_px: float = 120.0,
-    frames: int | None = None,
-    side: bool = False,
-    fins: float = 0.0,
-    seed: int = 0,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Postures:
     """Write ``top/``, ``top-background.png``, with ``side`` the same from the side, ``truth.npz``.
 
     Args:
         folder: made if it is not there.
-        motion: a recording to render; a scripted fish without one.
-        build: carp or eel.
-        length_px: body length.
-        frames: the largest number of frames.
-        side: also film from the side; a recording of midlines has no height and swims level.
-        fins: length of the pectoral fins, body lengths; 0: folded away.
-        seed: of patterns and noise.
+        options: motion, body and views; a recording of midlines has no height and swims level.
         on_progress: called with the frames done, and in all.
 
     Returns:
         The truth, body lengths as unit; (0, 0) is the middle of the frame.
 
     """
-    truth, spine, height = _truth(motion, build, frames)
+    length_px = options.length_px
+    truth, spine, height = _truth(options.motion, options.build, options.frames)
     low, high = np.nanmin(spine, axis=(0, 1)), np.nanmax(spine, axis=(0, 1))
     columns, rows = (int(np.ceil((high - low)[k] * length_px + 0.6 * length_px)) for k in (0, 1))
     shift = np.array([columns, -rows]) / 2.0 - 0.5 * (low + high) * length_px
-    model = fish_model(build, length_px)
+    model = fish_model(options.build, length_px)
     half_width = model.half_width * length_px
-    top = FishScene(rows, columns, seed)
+    top = FishScene(rows, columns, options.seed)
     (folder / "top").mkdir(parents=True, exist_ok=True)
     _write(folder / "top-background.png", top.background())
     side_rows = round(2.2 * length_px)
-    beside = FishScene(side_rows, columns, seed + 1)
-    if side:
+    beside = FishScene(side_rows, columns, options.seed + 1)
+    if options.side:
         (folder / "side").mkdir(exist_ok=True)
         _write(folder / "side-background.png", beside.background())
     for k, body in enumerate(spine):
         body_px = body * length_px + shift
-        _write(folder / "top" / f"{k:05d}.png", top.top(body_px, half_width, fins * length_px))
-        if side:
+        picture = top.top(body_px, half_width, options.fins * length_px)
+        _write(folder / "top" / f"{k:05d}.png", picture)
+        if options.side:
             height_px = height[k] * length_px - 0.5 * side_rows
             _write(
                 folder / "side" / f"{k:05d}.png",

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from snakewalk.config.base import Strict
+from snakewalk.config.constants import DEFAULT_ROBOT
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.option import Flag, numbers
 
@@ -86,5 +87,5 @@ class SynthesisOptions(Strict):
         0.25, ge=0.02, description="duration of the blend at a join in seconds"
     )
     robot: Annotated[str, Flag(complete=completion.ROBOTS)] = Field(
-        "yaw16", description="add the joint angles of this robot to the track"
+        DEFAULT_ROBOT, description="add the joint angles of this robot to the track"
     )

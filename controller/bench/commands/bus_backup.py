@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench.commands.bus_options import Baud
 from snakewalk.controller.bench.eeprom_backup import back_up_all, backup_text
 from snakewalk.controller.bench.port_lines import open_lines
@@ -21,7 +22,7 @@ from snakewalk.controller.console.result_files import atomic_write
 def backup(
     out: Annotated[Path, typer.Option("--out", "-o", help="write the backup to this file (.json)")],
     port: ChainPort = None,
-    baud: Baud = 1_000_000,
+    baud: Baud = DEFAULT_BAUD,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench.commands.bus_options import Baud, Ids
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
@@ -17,7 +18,7 @@ _BLINK_S = 0.3
 def blink(
     servo_id: Ids,
     port: ChainPort = None,
-    baud: Baud = 1_000_000,
+    baud: Baud = DEFAULT_BAUD,
     times: Annotated[
         int, typer.Option(min=1, max=1000, help="number of times that the LED blinks")
     ] = 5,

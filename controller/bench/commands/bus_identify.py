@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.bench import inventory, scan
 from snakewalk.controller.bench.port_lines import open_lines
@@ -37,7 +38,7 @@ def bus_identify(
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     scan.check_bauds(baud or ())
-    with open_lines(port, baud[0] if baud else 1_000_000) as lines:
+    with open_lines(port, baud[0] if baud else DEFAULT_BAUD) as lines:
         entries = [
             (line.name, entry)
             for line, _ in lines.lines

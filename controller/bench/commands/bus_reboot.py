@@ -4,6 +4,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench.commands.bus_options import Baud, Ids, confirmed
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import restart
@@ -15,7 +16,7 @@ from snakewalk.controller.console.options import ChainPort, Json, show
 def reboot(
     servo_id: Ids,
     port: ChainPort = None,
-    baud: Baud = 1_000_000,
+    baud: Baud = DEFAULT_BAUD,
     yes: Annotated[bool, typer.Option("--yes", "-y", help="reboot without asking")] = False,
     as_json: Json = False,
 ) -> None:

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.bench.commands.bus_options import Baud, confirmed
 from snakewalk.controller.bench.eeprom_backup import load_backup, plan_restore
@@ -26,7 +27,7 @@ def restore(
         list[int] | None, typer.Option("--id", help="restore only this servo; may be repeated")
     ] = None,
     port: ChainPort = None,
-    baud: Baud = 1_000_000,
+    baud: Baud = DEFAULT_BAUD,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="show the changes and write nothing")
     ] = False,

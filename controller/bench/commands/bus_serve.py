@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import load
@@ -232,7 +233,7 @@ def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served
     """Name of the line, the line, its taps, the decoder of its packets, and its faults."""
     if play is None:
         return simulated()
-    line = RecordedLine.of(play, baud or 1_000_000)
+    line = RecordedLine.of(play, baud or DEFAULT_BAUD)
     spec = ChainSpec(tuple(line.ids), (f"recording {play}",) * len(line.ids))
     return spec, line, LiveTable(list), Decoder, None
 
@@ -247,7 +248,7 @@ def _simulated(
     """Simulated servos, as ``_served`` has them."""
     spec = parse_chain(servos or "1-4")
     if served is None:
-        line = bench_line(spec, baud or 1_000_000, imu=None if imu is None else parse_imu(imu))
+        line = bench_line(spec, baud or DEFAULT_BAUD, imu=None if imu is None else parse_imu(imu))
     else:
         line = served.line
     player = None

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench.commands.bus_options import confirmed
 from snakewalk.controller.bench.fingerprints import fingerprint_file, note_changes
 from snakewalk.controller.bench.port_lines import open_lines
@@ -32,7 +33,7 @@ from snakewalk.drivers.protocol.registers import BAUDS
 def bus_set(
     servo_id: Annotated[int, typer.Option("--id", help="ID of the servo, 0 to 252")],
     port: ChainPort = None,
-    baud: Annotated[int, typer.Option(help="current baud rate of the servo")] = 1_000_000,
+    baud: Annotated[int, typer.Option(help="current baud rate of the servo")] = DEFAULT_BAUD,
     new_id: Annotated[int | None, typer.Option(help="new ID, 0 to 252")] = None,
     new_baud: Annotated[int | None, typer.Option(help="new baud rate in bit/s")] = None,
     min_position: Annotated[

@@ -12,6 +12,7 @@ from typing import Annotated
 import serial
 import typer
 
+from snakewalk.config.constants import DEFAULT_BAUD, DEFAULT_SERVO_MODEL
 from snakewalk.config.errors import InputError
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.controller.console.command import command
@@ -80,11 +81,11 @@ def sniff(
     source: Annotated[
         Path, typer.Argument(help="recording (JSON lines, hex text, raw bytes), or serial device")
     ],
-    baud: Annotated[int, typer.Option(help="baud rate of the device in bit/s")] = 1_000_000,
+    baud: Annotated[int, typer.Option(help="baud rate of the device in bit/s")] = DEFAULT_BAUD,
     model: Annotated[
         str,
         typer.Option(help="model, or file of a model, of servos that the exchange does not ping"),
-    ] = "XM430-W350",
+    ] = DEFAULT_SERVO_MODEL,
     through: Annotated[
         bool, typer.Option("--through", help="forward the bytes between a client and the device")
     ] = False,

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench import scan as scanning
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
@@ -27,7 +28,7 @@ def scan(
     found = []
     noise: dict[str, dict[int, int]] = {}
     with (
-        open_lines(port, baud[0] if baud else 1_000_000) as lines,
+        open_lines(port, baud[0] if baud else DEFAULT_BAUD) as lines,
         stderr_console().status("") as status,
     ):
         for line, _ in lines.lines:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
@@ -52,8 +53,8 @@ def track(
             autocompletion=completion.RECORDINGS,
         ),
     ] = None,
-    robot: GivenRobot = "yaw16",
-    world: GivenWorld = "flat",
+    robot: GivenRobot = DEFAULT_ROBOT,
+    world: GivenWorld = DEFAULT_WORLD,
     rate: Rate = None,
     min_score: MinScore = None,
     individual: Individual = None,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
+from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, console
@@ -29,8 +30,8 @@ from snakewalk.controller.learning.wave_search import (
 )
 def learn_policy(
     out: Annotated[Path, typer.Option("--out", "-o", help="write the policy here (.toml)")],
-    robot: GivenRobot = "yaw16",
-    world: GivenWorld = "flat",
+    robot: GivenRobot = DEFAULT_ROBOT,
+    world: GivenWorld = DEFAULT_WORLD,
     generations: Annotated[
         int, typer.Option(min=1, max=100_000, help="number of generations")
     ] = 24,

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console import completion
@@ -32,11 +33,11 @@ from snakewalk.controller.repertoire.repertoire_planning import default_file, fl
     results=("out", "picture"),
 )
 def record(
-    robot: GivenRobot = "yaw16",
+    robot: GivenRobot = DEFAULT_ROBOT,
     world: Annotated[
         str,
         typer.Option(help="shipped flat world, or a TOML file", autocompletion=completion.WORLDS),
-    ] = "flat",
+    ] = DEFAULT_WORLD,
     out: Annotated[
         Path | None,
         typer.Option(
