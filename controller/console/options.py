@@ -152,8 +152,8 @@ Set = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
-        help="replace a value of the run's, robot's or world's file, e.g. "
-        "run.behaviour.pulse_body_lengths_s=0.3, the speed of the walk; may be repeated",
+        help="replace a value of the run's, robot's or world's file, e.g. run.cycle_hz=25; "
+        "may be repeated",
         metavar="KEY=VALUE",
         autocompletion=completion.keys,
     ),

@@ -77,7 +77,10 @@ def run(
     *,
     options: RunOptions,
 ) -> None:
-    """Run a job on servos or in the simulator; leaves log, report, film."""
+    """Run a job on servos or in the simulator; leaves log, report, film.
+
+    `--set run.behaviour.pulse_body_lengths_s=0.3` sets the speed of the walk.
+    """
     job = Job(
         run=run, robot=robot, world=world, track=track, seed=seed, motion=motion, pose=pose,
         map_source=map_, keys=set_, compliance=compliance, live=live, observe=observe,
