@@ -54,7 +54,9 @@ def own_stop_buttons(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
     The programs that a test starts inherit it.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_RUNTIME_DIR", str(tmp_path_factory.mktemp("runtime")))
+        folder = str(tmp_path_factory.mktemp("runtime"))
+        patch.setenv("XDG_RUNTIME_DIR", folder)
+        patch.setenv("TMPDIR", folder)
         yield
 
 

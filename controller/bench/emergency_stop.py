@@ -1,25 +1,40 @@
-"""Emergency stop: latches the runs of other programs; imports little, to be quick.
+"""Emergency stop: ``snakewalk stop`` without the command line; imports little, to be quick.
 
 The stop button of a run latches it within a cycle. A run that does not reply is terminated, so that
-its safe link switches torque off; then it is killed, and the bus watchdogs stop the servos.
+its safe link switches torque off; then it is killed, and the bus watchdogs stop the servos. A run
+is stopped before anything slow is imported, and torque off is on the wire before the servos are
+asked for a confirmation.
 """
 
+import json
 import os
+import select
 import signal
-from collections.abc import Iterable
-from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from pathlib import Path
 from typing import Final, Literal
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.plain_text import plain
 from snakewalk.drivers.clock import WallClock
-from snakewalk.drivers.port.port_map import ports_in
-from snakewalk.drivers.safety.stop_button import PressedButton, resolved, stoppable_runs
+from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.port.port_holders import PortHolder, holders_of
+from snakewalk.drivers.safety.stop_button import (
+    BUTTON_SUFFIX,
+    PressedButton,
+    resolved,
+    stoppable_runs,
+)
 
 How = Literal["latched", "terminated", "killed", "torque off"]
 LATCH_S: Final = 1.0
 """Longest time of a run until it latches (ours): a cycle lasts some 10 ms, the set-up longer."""
 END_S: Final = 3.0
 """Longest time of a terminated run until torque is off: it asks for 2 s (ours)."""
+_TORQUE_OFF: Final = "snakewalk.controller.bench.torque_off"
 _LOOK_S: Final = 1e-3
 
 
@@ -62,7 +77,7 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
     """
     every = list(stoppable_runs())
     if port is not None:
-        asked = set(map(resolved, ports_in(port)))
+        asked = set(map(resolved, named_ports(port)))
         meant = [button for button in every if asked & set(button.run.ports)]
     elif run is not None:
         meant = [button for button in every if _is_meant(button, run)]
@@ -72,6 +87,20 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
         if button not in meant:
             button.close()
     return meant
+
+
+def named_ports(port: str) -> list[str]:
+    """Return the ports that ``--port`` names.
+
+    Raises:
+        InputError: unreadable text.
+
+    """
+    if "=" not in port:
+        return [port]
+    from snakewalk.drivers.port.port_map import ports_in  # noqa: PLC0415  slow to import
+
+    return ports_in(port)
 
 
 def _is_meant(button: PressedButton, run: str) -> bool:
@@ -88,6 +117,62 @@ def stop_runs(buttons: Iterable[PressedButton], who: str) -> list[StopOutcome]:
         for button in opened:
             button.press(who)
         return [_ended(button, clock) for button in opened]
+
+
+def stop_holders(ports: Iterable[str], who: str) -> list[StopOutcome]:
+    """Stop programs of ours that have a port open, for which no folder of this login has a button.
+
+    A run of another login is found by the device. A program without a button is terminated.
+    """
+    outcomes = []
+    for port in ports:
+        for holder in holders_of(port):
+            if holder.has_other_end:
+                continue
+            button = _button_of(holder)
+            if button is not None:
+                outcomes += stop_runs([button], who)
+            elif holder.is_ours:
+                outcomes.append(_terminated(holder, port))
+    return outcomes
+
+
+def _button_of(holder: PortHolder) -> PressedButton | None:
+    for file in holder.files:
+        if file.endswith(BUTTON_SUFFIX):
+            with suppress(OSError, ValueError, TypeError, KeyError):  # not a button, or unreachable
+                button = PressedButton(Path(file))
+                if button.run.process == holder.process:
+                    return button
+                button.close()
+    return None
+
+
+def _terminated(holder: PortHolder, port: str) -> StopOutcome:
+    """End a program without a button; nothing is known of the torque after that."""
+    clock = WallClock()
+    how: How = "terminated"
+    try:
+        ended = os.pidfd_open(holder.process)
+        try:
+            waiting = select.poll()
+            waiting.register(ended, select.POLLIN)
+            os.kill(holder.process, signal.SIGTERM)
+            if not waiting.poll(END_S * 1e3):
+                how = "killed"
+                os.kill(holder.process, signal.SIGKILL)
+                waiting.poll(END_S * 1e3)
+        finally:
+            os.close(ended)
+    except ProcessLookupError:  # it has ended meanwhile
+        pass
+    except PermissionError:
+        text = f"is another user's; end it by: sudo kill {holder.process}"
+        return StopOutcome(holder.program, how, text, safe=False, process=holder.process)
+    text = f"process {holder.process} had {port} open"
+    return StopOutcome(
+        holder.program, how, text, False, round(clock.now_s(), 4), holder.process, (resolved(port),)
+    )
 
 
 def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
@@ -114,3 +199,94 @@ def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
     return StopOutcome(
         run.name, how, said, safe, round(after_s, 4), run.process, run.ports, run.folder
     )
+
+
+@dataclass(slots=True)
+class Stop:
+    """Values of the options of ``snakewalk stop``."""
+
+    run: str | None = None
+    port: str | None = None
+    bauds: list[int] = field(default_factory=list)
+    as_json: bool = False
+
+    def carry_out(self) -> int:
+        """Stop the runs meant, or the servos of a port; return the exit code.
+
+        Raises:
+            InputError: the run is unknown, or no port can be chosen.
+
+        """
+        run, port = self.run, self.port
+        if run is not None and port is not None:
+            raise InputError("stop: a run and --port exclude each other; leave one out")
+        who = f"snakewalk stop (process {os.getpid()})"
+        outcomes = stop_runs(runs_of(port, run), who)
+        if run is not None and not outcomes:
+            raise InputError(f"{run}: no such run is under way")
+        devices = [] if outcomes else _free_ports(port)
+        held = stop_holders(devices, who)
+        if held:
+            outcomes, devices = held, []
+        # a run that was killed leaves its servos with torque on
+        devices += [port for each in outcomes if not each.safe for port in each.ports]
+        outcomes += _torque_off(devices, self.bauds)
+        return self._report(outcomes)
+
+    def _report(self, outcomes: Sequence[StopOutcome]) -> int:
+        stopped = {name for each in outcomes if each.safe for name in each.names}
+        safe = all(name in stopped for each in outcomes for name in each.names)
+        if self.as_json:
+            print(json.dumps({"safe": safe, "stopped": [each.to_dict() for each in outcomes]}))
+        else:
+            for each in outcomes:
+                after = "" if each.after_s is None else f" after {each.after_s * 1e3:.0f} ms"
+                print(plain(f"{each.what}: {each.how}{after}: {each.text}"))
+        return 0 if safe else 1
+
+
+def stop_now(words: Sequence[str]) -> int | None:
+    """Carry out ``snakewalk stop WORDS``; return the exit code, or None for other words.
+
+    Raises:
+        InputError: as ``Stop.carry_out``.
+
+    """
+    stop = _read(iter(words))
+    return None if stop is None else stop.carry_out()
+
+
+def _read(words: Iterator[str]) -> Stop | None:
+    """Return the options; None for words that only the complete command line understands."""
+    stop = Stop()
+    for word in words:
+        name, is_joined, value = word.partition("=")
+        if word == "--json":
+            stop.as_json = True
+        elif name in {"--port", "--baud"}:
+            value = value if is_joined else next(words, "")
+            if name == "--port" and value and stop.port is None:
+                stop.port = value
+            elif name == "--baud" and value.isascii() and value.isdecimal():
+                stop.bauds.append(int(value))
+            else:
+                return None
+        elif word and not word.startswith("-") and stop.run is None:
+            stop.run = word
+        else:
+            return None
+    return stop
+
+
+def _free_ports(port: str | None) -> list[str]:
+    if port is not None:
+        return named_ports(port)
+    try:
+        return [import_module(_TORQUE_OFF).only_port()]
+    except PortError as fault:
+        raise PortError(f"nothing to stop: no run is under way; {fault}") from None
+
+
+def _torque_off(devices: Sequence[str], bauds: Sequence[int]) -> list[StopOutcome]:
+    """Switch torque off on ports; the module is imported only if there are any."""
+    return [import_module(_TORQUE_OFF).torque_off(device, bauds) for device in devices]

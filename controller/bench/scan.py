@@ -67,6 +67,11 @@ def pick_port(port: str | None) -> str:
     raise PortError(f"--port: {shown}")
 
 
+def known_bauds() -> set[int]:
+    """Return the baud rates of all servo models."""
+    return {*BAUDS, *feetech_bauds()}
+
+
 def check_bauds(bauds: Sequence[int]) -> None:
     """Refuse baud rates that servos do not have.
 
@@ -74,7 +79,7 @@ def check_bauds(bauds: Sequence[int]) -> None:
         ControlTableError: a line for each.
 
     """
-    known = sorted({*BAUDS, *feetech_bauds()})
+    known = sorted(known_bauds())
     shown = ", ".join(map(str, known))
     unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in known]
     if unknown:

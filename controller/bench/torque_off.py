@@ -1,47 +1,33 @@
 """Torque off on a port that no program holds: to all servos, at every baud rate."""
 
-from collections.abc import Callable, Iterable
-from typing import Final
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
-from snakewalk.controller.bench.scan import scan
-from snakewalk.drivers.bus.feetech_bus import servo_bus
-from snakewalk.drivers.bus.feetech_scan import feetech_bauds
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.network_port import NetworkPort, open_port
 from snakewalk.drivers.port.serial_port import SerialPort
-from snakewalk.drivers.protocol.feetech import FeetechInstruction
-from snakewalk.drivers.protocol.packet import (
-    BITS_PER_BYTE,
-    BROADCAST_ID,
-    Instruction,
-    InstructionPacket,
-    encode_instruction,
-)
-from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID as FEETECH_BROADCAST
-from snakewalk.drivers.protocol.protocol1 import frame
-from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD
 
-_LIKELY: Final = (1_000_000, FACTORY_BAUD)
+_LIKELY: Final = (1_000_000, 57_600)
+"""Sent before anything slow is imported: the usual rate, and that of new servos."""
 _USB_S: Final = 5e-3
 """How long an adapter may keep bytes before it sends them (ours)."""
 _COPIES: Final = 3
 """So often torque off is sent: noise may hit one (ours)."""
 _TRIES: Final = 8
 """How often a servo is asked whether its torque is off (ours)."""
-_FEETECH_TORQUE_ENABLE: Final = 40
-_TORQUE_OFF = encode_instruction(
-    # Torque Enable(64) of the X and MX(2.0) series
-    InstructionPacket(BROADCAST_ID, Instruction.WRITE, bytes([64, 0, 0]))
-)
-_FEETECH_OFF = frame(
-    FEETECH_BROADCAST, FeetechInstruction.WRITE, bytes((_FEETECH_TORQUE_ENABLE, 0))
-)
+_BITS_PER_BYTE: Final = 10
+DYNAMIXEL_OFF: Final = bytes.fromhex("fffffd00fe0600034000002e16")
+"""Write 0 to Torque Enable(64) of all X and MX(2.0) servos; ``encode_instruction`` is slow to
+import."""
+FEETECH_OFF: Final = bytes.fromhex("fffffe04032800d2")
+"""Write 0 to Torque Enable(40) of all Feetech servos."""
+_PACKETS: Final = (DYNAMIXEL_OFF + FEETECH_OFF) * _COPIES
 
 
 def torque_off(
     device: str,
-    bauds: Iterable[int] = (),
+    bauds: Sequence[int] = (),
     on_progress: Callable[[str], None] = lambda step: None,
 ) -> StopOutcome:
     """Switch torque off on every servo of a port.
@@ -51,24 +37,23 @@ def torque_off(
 
     Raises:
         PortError: it is not there, or a program that has no stop button holds it.
+        ControlTableError: servos do not have a baud rate.
 
     """
-    known = {*BAUDS, *feetech_bauds()}
-    rates = tuple(bauds) or sorted(known, key=lambda rate: (rate not in _LIKELY, -rate))
-    sent = 0
-    with open_port(device, rates[0]) as port:
-        held_s = max(_USB_S, port.latency_s)
-        for rate in rates:
-            if port.setBaudRate(rate):
-                packets = (_TORQUE_OFF + _FEETECH_OFF) * _COPIES
-                port.write(packets)
-                sent += 1
-                wire_s = len(packets) * BITS_PER_BYTE / rate
-                port.clock.sleep_until_s(port.clock.now_s() + wire_s + held_s)
+    if bauds:
+        _scan_module().check_bauds(bauds)
+    first = tuple(bauds) or _LIKELY
+    with open_port(device, first[0]) as port:
+        sent = _send(port, first)
+        scan = _scan_module()
+        known = sorted(scan.known_bauds(), reverse=True)
+        others = () if bauds else tuple(rate for rate in known if rate not in _LIKELY)
+        sent += _send(port, others)
+        rates = first + others
         # on a bad line a request gets lost: the likely rates are asked twice
         for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
             on_progress(f"torque off is sent; waiting for replies at {rate} baud")
-            found = scan(port, [rate], patient=False).servos
+            found = scan.scan(port, [rate], patient=False).servos
             if found:
                 port.setBaudRate(rate)
                 failed = [
@@ -89,8 +74,40 @@ def torque_off(
     )
 
 
+def only_port() -> str:
+    """Return the only serial adapter there is.
+
+    Raises:
+        PortError: there are none or several.
+
+    """
+    port: str = _scan_module().pick_port(None)
+    return port
+
+
+def _scan_module() -> Any:
+    """Import it when it is needed: it is slow to import."""
+    from snakewalk.controller.bench import scan  # noqa: PLC0415  slow to import
+
+    return scan
+
+
+def _send(port: SerialPort | NetworkPort, rates: Iterable[int]) -> int:
+    """Send torque off at baud rates; return the number of rates that the port accepts."""
+    sent = 0
+    for rate in rates:
+        if port.setBaudRate(rate):
+            port.write(_PACKETS)
+            sent += 1
+            wire_s = len(_PACKETS) * _BITS_PER_BYTE / rate
+            port.clock.sleep_until_s(port.clock.now_s() + wire_s + max(_USB_S, port.latency_s))
+    return sent
+
+
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
+    from snakewalk.drivers.bus.feetech_bus import servo_bus  # noqa: PLC0415  slow to import
+
     try:
         bus = servo_bus(port, model, latency_s=port.latency_s, tries=_TRIES)
         bus.write_verified(servo_id, "Torque Enable", 0)

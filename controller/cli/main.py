@@ -4,6 +4,8 @@ import os
 import signal
 import sys
 from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
 
@@ -28,6 +30,8 @@ _LEFT_OUT = (
 last bit, and so would runs. numpy ignores unknown names."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
+_STOP = "snakewalk.controller.bench.emergency_stop"
+"""The only command that must not wait for imports."""
 _INTERRUPTED = 130
 """Exit code after Ctrl-C, which has been reported."""
 
@@ -56,6 +60,7 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         _check_words(sys.argv[1:])
+        _stop_at_once(sys.argv[1:])
         with without_collections():
             from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
@@ -85,6 +90,14 @@ def main() -> None:
             name = signal.Signals(stop.code - _BY_SIGNAL).name
             _print_line(_with_notes(f"ended by {name}", stop))
         raise
+
+
+def _stop_at_once(words: list[str]) -> None:
+    """End after ``snakewalk stop`` without importing the command line; return for other words."""
+    if words[:1] == ["stop"] and find_spec(_STOP) is not None:
+        code = import_module(_STOP).stop_now(words[1:])
+        if code is not None:
+            raise SystemExit(code)
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:

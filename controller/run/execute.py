@@ -1,6 +1,7 @@
 """Execution of a prepared run: folder, log, link, loop, summary."""
 
 import json
+import shlex
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -196,6 +197,10 @@ class _Execution:
         with made as button, cleared_folder(self.folder, self.force):
             self.ending.log = log_path
             with RunLog(log_path, None if view is None else view.on_row) as log:
+                if button is not None and ports and self.rehearsed is None:
+                    LOGGER.info(
+                        "to stop it: snakewalk stop --port %s", shlex.quote(",".join(ports[:1]))
+                    )
                 if view is not None and button is not None:
                     view.on_button(button.path)
                 log.config(

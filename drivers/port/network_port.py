@@ -12,7 +12,6 @@ from urllib.parse import urlsplit
 
 import serial
 
-from snakewalk.config.robot.ports import port_fault
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import is_url
@@ -94,6 +93,8 @@ class NetworkPort(LinePort):
         return super().setBaudRate(baudrate)
 
     def _open(self) -> None:
+        from snakewalk.config.robot.ports import port_fault  # noqa: PLC0415  slow to import
+
         fault = port_fault(self._name)
         if fault is not None:
             raise PortError(f"{self._name}: {fault}")

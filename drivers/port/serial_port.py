@@ -15,6 +15,7 @@ from serial.tools import list_ports
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.line_port import LinePort
+from snakewalk.drivers.port.port_holders import holders_of
 
 try:
     import fcntl
@@ -28,8 +29,6 @@ _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _STUCK_S = 1.0
 """A device that accepts no bytes for this time is gone."""
-_OWN = "snakewalk"
-"""Name of the program."""
 
 
 class SerialPort(LinePort):
@@ -170,10 +169,10 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
     if number in (errno.EACCES, errno.EPERM):
         return f"{name}: no permission; join the group that owns it (often 'dialout')"
     if number in (errno.EBUSY, errno.EAGAIN):
-        holders = _holders(name)
-        is_own = any(each.startswith(f"{_OWN} ") for each in holders)
+        holders = holders_of(name)
+        is_own = any(each.is_ours for each in holders)
         remedy = f"end it, a run by: snakewalk stop --port {name}" if is_own else "close it"
-        text = ", ".join(holders)
+        text = ", ".join(f"{each.program} (process {each.process})" for each in holders)
         return f"{name}: another program has it open{text and ': '}{text}; {remedy}"
     if isinstance(error, ValueError):
         return f"{name}: {baud} bit/s is not possible here: {error}"
@@ -190,48 +189,4 @@ def _is_no_terminal(device: str) -> bool:
             return not os.isatty(descriptor)
         finally:
             os.close(descriptor)
-    return False
-
-
-def _holders(device: str) -> list[str]:
-    """Programs that have a device open, ``name (process 123)``; those of other users are hidden."""
-    path = os.path.realpath(device)
-    found = []
-    for process in sorted(filter(str.isdigit, os.listdir("/proc")), key=int):
-        with suppress(OSError):  # another user's, or just ended
-            descriptors = os.listdir(f"/proc/{process}/fd")
-            if any(_leads_to(f"/proc/{process}/fd/{each}", path) for each in descriptors):
-                found.append(f"{_program(process)} (process {process})")
-    return found
-
-
-def _program(process: str) -> str:
-    """Name of a process: snakewalk with its command line, Python with its script or module."""
-    with open(f"/proc/{process}/cmdline", encoding="utf-8", errors="replace") as file:
-        words = file.read().rstrip("\0").split("\0")
-    names = [os.path.basename(word) for word in words[:2]]
-    if _OWN in names:
-        return " ".join([_OWN, *words[names.index(_OWN) + 1 :]])
-    with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
-        name = file.read().strip()
-    return " ".join([name, *_script(words[1:])]) if name.startswith("python") else name
-
-
-def _script(words: list[str]) -> list[str]:
-    rest = iter(words)
-    for word in rest:
-        if word == "-m":
-            return [word, *list(rest)[:1]]
-        if not word.startswith("-"):
-            return [os.path.basename(word)]
-        if word == "-c":
-            break
-        if word in ("-W", "-X"):  # the next word is its value
-            next(rest, None)
-    return []
-
-
-def _leads_to(link: str, path: str) -> bool:
-    with suppress(OSError):  # closed just now, like the listing's own
-        return os.readlink(link) == path
     return False

@@ -9,20 +9,17 @@ name of the operator and the end of the run (length and text each), and a descri
 JSON. A text is written before its byte.
 """
 
-import getpass
 import json
 import mmap
 import os
 import stat
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Final, Self
+from typing import Any, Final, Self
 
-from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.errors import notes_of
 from snakewalk.drivers.port.byte_port import is_url
@@ -38,9 +35,10 @@ _PRESSED, _ENDED = 0, 1
 _WHO: Final = slice(16, 528)
 _END: Final = slice(528, 1552)
 _RUN: Final = slice(1552, _BYTES)
-_SUFFIX: Final = ".stop"
+BUTTON_SUFFIX: Final = ".stop"
 _LOOK_EVERY: Final = 16
 """Calls of ``pressed`` until it looks at the file again (ours)."""
+_TEMPORARY: Final = "/tmp" if _HAS_LOCKS else os.path.expanduser("~")
 _OPEN_FLAGS: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
@@ -79,9 +77,9 @@ class StopButton:
         place = button_folder()
         _refuse_used_urls(devices)
         # locked and filled before it gets its final name; Windows cannot rename an open file
-        kind = "" if _HAS_LOCKS else _SUFFIX
+        kind = "" if _HAS_LOCKS else BUTTON_SUFFIX
         try:
-            self._file, made = tempfile.mkstemp(kind, f"{os.getpid()}-", place)  # mode 0600
+            self._file, made = _new_file(place, kind)
             # written, not truncated to its size: on a full disk a sparse map kills the program
             os.write(self._file, bytes(_BYTES))
         except OSError as error:
@@ -91,7 +89,7 @@ class StopButton:
         self._calls = 0
         self._map = mmap.mmap(self._file, _BYTES)
         _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
-        self.path = Path(made).with_suffix(_SUFFIX)
+        self.path = made.with_suffix(BUTTON_SUFFIX)
         """Path of the file, for programs that may press it."""
         if not kind:
             os.replace(made, self.path)
@@ -170,12 +168,12 @@ class PressedButton:
         self._file = os.open(path, os.O_RDWR | _OPEN_FLAGS)
         try:
             info = os.fstat(self._file)
-            if not _is_mine(info) or info.st_size != _BYTES:
+            if not (_is_mine(info) or os.getuid() == 0) or info.st_size != _BYTES:
                 raise PermissionError(
                     f"{path}: is not a stop button of this user; name a run of this user"
                 )
             self._map = mmap.mmap(self._file, _BYTES)
-            known = parse_json(_read_text(self._map, _RUN))
+            known = _parsed(_read_text(self._map, _RUN))
             self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})
             self.since_s = info.st_mtime
             """Time of day at which it was made, s."""
@@ -229,29 +227,40 @@ def resolved(port: str) -> str:
 
 
 def button_folder() -> Path:
-    """Return the folder of this user's buttons; create it if necessary.
+    """Return the folder for a new button; create it if necessary.
 
     Raises:
-        InputError: it is another user's, others may write to it, or it cannot be made.
+        InputError: no folder of ``button_folders`` is private, or can be made.
 
     """
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    own = Path(runtime) / "snakewalk" if runtime else None
-    if own is None or not own.parent.is_dir():
-        own = Path(tempfile.gettempdir()) / f"snakewalk-{_user()}"
-    try:
-        with suppress(FileExistsError):
-            own.mkdir(mode=0o700)
-        info = own.lstat()
-    except OSError as error:
-        raise InputError(_cannot_be_made(own, error)) from None
-    others_write = _HAS_LOCKS and info.st_mode & 0o022
-    if not stat.S_ISDIR(info.st_mode) or not _is_mine(info) or others_write:
-        raise InputError(
-            f"{own}: must be a folder of this user, which nobody else may write to; stop buttons "
-            "are in it (XDG_RUNTIME_DIR says where)"
-        )
-    return own
+    faults = []
+    for folder in button_folders():
+        try:
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if _is_private(folder):
+                return folder
+        except OSError as error:
+            faults.append(_cannot_be_made(folder, error))
+        else:
+            faults.append(
+                f"{folder}: must be a folder of this user, which nobody else may write to; stop "
+                "buttons are in it (XDG_RUNTIME_DIR says where)"
+            )
+    raise InputError(faults)
+
+
+def button_folders() -> list[Path]:
+    """Return the folders in which buttons of this user may be, the preferred one first.
+
+    A login, a cron job and a service have different environments, so a stop looks in all of them.
+    The last one, in the user's home, is for the case that another user has made the one before.
+    """
+    runtime = os.environ.get("XDG_RUNTIME_DIR") or f"/run/user/{_user()}"
+    folders = [Path(runtime) / "snakewalk"] if os.path.isdir(runtime) else []
+    folders.append(Path(os.environ.get("TMPDIR") or _TEMPORARY) / f"snakewalk-{_user()}")
+    with suppress(RuntimeError):  # a user without a home
+        folders.append(Path.home() / ".cache" / "snakewalk" / "stop")
+    return folders
 
 
 def stoppable_runs() -> Iterator[PressedButton]:
@@ -260,15 +269,50 @@ def stoppable_runs() -> Iterator[PressedButton]:
     Files of killed programs are deleted.
     """
     found = []
-    for path in button_folder().glob(f"*{_SUFFIX}"):
-        with suppress(OSError, ValueError, TypeError, KeyError):  # just removed, or not a button
-            button = PressedButton(path)
-            if button.is_held:
-                found.append(button)
-            else:
-                path.unlink(missing_ok=True)
-                button.close()
+    for folder in button_folders():
+        if not _is_private(folder):
+            continue
+        for path in folder.glob(f"*{BUTTON_SUFFIX}"):
+            with suppress(OSError, ValueError, TypeError, KeyError):  # just removed, or no button
+                button = PressedButton(path)
+                if button.is_held:
+                    found.append(button)
+                else:
+                    path.unlink(missing_ok=True)
+                    button.close()
     yield from sorted(found, key=lambda button: button.since_s, reverse=True)
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder exists, and only this user may write to it."""
+    try:
+        info = folder.lstat()
+    except OSError:
+        return False
+    others_write = _HAS_LOCKS and info.st_mode & 0o022
+    return stat.S_ISDIR(info.st_mode) and _is_mine(info) and not others_write
+
+
+def _new_file(folder: Path, suffix: str) -> tuple[int, Path]:
+    """Create a file with a new name that only this user may open."""
+    path = folder / f"{os.getpid()}-{os.urandom(4).hex()}{suffix}"
+    return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN_FLAGS, 0o600), path
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    """Parse the description of a run.
+
+    Raises:
+        ValueError: it is damaged.
+
+    """
+    try:
+        known = json.loads(text)
+    except RecursionError:
+        raise ValueError("too many brackets") from None
+    if not isinstance(known, dict):
+        raise ValueError("no description of a run")
+    return known
 
 
 def _refuse_used_urls(ports: Iterable[str]) -> None:
@@ -295,7 +339,7 @@ def _is_mine(info: os.stat_result) -> bool:
 
 
 def _user() -> str:
-    return getpass.getuser() if not _HAS_LOCKS else str(os.getuid())
+    return str(os.getuid()) if _HAS_LOCKS else os.environ.get("USERNAME", "user")
 
 
 def _write_text(place: mmap.mmap, where: slice, text: str) -> None:

@@ -1,20 +1,35 @@
 """``snakewalk stop``: runs of other programs, and servos on a port that no program holds."""
 
 import json
+import os
+import resource
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from subprocess import PIPE, Popen
 
 import pytest
 
 from snakewalk.config.faults import FaultPlan
 from snakewalk.controller.bench import emergency_stop
+from snakewalk.controller.bench.emergency_stop import Stop, _read
+from snakewalk.controller.bench.torque_off import DYNAMIXEL_OFF, FEETECH_OFF
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.protocol.feetech import FeetechInstruction
+from snakewalk.drivers.protocol.packet import (
+    BROADCAST_ID,
+    Instruction,
+    InstructionPacket,
+    encode_instruction,
+)
+from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID as FEETECH_BROADCAST
+from snakewalk.drivers.protocol.protocol1 import frame
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.servo.bank import ServoBank
@@ -32,9 +47,160 @@ with StopButton("hung", sys.argv[1]):
 """
 
 
+OTHER_LOGIN = """
+import os, select, sys
+from snakewalk.drivers.safety.stop_button import StopButton
+port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+with StopButton("walk", sys.argv[1]) as button:
+    print("up", flush=True)
+    while (why := button.pressed()) is None:
+        select.select([], [], [], 1e-3)
+    button.end(why)
+"""
+OUR_COMMAND = """
+import os, signal, sys
+port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+print("up", flush=True)
+signal.pause()
+"""
+
+
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    for name in ("XDG_RUNTIME_DIR", "TMPDIR", "HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+
+
+@contextmanager
+def program(text: str, path: Path, *words: str, **environment: str) -> Iterator[Popen[str]]:
+    """Run a file of this name until it has said that it is up."""
+    path.write_text(text)
+    command = [sys.executable, str(path), *words]
+    environment = {**os.environ, **environment}
+    with Popen(command, stdout=PIPE, text=True, env=environment) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "up\n"
+        try:
+            yield child
+        finally:
+            child.kill()
+
+
+def test_a_run_of_another_login_is_found_by_the_device(
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    """It said that no run was under way, while the robot moved."""
+    other = tmp_path / "other"
+    other.mkdir()
+    with (
+        line_port(three) as port,
+        program(
+            OTHER_LOGIN, tmp_path / "run.py", port, XDG_RUNTIME_DIR=str(other), TMPDIR=str(other)
+        ) as child,
+    ):
+        code, out, err = stop("--port", port)
+        child.wait()
+    assert (code, err) == (0, "")
+    assert out.startswith("walk: latched after ")
+    assert "stop requested by snakewalk stop" in out
+    assert child.returncode == 0
+
+
+def test_a_command_of_ours_that_has_the_port_is_ended_and_torque_goes_off(
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    three.bank["Torque Enable"][:] = 1
+    with line_port(three) as port, program(OUR_COMMAND, tmp_path / "snakewalk", port) as child:
+        code, out, _ = stop("--port", port)
+        child.wait()
+    lines = out.splitlines()
+    assert code == 0
+    assert lines[0].startswith(f"snakewalk {port}: terminated after ")
+    assert "3 servos confirm it" in lines[1]
+    assert child.returncode == -15
+    assert three.bank["Torque Enable"].tolist() == [0] * 3
+
+
+def test_a_program_that_is_not_ours_is_left_alone(
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    with line_port(three) as port, program(OUR_COMMAND, tmp_path / "other.py", port) as child:
+        code, out, _ = stop("--port", port, "--baud", "1000000")
+        assert child.poll() is None
+    assert (code, "terminated" in out) == (0, False)
+
+
+def cpu_s(*words: str) -> float:
+    """CPU of a program, the least of three calls."""
+    spent = []
+    for _ in range(3):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *words], capture_output=True, check=False)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(spent)
+
+
+def test_a_run_is_stopped_before_anything_slow_is_imported() -> None:
+    """It cost 20 times as much, and on a busy computer torque went off after 17 s."""
+    snakewalk = "import sys; from snakewalk.controller.cli.main import main; main()"
+    with StopButton("walk", "/dev/null"):
+        stopping = cpu_s("-c", snakewalk, "stop", "another")
+    assert stopping <= 3.0 * cpu_s("-c", "import json, os, socket")
+
+
+def test_torque_off_is_on_the_wire_before_anything_slow_is_imported() -> None:
+    child = (
+        "import os, resource, sys\n"
+        "from snakewalk.controller.cli.main import main\n"
+        "from snakewalk.drivers.port.serial_port import SerialPort\n"
+        "def write(port, data):\n"
+        "    used = resource.getrusage(resource.RUSAGE_SELF)\n"
+        "    slow = sorted({'numba', 'numpy', 'pydantic', 'typer', 'rich'} & {*sys.modules})\n"
+        "    print(data.hex(), used.ru_utime + used.ru_stime, *slow, flush=True)\n"
+        "    os._exit(0)\n"
+        "SerialPort.write = write\n"
+        "_, slave = os.openpty()\n"
+        "sys.argv = ['snakewalk', 'stop', '--port', os.ttyname(slave)]\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", child], capture_output=True, text=True, check=True)
+    data, used_s, *slow = done.stdout.split()
+    assert data == ((DYNAMIXEL_OFF + FEETECH_OFF) * 3).hex()
+    assert slow == []
+    assert float(used_s) < 0.5
+
+
+def test_the_bytes_of_torque_off_are_those_of_the_protocols() -> None:
+    write = InstructionPacket(BROADCAST_ID, Instruction.WRITE, bytes([64, 0, 0]))
+    assert encode_instruction(write) == DYNAMIXEL_OFF
+    assert frame(FEETECH_BROADCAST, FeetechInstruction.WRITE, bytes((40, 0))) == FEETECH_OFF
+
+
+@pytest.mark.parametrize(
+    ("words", "read"),
+    [
+        ((), Stop()),
+        (("walk", "--json"), Stop("walk", as_json=True)),
+        (("--port=a=b", "--baud", "57600", "--baud=1"), Stop(None, "a=b", [57600, 1])),
+        *(
+            (words, None)
+            for words in (
+                ("--help",),
+                ("--port",),
+                ("--port", "a", "--port", "b"),
+                ("--baud", "x"),
+                ("a", "b"),
+                ("",),
+                ("--quiet",),
+            )
+        ),
+    ],
+)
+def test_words_that_are_not_simple_are_left_to_the_command_line(
+    words: tuple[str, ...], read: Stop | None
+) -> None:
+    assert _read(iter(words)) == read
 
 
 @pytest.fixture

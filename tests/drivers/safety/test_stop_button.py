@@ -31,6 +31,9 @@ ROBOT = RobotConfig(name="trio", joint_axes="yyy")
 @pytest.fixture(autouse=True)
 def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    for name in ("TMPDIR", "HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name))
+        (tmp_path / name).mkdir()
     return tmp_path / "snakewalk"
 
 
@@ -115,23 +118,55 @@ def test_a_press_before_torque_is_on_switches_it_off_where_an_earlier_program_le
         assert line.bank["Torque Enable"].tolist() == [0] * 3
 
 
-def test_a_folder_that_others_may_write_to_is_refused(own_folder: Path) -> None:
-    own_folder.mkdir()
-    own_folder.chmod(0o777)
-    with pytest.raises(InputError, match="nobody else may write"):
-        StopButton("walk")
-    own_folder.rmdir()
-    own_folder.symlink_to("/tmp")
-    with pytest.raises(InputError, match="nobody else may write"):
-        button_folder()
+@pytest.mark.parametrize("kind", ["open to others", "link", "file", "nowhere"])
+def test_a_folder_that_is_not_private_is_not_used_and_blocks_nothing(
+    kind: str, own_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another user could make the folder first, and then no run began and no stop worked."""
+    user = f"snakewalk-{os.getuid()}"
+    folders = [own_folder, tmp_path / "TMPDIR" / user, tmp_path / "HOME/.cache/snakewalk/stop"]
+    for unusable, expected in zip(folders, [*folders[1:], None], strict=True):
+        unusable.parent.mkdir(parents=True, exist_ok=True)
+        if unusable.exists():  # of the turn before
+            unusable.rmdir()
+        if kind == "open to others":
+            unusable.mkdir()
+            unusable.chmod(0o777)
+        elif kind == "link":
+            unusable.symlink_to("/tmp")
+        elif kind == "file":
+            unusable.write_text("", encoding="utf-8")
+        else:
+            unusable.symlink_to("/proc/self/nowhere")
+        if expected is None:
+            with pytest.raises(InputError) as info:
+                StopButton("walk")
+            assert len(info.value.faults) == 3
+            assert list(stoppable_runs()) == []
+        else:
+            with StopButton("walk") as button:
+                assert button.path.parent == expected
+                (run,) = stoppable_runs()
+                run.close()
 
 
 def test_without_a_runtime_folder_it_is_in_the_folder_of_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("XDG_RUNTIME_DIR")
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    assert button_folder() == tmp_path / f"snakewalk-{os.getuid()}"
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "none"))
+    assert button_folder() == tmp_path / "TMPDIR" / f"snakewalk-{os.getuid()}"
+
+
+def test_a_run_of_a_cron_job_is_seen_in_a_login(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as cron:
+        cron.setenv("XDG_RUNTIME_DIR", str(tmp_path / "none"))
+        button = StopButton("walk")
+    with button:
+        (run,) = stoppable_runs()
+        assert run.run == button.run
+        run.close()
 
 
 @pytest.mark.parametrize("content", [b"", b"\0" * 4096, b"x" * 4096])
