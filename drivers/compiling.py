@@ -77,6 +77,8 @@ def compiled_when_called(function: F) -> F:
 def _jitted(function: F, signature: Any, *, cached: bool, **options: Any) -> F:
     """Return numba's dispatcher of a function, compiled if a signature is given."""
     made: Any = _numba().njit(**options)(function)
+    if made is function:  # NUMBA_DISABLE_JIT=1
+        return function
     if cached:
         made._cache = _cache_of(made)
     if signature is not None:

@@ -62,7 +62,8 @@ def nearest_tests(module: str) -> list[str]:
     def rank(test: str) -> tuple[object, ...]:
         file = PurePosixPath(test)
         shared = words & set(file.stem.split("_"))
+        is_indirect = not _imports().has_edge(test.removesuffix(".py").replace("/", "."), module)
         is_apart = str(file.parent) != mirror
-        return by_import[test] > 1, -len(shared), is_apart, cpu_s.get(test, 0.0), test
+        return is_indirect, -len(shared), is_apart, by_import[test], cpu_s.get(test, 0.0), test
 
     return sorted(by_import, key=rank)[:FILES]

@@ -22,7 +22,7 @@ STUCK_S: Final = 600
 """Wall time after which a test that waits for ever has noticed its mutant."""
 TEST_S: Final = 4.0
 """CPU time of the most expensive test that is run on each mutant."""
-_WORDS: Final = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
+WORDS: Final = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 _COMPILED: Final = {"compiled", "njit", "inlined", "vectorize", "guvectorize"}
 
 
@@ -166,7 +166,7 @@ def try_mutants(
         if _has_compiled_loops(ast.parse(path_of(module).read_text(encoding="utf-8"))):
             os.environ["NUMBA_DISABLE_JIT"] = "1"
         forks = _Forks(path_of(module), mutants, budget_s)
-        code = pytest.main([*_WORDS, *files], plugins=[forks])
+        code = pytest.main([*WORDS, *files], plugins=[forks])
         if not forks.is_child and forks.trial is not None:
             with os.fdopen(write, "w") as out:
                 json.dump(forks.trial, out)
