@@ -24,10 +24,11 @@ from benchmarks.provenance import PAGES, provenance, write_tables
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import ServoSettings, configure
@@ -84,10 +85,10 @@ def at_rate(prepared: PreparedRun, hz: float) -> PreparedRun:
     return replace(prepared, run=run)  # type: ignore[type-var]
 
 
-def finish(prepared: PreparedRun) -> Finished:
+def finish(prepared: PreparedRun) -> RunResult:
     """Run it; its log is not kept."""
     with TemporaryDirectory() as folder:
-        return execute(prepared, Path(folder))
+        return run_robot(RunRequest(prepared, Path(folder)))
 
 
 @contextmanager
@@ -131,13 +132,13 @@ def profiles() -> Iterator[None]:
         yield
 
 
-def cost(finished: Finished) -> str:
+def cost(finished: RunResult) -> str:
     """Electrical cost of transport."""
     value = finished.summary.electrical_cost_of_transport
     return "" if value is None else f"{value:.3g}"
 
 
-def lag_ms(finished: Finished) -> str:
+def lag_ms(finished: RunResult) -> str:
     """Lag of the measured behind the sent angles."""
     value = finished.summary.lag_s
     return "" if value is None else f"{1e3 * value:.0f}"

@@ -13,8 +13,9 @@ import numpy as np
 from rich.console import Console
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 
 CASES: dict[str, dict[str, float]] = {
     "as the files": {},
@@ -46,7 +47,7 @@ def walk(run: str, case: dict[str, float], seed: int, seconds: float, pose: str 
         told["run.pose"] = pose
     with TemporaryDirectory() as folder:
         prepared = prepare_job(run, keys={**keys, **told}, seed=seed)
-        record = execute(prepared, Path(folder), stoppable=False).record
+        record = run_robot(RunRequest(prepared, Path(folder), stoppable=False)).record
     table, file = record.friction, record.header.world.friction
     there = np.array(
         [

@@ -26,8 +26,9 @@ from benchmarks.shadow import planted
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,
@@ -44,7 +45,9 @@ def goals_of_gait(gait: str, robot: str, seconds: float, parameters: dict[str, f
     """Goals that a gait's run sends."""
     prepared = prepare_gait(gait, robot=robot, seconds=seconds, parameters=dict(parameters))
     with TemporaryDirectory() as folder:
-        return goals_of(execute(prepared, Path(folder) / "run", stoppable=False).record)[0]
+        return goals_of(
+            run_robot(RunRequest(prepared, Path(folder) / "run", stoppable=False)).record
+        )[0]
 
 
 def links_seen(noise_m: float, seed: int, links_m: Floats) -> Floats:

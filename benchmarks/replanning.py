@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.rows import Row
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.pilot import Pilot
 
@@ -67,7 +68,7 @@ def _walk(job: str, seed: int) -> tuple[list[float], list[float], list[int]]:
     Pilot.step = timed  # type: ignore[method-assign, assignment]
     try:
         with tempfile.TemporaryDirectory() as folder, _forced_misses():
-            execute(prepared, Path(folder) / "run")
+            run_robot(RunRequest(prepared, Path(folder) / "run"))
     finally:
         Pilot.step = step  # type: ignore[method-assign]
     return planning_s, other_s, delays

@@ -18,7 +18,8 @@ from rich.console import Console
 from rich.table import Table
 
 from snakewalk.controller.metrics.ground_contact import roll_rad
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.trials import Case, prepare_case
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
@@ -73,7 +74,7 @@ def fallen(case: Case, seed: int, seconds: float) -> tuple[float, bool, bool]:
         patch.object(MujocoPlant, "reset", on_its_back),
         patch.object(MujocoPlant, "head_pose", watched),
     ):
-        done = execute(prepared, Path(folder), stoppable=False)
+        done = run_robot(RunRequest(prepared, Path(folder), stoppable=False))
     time_s, roll = np.array(rolls).T
     over = np.flatnonzero(roll > UPRIGHT_RAD)
     last_s = time_s[over[-1]] if len(over) else 0.0

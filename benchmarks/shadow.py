@@ -14,8 +14,9 @@ from rich.table import Table
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run.deviation import Deviation
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.shadow.diagnosis import Signatures, answers, goals_of
 
 KINDS = ("none", "friction", "load", "weaker servo", "slipped horn")
@@ -61,7 +62,7 @@ def main() -> None:
     given = parser.parse_args()
     prepared = prepare_gait(given.gait, robot=given.robot, seconds=given.seconds)
     with TemporaryDirectory() as folder:
-        record = execute(prepared, Path(folder) / "run", stoppable=False).record
+        record = run_robot(RunRequest(prepared, Path(folder) / "run", stoppable=False)).record
     goals, _ = goals_of(record)
     signatures = Signatures(goals)
     console = Console(width=200)

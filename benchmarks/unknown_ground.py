@@ -18,8 +18,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.mapping.stereo_head import StereoHead
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.sim.physics.plant import MujocoPlant
@@ -84,10 +85,10 @@ def cross(world_name: str, seed: int, stereo: bool) -> Crossing:
     )
     prepared = replace(known, run=run)
     with tempfile.TemporaryDirectory() as folder:
-        return judged(execute(prepared, Path(folder), stoppable=False), known.planner)
+        return judged(run_robot(RunRequest(prepared, Path(folder), stoppable=False)), known.planner)
 
 
-def judged(finished: Finished, planner: TerrainPlanner) -> Crossing:
+def judged(finished: RunResult, planner: TerrainPlanner) -> Crossing:
     """What became of a run."""
     assert planner.relief is not None
     pose, found = finished.record.pose, finished.map

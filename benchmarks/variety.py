@@ -24,8 +24,9 @@ import scipy.signal
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.console.options import key_values
 from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 
 RUN = "ramp-10-up"
 WINDOW_S = 20.0
@@ -53,7 +54,7 @@ def measured(slope_deg: float, motion: str, seed: int, changes: Sequence[str]) -
     keys |= key_values("--set", list(changes))
     prepared = prepare_walk(RUN, seed=seed, motion=motion, keys=keys)
     with tempfile.TemporaryDirectory() as folder:
-        finished = execute(prepared, Path(folder) / "run", stoppable=False)
+        finished = run_robot(RunRequest(prepared, Path(folder) / "run", stoppable=False))
     cycle, summary = finished.record.cycle, finished.summary
     goals_rad = cycle.sent_rad[np.isfinite(cycle.sent_rad).all(axis=1)]
     return {

@@ -31,8 +31,10 @@ from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.observers import Observers
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.view.live_view import LiveView
 
 CONDITIONS = (
@@ -105,15 +107,17 @@ def lateness_s(condition: str, seconds: float) -> tuple[Floats, int]:
             what = signal.SIGSTOP if "stopped" in condition else signal.SIGKILL
             ill = threading.Timer(0.4 * seconds, lambda: os.kill(victim.pid or 0, what))
             ill.start()
-        finished = execute(
-            prepare_gait(
-                "lateral-undulation",
-                seconds=seconds,
-                keys=PATIENT | {"run.safety.lost_observer": "warn"},
-            ),
-            folder / "run",
-            port,
-            view=page,
+        finished = run_robot(
+            RunRequest(
+                prepare_gait(
+                    "lateral-undulation",
+                    seconds=seconds,
+                    keys=PATIENT | {"run.safety.lost_observer": "warn"},
+                ),
+                folder / "run",
+                port,
+                observers=None if page is None else Observers(page),
+            )
         )
         if ill is not None:
             ill.join()

@@ -47,7 +47,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         try:
             prepared = sw.prepare_source(lambda robot: Wave(robot, given.amplitude, 3.0), seconds=8)
-            finished = sw.execute(prepared, given.out or Path(folder), given.port)
+            finished = sw.run_robot(sw.RunRequest(prepared, given.out or Path(folder), given.port))
         except sw.InputError as error:  # nothing has moved yet
             raise SystemExit(str(error)) from None
     print(f"the body went {finished.summary.travelled_m:.2f} m in {finished.summary.cycles} cycles")

@@ -38,7 +38,7 @@ def main() -> None:
         return show(given.log)
     with TemporaryDirectory() as folder:
         prepared = sw.prepare_gait("lateral-undulation", seconds=2.0)
-        return show(sw.execute(prepared, Path(folder)).log)
+        return show(sw.run_robot(sw.RunRequest(prepared, Path(folder))).log)
 
 
 if __name__ == "__main__":

@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from snakewalk.controller.metrics.summary import summary
     from snakewalk.controller.motion.gait_motion import GaitMotion
     from snakewalk.controller.motion.source import MotionSource, Pace
-    from snakewalk.controller.run.execute import execute
     from snakewalk.controller.run.external.real_time_robot import RealTimeRobot
     from snakewalk.controller.run.factory import prepare_policy, prepare_source, prepare_walk
     from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+    from snakewalk.controller.run.request import RunRequest, RunResult
+    from snakewalk.controller.run.run_robot import run_robot
     from snakewalk.controller.runlog.reader import read_log
     from snakewalk.controller.runlog.record import RunRecord
     from snakewalk.controller.runtime.loop import ticks
@@ -64,6 +65,8 @@ __all__ = [
     "RobotConfig",
     "RunConfig",
     "RunRecord",
+    "RunRequest",
+    "RunResult",
     "SafeLink",
     "SafetyConfig",
     "SafetyLimits",
@@ -73,7 +76,6 @@ __all__ = [
     "ServoChain",
     "WorldConfig",
     "body_in_world",
-    "execute",
     "load_robot",
     "load_run",
     "load_world",
@@ -85,6 +87,7 @@ __all__ = [
     "prepare_source",
     "prepare_walk",
     "read_log",
+    "run_robot",
     "summary",
     "ticks",
     "wire_budget",
@@ -97,7 +100,8 @@ _NAMES = {
     "config.robot.chain": ("RobotConfig",),
     "config.run": ("RunConfig", "SafetyConfig"),
     "config.world": ("WorldConfig",),
-    "controller.run.execute": ("execute",),
+    "controller.run.request": ("RunRequest", "RunResult"),
+    "controller.run.run_robot": ("run_robot",),
     "controller.run.external.real_time_robot": ("RealTimeRobot",),
     "controller.run.kinds.gait_factory": ("prepare_gait",),
     "controller.run.factory": (

@@ -251,25 +251,71 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
     return values
 
 
+UNITS: Final = {
+    "_rad_cycle": "rad per cycle",
+    "_body_lengths_cycle": "body lengths per cycle",
+    "_rad_s": "rad/s",
+    "_m_s": "m/s",
+    "_n_m": "N m",
+    "_m2": "m²",
+    "_rad": "rad",
+    "_deg": "°",
+    "_hz": "Hz",
+    "_kg": "kg",
+    "_ms": "ms",
+    "_mm": "mm",
+    "_a": "A",
+    "_c": "°C",
+    "_j": "J",
+    "_m": "m",
+    "_s": "s",
+    "_v": "V",
+    "_w": "W",
+}
+"""Units by the end of a key; the longest end comes first."""
+_DIGITS: Final = 4
+"""Significant digits of a number in a table (ours); JSON has all of them."""
+
+
 def show(result: Mapping[str, object], as_json: bool) -> None:
-    """Print a result as a table of two columns (a dash for None), or as JSON."""
+    """Print a result as a table of labels and values with units, or as JSON.
+
+    The table leaves out what is None, an empty list or an empty text.
+    """
     if as_json:
         print(json.dumps(result))
         return
     table = Table(box=None, show_header=False)
     for key, value in result.items():
-        table.add_row(key.replace("_", " "), _text(value))
+        if value is not None and value not in ("", [], (), {}):
+            table.add_row(*labelled(key, value))
     console.print(table)
 
 
+def labelled(key: str, value: object) -> tuple[str, str]:
+    """Return the label of a key, and its value with a unit."""
+    ends = (end for end in UNITS if key.endswith(end)) if _is_number(value) else ()
+    end = next(iter(ends), "")
+    text = _text(value)
+    return key.removesuffix(end).replace("_", " "), f"{text} {UNITS[end]}" if end else text
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, list | tuple):
+        return all(_is_number(each) for each in value)
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def _text(value: object) -> str:
-    """A value without brackets, quotes and ``None``."""
+    """A value without brackets and quotes; floats are rounded."""
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.{_DIGITS}g}" if abs(value) < 10.0**_DIGITS else f"{value:.0f}"
     if isinstance(value, dict):
-        return ", ".join(f"{key} {_text(one)}" for key, one in value.items()) or "-"
+        return ", ".join(" ".join(labelled(key, one)) for key, one in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(_text(one) for one in value) or "-"
+        return ", ".join(_text(one) for one in value)
     return "-" if value is None else str(value)
 
 

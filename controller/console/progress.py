@@ -103,6 +103,7 @@ class RunBar(ProgressBar):
 
     def __init__(self, description: str, total: float) -> None:
         super().__init__(description, total)
+        self.total = total
         self._cycles = 0
 
     def __exit__(
@@ -130,8 +131,9 @@ class PathBar(RunBar):
     def on_progress(self, progress: "RunProgress") -> None:
         """Update every few cycles."""
         if self._is_due(progress):
+            is_complete = progress.done and progress.reached == progress.waypoints
             self.update(
-                progress.along_m,
+                self.total if is_complete else progress.along_m,  # the last waypoint has a radius
                 description=f"waypoint {progress.reached}/{progress.waypoints}",
                 note=f"{progress.time_s:5.1f} s  {progress.speed_m_s:5.2f} m/s",
             )
@@ -156,7 +158,8 @@ class TimeBar(RunBar):
             self._start_s = progress.time_s
         if self._is_due(progress):
             gone_s = progress.time_s - self._start_s
-            self.update(gone_s, description=self._name_at(gone_s), note=f"{gone_s:5.1f} s")
+            done_s = self.total if progress.done else gone_s
+            self.update(done_s, description=self._name_at(gone_s), note=f"{gone_s:5.1f} s")
 
 
 def in_real_time(

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Final
 
 import numpy as np
@@ -19,11 +18,12 @@ from snakewalk.controller.metrics.effort import energy_track
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.stop_profile import STOP_S
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.controller.run.kinds.gait_factory import is_gait, prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.kinds.source_run import SourceRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.sweep_measure import varied
 
 HEADING_SPREAD_RAD: Final = 0.2
@@ -76,9 +76,7 @@ def policy_trials(
 
 def measure_trial(trial: PolicyTrial) -> PolicyTrialResult:
     """Run a trial, and return its numbers."""
-    with TemporaryDirectory() as folder:
-        finished = execute(_prepare(trial), Path(folder), stoppable=False)
-    return _result(finished, trial.seconds)
+    return _measured(run_robot(RunRequest(_prepare(trial), stoppable=False)), trial.seconds)
 
 
 def _prepare(trial: PolicyTrial) -> SourceRun | GaitRun:
@@ -104,10 +102,10 @@ def _is_set(motion: str) -> bool:
     return any(line.partition("=")[0].strip() == "gait" for line in lines)
 
 
-def _result(finished: Finished, seconds: float) -> PolicyTrialResult:
-    record, source, outcome = finished.record, finished.source, finished.outcome
+def _measured(result: RunResult, seconds: float) -> PolicyTrialResult:
+    record, source, outcome = result.record, result.source, result.outcome
     assert isinstance(source, GaitMotion | PolicyMotion)
-    pose_of = (finished.summary.pose_evidence, finished.summary.pose_source)
+    pose_of = (result.summary.pose_evidence, result.summary.pose_source)
     if outcome.tripped is not None:
         return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate, *pose_of)
     pose = record.pose

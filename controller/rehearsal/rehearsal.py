@@ -15,9 +15,10 @@ from snakewalk.controller.rehearsal.judgement import judge
 from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.truth import read_truth
 
 RUNS: Final = (
@@ -127,25 +128,26 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
         serving = Serving(case.tracker, deviation, LATE_S if case.has_errors else 0.0, case.seed)
         truth = folder / "truth.jsonl"
         with ServedRobot(prepared.robot, prepared.world, place, serving, truth) as served:
-            finished = execute(prepared, folder / "run", SimulatedPort(served), stoppable=False)
+            port = SimulatedPort(served)
+            result = run_robot(RunRequest(prepared, port=port, stoppable=False))
     except InputError as error:
         return {"error": error.faults[0]}
-    numbers = finished.summary
-    found = judge(read_truth(truth), finished.record, finished.outcome.tripped, numbers.outcome)
-    metrics = metric_errors(read_truth(truth), finished.record, numbers)
+    numbers = result.summary
+    found = judge(read_truth(truth), result.record, result.outcome.tripped, numbers.outcome)
+    metrics = metric_errors(read_truth(truth), result.record, numbers)
     return {
         **found.facts(),
         "metrics": None if metrics is None else asdict(metrics),
-        "friction": _friction_facts(finished, deviation),
-        "duration_s": round(finished.outcome.duration_s, 2),
-        "missed": finished.outcome.missed,
-        "latency_s": finished.pose.facts().get("pose_latency_s"),
+        "friction": _friction_facts(result, deviation),
+        "duration_s": round(result.outcome.duration_s, 2),
+        "missed": result.outcome.missed,
+        "latency_s": result.pose.facts().get("pose_latency_s"),
     }
 
 
-def _friction_facts(finished: Finished, deviation: Deviation) -> dict[str, Any] | None:
+def _friction_facts(result: RunResult, deviation: Deviation) -> dict[str, Any] | None:
     """Return the estimated friction next to the true one; None if it was not estimated."""
-    found = finished.summary.friction_found
+    found = result.summary.friction_found
     if found is None:
         return None
     true = {
@@ -154,5 +156,5 @@ def _friction_facts(finished: Finished, deviation: Deviation) -> dict[str, Any] 
     }
     (low, high), (least, most) = found.along_95, found.across_95
     is_inside = low <= true["true_along"] <= high and least <= true["true_across"] <= most
-    used = any(event.kind == "friction" for event in finished.record.events)
+    used = any(event.kind == "friction" for event in result.record.events)
     return {**asdict(found), **true, "is_inside": is_inside, "was_used": used}

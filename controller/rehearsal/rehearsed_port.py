@@ -32,7 +32,7 @@ class SimulatedDatagrams:
 
 @dataclass(frozen=True, slots=True)
 class SimulatedPort:
-    """A served robot as a port of ``execute``; a ``RehearsedPort``."""
+    """A served robot as a port of a request; a ``RehearsedPort``."""
 
     served: ServedRobot
     name: str = "rehearsal"

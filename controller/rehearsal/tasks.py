@@ -6,8 +6,6 @@ is the share that the simulated body truly reached.
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -22,10 +20,11 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.plugins import find
 from snakewalk.controller.rehearsal.judgement import true_arrivals
 from snakewalk.controller.rehearsal.rehearsal import RehearsalCase, rehearse
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_job, prepare_policy, prepare_source
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 
 CONTROLLERS: Final = ("walk", "serpenoid", "gait", "cpg", "wave-cma", "wave-ppo")
@@ -130,23 +129,22 @@ def run_task(item: TaskRun) -> TaskResult:
         if task.is_rehearsed:
             return _rehearsed(task, item)
         prepared = _prepare(task, item.controller, item.seed)
-        with TemporaryDirectory() as folder:
-            finished = execute(prepared, Path(folder), stoppable=False)
+        result = run_robot(RunRequest(prepared, stoppable=False))
     except InputError as error:
         return TaskResult(*about, ended=f"not applicable: {error.faults[0]}")
-    numbers, outcome = finished.summary, finished.outcome
+    numbers, outcome = result.summary, result.outcome
     return TaskResult(
         *about,
-        share=_digits(share(task, finished)),
+        share=_digits(share(task, result)),
         duration_s=_digits(outcome.duration_s),
         cost_of_transport=_digits(numbers.electrical_cost_of_transport),
         ended=outcome.tripped or "ran to its end",
     )
 
 
-def share(task: ControllerTask, finished: Finished) -> float:
+def share(task: ControllerTask, result: RunResult) -> float:
     """Share of a task that a body truly did."""
-    record = finished.record
+    record = result.record
     if task.run is None:
         return min(max(_moved_m(record, task.axis) / task.distance_m, 0.0), 1.0)
     run = load_run(task.run)

@@ -19,9 +19,9 @@ from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
-from snakewalk.controller.run.execute import Finished
-from snakewalk.controller.run.finish import by_evidence
 from snakewalk.controller.run.prepared_run import pose_with
+from snakewalk.controller.run.request import RunResult
+from snakewalk.controller.run.results import by_evidence
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.drivers.types import BodyPose
@@ -159,26 +159,26 @@ class RouteRun:
     """A run of a plan, and what its follower predicted and measured."""
 
     job: RepertoireRun
-    finished: Finished
+    result: RunResult
 
     @property
     def follower(self) -> RouteFollower:
         """Follower of the route, with its predicted and measured poses."""
-        source = self.finished.source
+        source = self.result.source
         assert isinstance(source, RouteMotion), "a repertoire run has no other motion"
         return source.follower
 
     @property
     def complete(self) -> bool:
         """Whether every waypoint was reached without a trip."""
-        return self.finished.outcome.complete
+        return self.result.outcome.complete
 
     def to_dict(self) -> dict[str, object]:
         """Numbers for a command's answer."""
-        job, outcome, follower = self.job, self.finished.outcome, self.follower
+        job, outcome, follower = self.job, self.result.outcome, self.follower
         facts: dict[str, object] = {
             "waypoints": len(job.run.waypoints_m),
-            **by_evidence(self.finished, {"waypoints_reached": outcome.reached}),
+            **by_evidence(self.result, {"waypoints_reached": outcome.reached}),
             "replanned": job.replan,
             "actions_planned": len(job.route.actions),
             "actions_run": len(follower.measured),
@@ -192,14 +192,14 @@ class RouteRun:
                 "cycle_error_median_m": round(float(np.median(cycle[:, 0])), 4),
                 "cycle_error_median_rad": round(float(np.median(cycle[:, 1])), 4),
             }
-            facts |= by_evidence(self.finished, errors)
+            facts |= by_evidence(self.result, errors)
         if len(route) and not job.replan:
             errors = {
                 "open_loop_error_max_m": round(float(route[:, 0].max()), 4),
                 "open_loop_error_end_m": round(float(route[-1, 0]), 4),
                 "open_loop_error_end_rad": round(float(route[-1, 1]), 4),
             }
-            facts |= by_evidence(self.finished, errors)
+            facts |= by_evidence(self.result, errors)
         return facts
 
 

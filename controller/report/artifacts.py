@@ -10,12 +10,12 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Section, film_on_page, page
 from snakewalk.controller.report.trip import trip_of
-from snakewalk.controller.run.execute import write_summary
-from snakewalk.controller.run.film_look import SERVOS, film_look
-from snakewalk.controller.run.finish import Artifacts
+from snakewalk.controller.run.results import SERVOS, Artifacts, film_look
+from snakewalk.controller.run.run_robot import write_summary
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -40,7 +40,7 @@ def make_artifacts(
     Args:
         record: the run.
         folder: of the files.
-        numbers: the summary of ``execute``; computed by default.
+        numbers: the summary of ``run_robot``; computed by default.
         film: draw a film.
         fine: better and slower.
         look: body in the film, as for ``film_look``.
@@ -118,6 +118,7 @@ def _write_page(
     }
     html = page(
         numbers,
+        verdict(record, numbers, LOG),
         drawn.sections,
         film=shown,
         events=record.events,

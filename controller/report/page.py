@@ -16,6 +16,7 @@ from urllib.parse import quote
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.metrics.verdict import RunVerdict
 from snakewalk.controller.report.trip import Trip
 from snakewalk.controller.runlog.record import Event
 
@@ -51,6 +52,7 @@ class Film:
 
 def page(
     numbers: RunSummary,
+    found: RunVerdict,
     sections: Sequence[Section],
     *,
     film: Film | None,
@@ -66,6 +68,7 @@ def page(
 
     Args:
         numbers: of the run.
+        found: verdict on the run.
         sections: its figures.
         film: shown first, if there is one.
         events: of the log.
@@ -85,13 +88,17 @@ def page(
         numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
         events = [replace(event, text=without_folders(event.text)) for event in events]
         trip = None if trip is None else replace(trip, reason=without_folders(trip.reason))
+        cause = None if found.cause is None else without_folders(found.cause)
+        command = None if found.next_command is None else without_folders(found.next_command)
+        found = replace(found, cause=cause, next_command=command)
     every = numbers.to_dict() if folders else shared(numbers.to_dict())
     return str(
         _template().render(
             n=numbers,
             mood=_mood(numbers),
-            headline=_headline(numbers),
-            facts=_facts(numbers),
+            headline=_headline(numbers, found),
+            verdict=found,
+            facts=_facts(numbers, found),
             tiles=_tiles(numbers),
             film=film,
             trip=trip,
@@ -125,57 +132,21 @@ def _mood(n: RunSummary) -> str:
     return "good" if n.is_measured and n.waypoints_reached == n.waypoints else "fair"
 
 
-def _headline(n: RunSummary) -> str:
-    """One sentence: how far it came, how fast, how well it kept to its path, whether on time."""
+def _headline(n: RunSummary, found: RunVerdict) -> str:
+    """Return the sentence of the verdict, with robot, motion, bus and missed deadlines."""
     where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
     late = n.missed_deadlines
-    missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed."
-    if not n.is_measured:
-        return _believed_headline(n, where, missed)
-    if n.waypoints == 0:
-        return (
-            f"{n.robot} moved by {n.motion} {where}: its centre of mass went "
-            f"{_fmt(n.travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s, {missed}"
-        )
-    return (
-        f"{n.robot} reached {n.waypoints_reached} of {_count(n.waypoints, 'waypoint')} "
-        f"{where}: {_fmt(n.travelled_m, 1)} m in {_fmt(n.duration_s, 1)} s, "
-        f"{_centimetres(n.path_error_mean_m)} from its path on average, {missed}"
-    )
+    missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed"
+    return f"{n.robot} by {n.motion} {where}: {found.sentence}, {missed}."
 
 
-def _believed_headline(n: RunSummary, where: str, missed: str) -> str:
-    """Return the sentence of a run whose pose was dead-reckoned."""
-    travelled = f"{_fmt(n.dead_reckoned_travelled_m, 1)} m by dead reckoning in "
-    travelled += f"{_fmt(n.duration_s, 1)} s"
-    unknown = "Nothing measured the pose: distances and arrivals are dead-reckoned."
-    if n.waypoints == 0:
-        moved = f"{n.robot} moved by {n.motion} {where} and believes it went"
-        return f"{moved} {travelled}, {missed} {unknown}"
-    return (
-        f"{n.robot} believes it reached {n.dead_reckoned_waypoints_reached} of "
-        f"{_count(n.waypoints, 'waypoint')} {where}: {travelled}, {missed} {unknown}"
-    )
-
-
-def _centimetres(length_m: float | None) -> str:
-    return "–" if length_m is None else f"{100.0 * length_m:.1f} cm"
-
-
-def _facts(n: RunSummary) -> tuple[tuple[str, object], ...]:
+def _facts(n: RunSummary, found: RunVerdict) -> tuple[tuple[str, object], ...]:
     backend = "simulation" if n.backend == "sim" else n.backend
     return (
         ("robot", n.robot), ("ground", n.world), ("motion", n.motion),
         ("bus", backend), ("seed", n.seed), ("configuration", n.config_hash),
-        ("pose", _evidence(n)), ("snakewalk", n.software),
+        ("pose", found.evidence), ("snakewalk", n.software),
     )  # fmt: skip
-
-
-def _evidence(n: RunSummary) -> str:
-    if n.pose_source == "simulator":
-        return "simulated"
-    simulated = ", simulated" if n.pose_is_simulated or n.port_is_pseudo_terminal else ""
-    return f"{n.pose_evidence} ({n.pose_source}{simulated})"
 
 
 def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:

@@ -13,12 +13,12 @@ from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.command import Command, GoTo, Refused
 from snakewalk.controller.ros.command_codec import decode_command
 from snakewalk.controller.ros.ros_options import RosOptions, not_loaded
-from snakewalk.controller.run.watcher import WatcherProcess
-from snakewalk.controller.run.watchers import GOALS
+from snakewalk.controller.run.observer_process import ObserverProcess
+from snakewalk.controller.run.observers import GOALS
 from snakewalk.controller.walk.live_course import NEXT
 
 
-class RosLink(WatcherProcess):
+class RosLink(ObserverProcess):
     """Serves a run's ROS node from a process of its own; use it in a ``with``.
 
     Raises:

@@ -42,7 +42,7 @@ from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_commands import QUEUE, CommandTopics, in_words, message_type
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import BUTTON, WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, ObserverEnd
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
@@ -94,7 +94,7 @@ def serve(line: socket.socket, options: RosOptions) -> None:
     domain = node.context.get_domain_id()
     hello = {"name": node.get_fully_qualified_name(), "domain": domain}
     line.sendall(json.dumps(hello).encode() + b"\n")
-    robot = RobotNode(node, WatcherEnd(line), options)
+    robot = RobotNode(node, ObserverEnd(line), options)
     with _spinning(node, robot.commands.reject):
         with suppress(EOFError):
             while True:
@@ -170,7 +170,7 @@ class ClockOffset:
 class RobotNode:
     """Topics and services of one run."""
 
-    def __init__(self, node: Node, end: WatcherEnd, options: RosOptions) -> None:
+    def __init__(self, node: Node, end: ObserverEnd, options: RosOptions) -> None:
         self._node, self._end, self._options = node, end, options
         self._clock = WallClock()
         self._offset = ClockOffset()

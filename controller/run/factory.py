@@ -276,7 +276,7 @@ def prepare_source(
 
     Raises:
         InputError: the robot lacks joints that the source needs, or its cycle does not fit the
-            wire; limits of the joints are checked by ``execute``.
+            wire; limits of the joints are checked by ``run_robot``.
 
     """
     keys = checked_keys(keys, OF_A_SOURCE)

@@ -18,8 +18,7 @@ from snakewalk.controller.motion.command import LATE_S, Refused
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.operator import KEYS, Operator
 from snakewalk.controller.motion.refusals import NAME_MAX
-from snakewalk.controller.run.observer_watch import ADVICE
-from snakewalk.controller.run.watchers import PageControls
+from snakewalk.controller.run.observers import ADVICE, PageControls
 from snakewalk.controller.runtime.drive import OnEvent
 
 _ENDS: Final = ("q", "t")

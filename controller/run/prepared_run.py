@@ -19,7 +19,7 @@ from snakewalk.controller.runtime.drive import OnEvent
 
 
 class PreparedRun(Protocol):
-    """A run that ``execute`` can carry out."""
+    """A run that ``run_robot`` can run."""
 
     @property
     def run(self) -> RunConfig:

@@ -1,13 +1,16 @@
-"""Servos of a run: gains for its motion; checks of supply, current and cycle rate."""
+"""Servos of a run: gains for its motion; checks of supply, current, rate and compliance."""
 
 from collections.abc import Sequence
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.controller.motion.compliance import chatters
+from snakewalk.controller.runlog.record import Winding
 from snakewalk.drivers.bus.budget import check_ages, robot_budget
 from snakewalk.drivers.compiling import is_compiling
 from snakewalk.drivers.protocol.registers import CURRENT_POSITION_MODE
+from snakewalk.sim.servo.motor import known_motors, p_gain_per_rad
 
 GAIT_PITCH_SHARE = 0.75
 """Goal current of pitch joints that lift, as a share of safety's limit (1.5 A of an XM430; ours):
@@ -122,3 +125,49 @@ def with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) -> 
     return robot.model_copy(
         update={"servo": servo.model_copy(update=changes), "joints": tuple(joints)}
     )
+
+
+def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
+    """Reject compliance that safety would clamp, or that would chatter at a blocked shaft.
+
+    Raises:
+        InputError: one line for each fault.
+
+    """
+    config = run.compliance
+    if config is None:
+        return
+    faults, allowed = [], run.safety.goal_rate_rad_s - robot.joint_speed_limit_rad_s
+    if config.yield_rate_rad_s > allowed:
+        faults.append(
+            f"run {run.name}: compliance.yield_rate_rad_s {config.yield_rate_rad_s:g}: together "
+            f"with the robot's joint_speed_limit_rad_s {robot.joint_speed_limit_rad_s:g} it is "
+            f"over safety.goal_rate_rad_s {run.safety.goal_rate_rad_s:g}; at most {allowed:g}"
+        )
+    chatter = chatters(config, _current_gain_a_rad(robot), 1.0 / run.cycle_hz)
+    if chatter is not None:
+        faults.append(f"run {run.name}: {chatter}")
+    if faults:
+        raise InputError(faults)
+
+
+def _current_gain_a_rad(robot: RobotConfig) -> float:
+    """Current of the stiffest joint per radian of lead; 0 without a known motor."""
+    gains_a_rad = [0.0]
+    for motor, gain in zip(known_motors(robot), robot.position_p_gains, strict=True):
+        if motor is not None:
+            per_rad = float(p_gain_per_rad(gain, motor))
+            gains_a_rad.append(per_rad * robot.servo.supply_v / motor.resistance_ohm)
+    return max(gains_a_rad)
+
+
+def motor_constants(robot: RobotConfig) -> tuple[float, Winding | None]:
+    """Torque constant (N m/A) and winding of the robot's servos.
+
+    NaN and None if the model has no motor, or there are several models.
+    """
+    motors = set(known_motors(robot))
+    motor = motors.pop()
+    if motor is None or motors:
+        return float("nan"), None
+    return motor.torque_constant_n_m_a, Winding(motor.resistance_ohm, motor.back_emf_v_s)

@@ -184,7 +184,7 @@ class RunEnd:
                 )
 
 
-class WatcherEnd:
+class ObserverEnd:
     """The observer's end of the line; it does not wait until the run receives."""
 
     def __init__(self, line: socket.socket) -> None:

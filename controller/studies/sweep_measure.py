@@ -2,8 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TypeVar
 
 import numpy as np
@@ -13,10 +11,11 @@ from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.travel import Travel
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.prepared_run import GroundedRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.sweep_points import Point
 
@@ -67,16 +66,15 @@ def measure(point: Point, vary: int | None = None) -> Measurement:
         prepared = prepared_point(point)
         if vary is not None:
             prepared = varied(prepared, np.random.default_rng(vary))
-        with TemporaryDirectory() as folder:
-            finished = execute(prepared, Path(folder), stoppable=False)
+        result = run_robot(RunRequest(prepared, stoppable=False))
     except InputError as error:
         return Measurement(f"refused: {error.faults[0]}")
     return measurement(
-        finished.record,
-        finished.summary,
-        finished.travel,
-        tripped=finished.outcome.tripped,
-        least_rate=finished.outcome.least_rate,
+        result.record,
+        result.summary,
+        result.travel,
+        tripped=result.outcome.tripped,
+        least_rate=result.outcome.least_rate,
         backend=COMPILED,
     )
 

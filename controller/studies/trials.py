@@ -5,8 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -17,12 +15,13 @@ from snakewalk.config.loader import digest
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import changed, prepare_job
 from snakewalk.controller.run.kinds.gait_factory import is_gait, prepare_gait
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_keys import with_compliance
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.terrain.summary import path_relief
 from snakewalk.controller.track.readers.load import load_track
 
@@ -215,13 +214,12 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
 
 
 def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
-    with TemporaryDirectory() as folder:
-        finished = execute(prepared, Path(folder), stoppable=False)
-        stood = ground_contact(finished.record, prepared.ground)
-    numbers, outcome, off = finished.summary, finished.outcome, finished.pose.error
+    result = run_robot(RunRequest(prepared, stoppable=False))
+    stood = ground_contact(result.record, prepared.ground)
+    numbers, outcome, off = result.summary, result.outcome, result.pose.error
     reached = outcome.reached if off is None else off.waypoints_reached
     complete = outcome.tripped is None and reached == outcome.waypoints
-    ended = None if complete else failure(finished.record)
+    ended = None if complete else failure(result.record)
     return replace(
         trial,
         complete=complete,

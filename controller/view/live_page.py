@@ -15,7 +15,7 @@ import viser
 
 from snakewalk.config.plain_text import plain
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, WatcherEnd
+from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, ObserverEnd
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
@@ -61,7 +61,7 @@ def serve(line: socket.socket, host: str, port: int) -> None:
         line.sendall(json.dumps({"fault": str(fault)}).encode() + b"\n")
         return
     line.sendall(json.dumps({"url": url}).encode() + b"\n")
-    page = _LivePage(server, WatcherEnd(line), gamepad, stop, freshness)
+    page = _LivePage(server, ObserverEnd(line), gamepad, stop, freshness)
     with suppress(EOFError):
         while True:
             try:
@@ -79,7 +79,7 @@ class _LivePage:
     def __init__(
         self,
         server: viser.ViserServer,
-        end: WatcherEnd,
+        end: ObserverEnd,
         gamepad: BrowserGamepad,
         stop: StopElement,
         freshness: Freshness,

@@ -15,7 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.command import Refused
-from snakewalk.controller.run.watcher import WatcherProcess
+from snakewalk.controller.run.observer_process import ObserverProcess
 from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.view.command_line import fresh_commands
@@ -26,7 +26,7 @@ _PICTURE_S: Final = 0.5
 _QUALITY: Final = 70
 
 
-class LiveView(WatcherProcess):
+class LiveView(ObserverProcess):
     """Serves the page; use it in a ``with``.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Each topic of the log, of the exports and of the watchers' line is typed once in the library."""
+"""Each topic of the log, of the exports and of the observers' line is typed once in the library."""
 
 import ast
 from collections import Counter

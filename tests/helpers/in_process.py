@@ -42,11 +42,11 @@ def work_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 def leave_out_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs leave their log and numbers: a page takes two seconds, and is drawn by other tests."""
     from snakewalk.controller.report import artifacts
-    from snakewalk.controller.run import execute
+    from snakewalk.controller.run import run_robot
 
     def numbers_only(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
         assert numbers is not None, "the command makes a page of a log that was there before"
-        execute.write_summary(numbers, folder)
+        run_robot.write_summary(numbers, folder)
         return artifacts.Artifacts(None, None, ())
 
     monkeypatch.setattr(artifacts, "make_artifacts", numbers_only)

@@ -83,7 +83,9 @@ class ReferenceRun:
         with ExitStack() as stack:
             lines = stack.enter_context(hashed_wires())
             port = stack.enter_context(_served(prepared, folder)) if self.is_rehearsed else None
-            done = snakewalk.execute(prepared, folder, port, shadow=self.shadow, stoppable=False)
+            done = snakewalk.run_robot(
+                snakewalk.RunRequest(prepared, folder, port, shadow=self.shadow, stoppable=False)
+            )
         return done.record, lines
 
 

@@ -34,8 +34,8 @@ from snakewalk.controller.console.result_files import (
     refuse_to_overwrite,
 )
 from snakewalk.controller.run.factory import prepare_walk
-from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.results import ANIMAL
 
 _END = (
     "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "

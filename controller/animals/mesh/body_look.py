@@ -13,7 +13,7 @@ from snakewalk.controller.animals.mesh.body_motion import robot_skin
 from snakewalk.controller.animals.mesh.body_skin import body_skin
 from snakewalk.controller.animals.mesh.rig import Rig, spine_rig
 from snakewalk.controller.console.command import plugin
-from snakewalk.controller.run.film_look import ANIMAL
+from snakewalk.controller.run.results import ANIMAL
 from snakewalk.controller.runlog.record import Header
 from snakewalk.sim.rendering.looks import SkinLook
 

@@ -20,8 +20,8 @@ from snakewalk.controller.animals.synthesis.tongue_skin import (
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.report.film import film_motion
-from snakewalk.controller.run.film_look import ANIMAL
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.results import ANIMAL
 from snakewalk.controller.track.bone_motion import BoneMotion
 from snakewalk.sim.rendering.looks import SkinLook
 

@@ -13,11 +13,10 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
-from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.factory import prepare_policy
-from snakewalk.controller.run.finish import show_run, summarized
+from snakewalk.controller.run.results import show_result, summarized
+from snakewalk.controller.run.run_for_user import run_for_user
 
 Name = Annotated[
     str,
@@ -49,21 +48,17 @@ def run_policy(
     """Run a learnt policy on servos or in the simulator; leaves a log, a report and a film."""
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
-    run_name = prepared.run.name
-    results = f"policy-{run_name}-{prepared.robot.name}"
-    with watched_by(options) as watchers:
-        finished, folder = carry_out(
-            prepared, results, TimeBar(run_name, seconds), options, watchers, shadow=shadow
-        )
-    result: dict[str, object] = {
+    results = f"policy-{prepared.run.name}-{prepared.robot.name}"
+    result = run_for_user(prepared, results, options, seconds=seconds, shadow=shadow)
+    facts: dict[str, object] = {
         "policy": name,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
-        "duration_s": round(finished.outcome.duration_s, 2),
-        "tripped": finished.outcome.tripped,
-        "slowed_to": round(finished.outcome.least_rate, 3),
-        **summarized(finished.summary, "travelled_m"),
-        "electrical_energy_j": finished.summary.electrical_energy_j,
-        "peak_current_a": finished.summary.peak_current_a,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
+        "slowed_to": round(result.outcome.least_rate, 3),
+        **summarized(result.summary, "travelled_m"),
+        "electrical_energy_j": result.summary.electrical_energy_j,
+        "peak_current_a": result.summary.peak_current_a,
     }
-    show_run(finished, folder, result, options.as_json, film=options.film)
+    show_result(result, facts, options)

@@ -16,7 +16,6 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
@@ -26,8 +25,8 @@ from snakewalk.controller.repertoire.schedule_run import (
     ScheduleMotion,
     read_schedule,
 )
-from snakewalk.controller.run.carry_out import carry_out, watched_by
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.results import show_result
+from snakewalk.controller.run.run_for_user import run_for_user
 
 Speed = Annotated[
     float | None, typer.Option(help="requested speed in m/s; negative: tail first; default: 0.4")
@@ -93,29 +92,26 @@ def play_actions(
         seed=seed,
         keys=key_values("--set", set_),
     )
-    bar = TimeBar(prepared.run.name, prepared.config.duration_s)
-    with watched_by(options) as watchers:
-        finished, folder = carry_out(
-            prepared, f"actions-{prepared.run.name}", bar, options, watchers
-        )
-    assert isinstance(finished.source, ScheduleMotion), "a schedule's run has no other motion"
-    played = finished.source.played
+    name = f"actions-{prepared.run.name}"
+    result = run_for_user(prepared, name, options, seconds=prepared.config.duration_s)
+    assert isinstance(result.source, ScheduleMotion), "a schedule's run has no other motion"
+    played = result.source.played
     names = [segment.name for segment in prepared.repertoire.segments]
-    result: dict[str, object] = {
+    facts: dict[str, object] = {
         "repertoire": str(file),
         "robot": prepared.robot.name,
         "world": prepared.world.name,
         "size": round(prepared.scale, 4),
-        "duration_s": round(finished.outcome.duration_s, 2),
-        "tripped": finished.outcome.tripped,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
         "actions": [names[action.action] for action in played],
     }
     if played:
-        result |= _errors(played)
+        facts |= _errors(played)
         if picture is not None:
             plots().draw_schedule(prepared, played, picture)
-            result["picture"] = str(picture)
-    show_run(finished, folder, result, options.as_json, film=options.film)
+            facts["picture"] = str(picture)
+    show_result(result, facts, options)
 
 
 def _asked(

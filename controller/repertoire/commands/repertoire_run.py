@@ -7,14 +7,13 @@ import typer
 
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import show
-from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.repertoire_planning import load_plan
 from snakewalk.controller.repertoire.repertoire_run import RepertoireRun, RouteRun, run_name
-from snakewalk.controller.run.carry_out import carry_out, watched_by
-from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.run.results import write_artifacts
+from snakewalk.controller.run.run_for_user import run_for_user
 
 
 @command(
@@ -48,12 +47,10 @@ def run_route(
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; return its facts, and whether it reached every waypoint."""
     check_picture(picture)
-    bar = TimeBar(job.run.name, job.route.duration_s)
-    with watched_by(options) as watchers:
-        finished, folder = carry_out(job, run_name(job), bar, options, watchers)
-    with finished.ending.noted():
-        artifacts = write_artifacts(finished.record, folder, finished.summary, film=options.film)
+    result = run_for_user(job, run_name(job), options, seconds=job.route.duration_s)
+    with result.ending.noted():
+        artifacts = write_artifacts(result.record, result.folder, result.summary, film=options.film)
     if picture is not None:
-        plots().draw_route(job, finished.record, picture)
-    ran = RouteRun(job, finished)
-    return ran.to_dict() | {"log": str(finished.log)} | artifacts.to_dict(), ran.complete
+        plots().draw_route(job, result.record, picture)
+    ran = RouteRun(job, result)
+    return ran.to_dict() | {"log": str(result.log)} | artifacts.to_dict(), ran.complete

@@ -9,8 +9,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, Look, show
 from snakewalk.controller.console.result_files import refuse_mixture
-from snakewalk.controller.run.film_look import check_look
-from snakewalk.controller.run.finish import write_artifacts
+from snakewalk.controller.run.results import check_look, write_artifacts
 from snakewalk.controller.runlog.reader import read_log
 
 

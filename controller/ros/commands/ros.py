@@ -22,17 +22,16 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar, in_real_time
-from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import open_ros
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.commands.gait_options import Param, parameters
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_commanded
-from snakewalk.controller.run.finish import show_run
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name
-from snakewalk.controller.run.watchers import PAGE, Watchers, open_observer
+from snakewalk.controller.run.observers import PAGE, Observers, open_observer
+from snakewalk.controller.run.results import show_result
+from snakewalk.controller.run.run_for_user import run_for_user
 
 _WEEK_S = 604_800.0
 
@@ -105,6 +104,9 @@ def ros(
         raise InputError(f"--namespace {namespace}: expected a name as snake or lab/snake")
     options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
     begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
+    run_options = RunOptions(
+        port=port, view=view, view_at=view_at, film=False, out=out, force=force, as_json=as_json
+    )
     opened = open_observer(PAGE, view_at) if view else nullcontext()
     with open_ros(options) as link, opened as page:
         prepared = prepare_commanded(
@@ -124,24 +126,18 @@ def ros(
         )
         if begun is not None:
             begun.check(prepared.robot)
-        with (
-            run_folder(f"ros-{prepared.robot.name}", out) as folder,
-            TimeBar("ros", seconds) as bar,
-        ):
-            finished = execute(
-                prepared,
-                folder,
-                port,
-                force=force,
-                view=Watchers(page, link),
-                on_progress=bar.on_progress if port else in_real_time(bar.on_progress),
-                on_event=bar.on_event,
-            )
+        result = run_for_user(
+            prepared,
+            f"ros-{prepared.robot.name}",
+            run_options,
+            seconds=seconds,
+            observers=Observers(link, page=page),
+        )
     facts = {
         "robot": prepared.robot.name,
         "world": prepared.world.name,
-        "duration_s": round(finished.outcome.duration_s, 2),
-        "tripped": finished.outcome.tripped,
-        "peak_current_a": finished.summary.peak_current_a,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
+        "peak_current_a": result.summary.peak_current_a,
     }
-    show_run(finished, folder, facts, as_json, film=False)
+    show_result(result, facts, run_options)

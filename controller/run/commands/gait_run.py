@@ -1,10 +1,15 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
@@ -13,10 +18,21 @@ from snakewalk.controller.console.options import (
     Set,
     Shadow,
     World,
+    key_values,
 )
 from snakewalk.controller.console.run_options import RunOptions
-from snakewalk.controller.run.commands.gait_options import Name, Param
-from snakewalk.controller.run.gait_job import GaitJob
+from snakewalk.controller.metrics.displacement import gait_displacement
+from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
+from snakewalk.controller.run.hands import Hands, open_hands
+from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.request import RunResult
+from snakewalk.controller.run.results import by_evidence, show_result, summarized
+from snakewalk.controller.run.run_for_user import observers_of, run_for_user
+from snakewalk.controller.run.run_keys import with_compliance
+
+_LEAST_S = 0.1
+"""Shortest motion (ours)."""
 
 Then = Annotated[
     list[str] | None,
@@ -70,8 +86,114 @@ def run_gait(
     options: RunOptions,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    GaitJob(
-        name=name, robot=robot, world=world, param=param, keys=set_, then=then, by=by,
-        seconds=seconds, look_heading_rad=look_heading_rad, look_at=look_at, live=live,
-        gamepad=gamepad, compliance=compliance, shadow=shadow, seed=seed, options=options,
-    ).carry_out()  # fmt: skip
+    if by not in {"blend", "cpg"}:
+        raise InputError(f"--by {by}: expected blend or cpg")
+    if seconds < _LEAST_S:
+        raise InputError(f"--seconds {seconds:g}: must be at least {_LEAST_S:g}")
+    with ExitStack() as stack:
+        observers = stack.enter_context(observers_of(options))
+        hands = open_hands(stack, live, gamepad, observers.page)
+        gait = prepare_gait(
+            name,
+            robot=robot,
+            world=world,
+            parameters=parameters(param),
+            seconds=seconds,
+            seed=seed,
+            look_heading_rad=look_heading_rad,
+            look_at_m=_point(look_at),
+            make_operator=None if hands is None else hands.operator,
+            then=[_change(text) for text in then or []],
+            by="cpg" if by == "cpg" else "blend",
+            keys=key_values("--set", set_),
+        )
+        prepared = replace(gait, run=with_compliance(gait.run, compliance))
+        if hands is not None:
+            hands.policy = prepared.run.safety.lost_observer
+        result = run_for_user(
+            prepared,
+            f"gait-{prepared.run.name}-{prepared.robot.name}",
+            options,
+            seconds=seconds,
+            motion_at=_names(prepared, hands),
+            observers=observers,
+            shadow=shadow,
+            stop_requested=None if hands is None else hands.torque_off,
+        )
+    show_result(result, _facts(prepared, result), options)
+
+
+def _facts(prepared: GaitRun, result: RunResult) -> dict[str, object]:
+    facts: dict[str, object] = {
+        "gait": prepared.config.name,
+        "robot": prepared.robot.name,
+        "world": prepared.world.name,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
+        "slowed_to": round(result.outcome.least_rate, 3),
+    }
+    if prepared.config.then:
+        facts["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
+    if (
+        prepared.make_operator is None
+        and not prepared.config.then
+        and prepared.config.by == "blend"
+    ):
+        displacement = result.travel.gait or gait_displacement(result.record)
+        facts |= {
+            "frequency_hz": round(displacement.frequency_hz, 3),
+            "cycles": displacement.cycles,
+        }
+        moved = {
+            "forward_body_lengths_cycle": _digits(displacement.forward_bl),
+            "left_body_lengths_cycle": _digits(displacement.left_bl),
+            "up_body_lengths_cycle": _digits(displacement.up_bl),
+            "turn_rad_cycle": _digits(displacement.turn_rad),
+            "speed_m_s": _digits(displacement.speed_m_s),
+        }
+        facts |= by_evidence(result, moved)
+    facts |= {
+        "electrical_energy_j": result.summary.electrical_energy_j,
+        **summarized(
+            result.summary, "electrical_cost_of_transport", "mechanical_cost_of_transport"
+        ),
+        "peak_current_a": result.summary.peak_current_a,
+        "peak_temperature_c": result.summary.peak_temperature_c,
+    }
+    return facts
+
+
+def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
+    name = prepared.run.name
+    if hands is not None:
+        return lambda gone_s: hands.gait or name
+    return lambda gone_s: [
+        name,
+        *(change.name for change in prepared.config.then if change.at_s <= gone_s),
+    ][-1]
+
+
+def _change(text: str) -> tuple[float, str, dict[str, Any]]:
+    what, *values = text.split(",")
+    name, at, seconds = what.rpartition("@")
+    try:
+        at_s = float(seconds)
+    except ValueError:
+        at = ""
+    if not at or not name:
+        raise InputError(f"--then {text}: expected NAME@SECONDS[,PARAM=VALUE...]")
+    return at_s, name, parameters(values)
+
+
+def _point(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"--look-at {text}: expected X,Y in metres") from None
+    return x, y
+
+
+def _digits(value: float) -> float | None:
+    return None if math.isnan(value) else round(value, 4)

@@ -13,11 +13,10 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
-from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
-from snakewalk.controller.run.carry_out import carry_out, watched_by
 from snakewalk.controller.run.factory import prepare_playback
-from snakewalk.controller.run.finish import show_run
+from snakewalk.controller.run.results import show_result
+from snakewalk.controller.run.run_for_user import run_for_user
 
 
 @command(
@@ -91,10 +90,9 @@ def play(
         topic=topic,
         episode=episode,
     )
-    bar = TimeBar(prepared.run.name, prepared.duration_s)
-    with watched_by(options) as watchers:
-        finished, folder = carry_out(prepared, f"play-{prepared.run.name}", bar, options, watchers)
-    result: dict[str, object] = {
+    name = f"play-{prepared.run.name}"
+    result = run_for_user(prepared, name, options, seconds=prepared.duration_s)
+    facts: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
@@ -102,11 +100,11 @@ def play(
         "scale": scale,
         "clipped": prepared.clipped,
         "notes": list(prepared.notes),
-        "duration_s": round(finished.outcome.duration_s, 2),
-        "tripped": finished.outcome.tripped,
-        "peak_current_a": finished.summary.peak_current_a,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
+        "peak_current_a": result.summary.peak_current_a,
     }
-    show_run(finished, folder, result, options.as_json, film=options.film)
+    show_result(result, facts, options)
 
 
 def _unit(text: str | None) -> str | None:

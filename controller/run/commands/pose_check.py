@@ -21,9 +21,9 @@ from snakewalk.controller.pose.sample import PoseFeed, PoseSample
 from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
 from snakewalk.controller.run.external.pose_check_page import PoseCheckPage, feed_words
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.observers import PAGE, open_observer
 from snakewalk.controller.run.pose_provider import pose_plugin
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.run.watchers import PAGE, open_observer
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.clock import Clock, WallClock
 

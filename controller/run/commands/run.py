@@ -1,9 +1,12 @@
 """``snakewalk run``: the main job, on servos or in the simulator."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from snakewalk.config.errors import InputError
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
@@ -19,9 +22,13 @@ from snakewalk.controller.console.options import (
     Shadow,
     TrackFile,
     World,
+    key_values,
 )
 from snakewalk.controller.console.run_options import RunOptions
-from snakewalk.controller.run.job import Job
+from snakewalk.controller.run.factory import changed, prepare_job, with_map
+from snakewalk.controller.run.results import by_evidence, check_look, show_result
+from snakewalk.controller.run.run_for_user import run_for_user
+from snakewalk.controller.run.run_keys import with_compliance
 
 
 @command(
@@ -81,9 +88,44 @@ def run(
 
     `--set run.behaviour.pulse_body_lengths_s=0.3` sets the speed of the walk.
     """
-    job = Job(
-        run=run, robot=robot, world=world, track=track, seed=seed, motion=motion, pose=pose,
-        map_source=map_, keys=set_, compliance=compliance, live=live, observe=observe,
-        shadow=shadow, options=options,
-    )  # fmt: skip
-    raise SystemExit(job.carry_out(look=look, accept_dead_reckoning=accept_dead_reckoning))
+    check_look(look)
+    if live and not (options.view or options.ros):
+        raise InputError("--live: waypoints come from the page or from ROS; add --view or --ros")
+    prepared = prepare_job(
+        run,
+        keys=key_values("--set", set_),
+        seed=seed,
+        motion=motion,
+        robot=robot,
+        world=world,
+        track=track,
+        pose=pose,
+    )
+    job = with_map(with_compliance(prepared.run, compliance), map_)
+    name = _name(job, robot, world, track)
+    result = run_for_user(
+        changed(prepared, run=job), name, options, observe=observe, live=live, shadow=shadow
+    )
+    outcome = result.outcome
+    facts = {
+        "run": name,
+        "waypoints": outcome.waypoints,
+        **by_evidence(result, {"waypoints_reached": outcome.reached}),
+        "duration_s": round(outcome.duration_s, 2),
+        "tripped": outcome.tripped,
+        "advance_alarms": outcome.alarms,
+        **result.pose.facts(),
+        **result.map.facts(),
+    }
+    show_result(result, facts, options, look=look, accept_dead_reckoning=accept_dead_reckoning)
+
+
+def _name(run: RunConfig, *replaced: str | None) -> str:
+    """Return the name of the result folder: the run and all that differs from its file."""
+    files = [Path(each).stem for each in replaced if each is not None]
+    parts = [run.name, *files, run.motion, f"seed{run.seed}"]
+    if run.pose is not None:
+        parts.append(f"pose-{run.pose.partition(':')[0]}")
+    if run.mapping is not None:
+        parts.append(f"map-{run.mapping.source}")
+    return "-".join(parts)

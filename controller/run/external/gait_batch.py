@@ -11,9 +11,9 @@ from pathlib import Path
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.kinematics.links import SpineLinks
-from snakewalk.controller.run.execute import motor_constants
 from snakewalk.controller.run.external.robot_batch import BatchRow, RobotBatch
 from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.servo_setup import motor_constants
 from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog

@@ -9,8 +9,9 @@ from PIL import Image
 
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.report.artifacts import make_artifacts
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 
 WIDTH, HEIGHT = 400, 225
 SHOWN_S = 5.0
@@ -24,7 +25,7 @@ def gallery(folder: Path, names: list[str]) -> None:
     for name in names:
         with TemporaryDirectory() as place:
             out = Path(place)
-            finished = execute(prepare_gait(name, seconds=RUN_S), out)
+            finished = run_robot(RunRequest(prepare_gait(name, seconds=RUN_S), out))
             made = make_artifacts(finished.record, out, finished.summary)
             if made.film is None:
                 raise SystemExit(f"{name}: no film: {' '.join(made.notes)}")

@@ -18,8 +18,9 @@ from snakewalk.controller.animals.mesh.body_skin import Cut, body_skin, fish_ski
 from snakewalk.controller.animals.mesh.skin_file import Y_UP
 from snakewalk.controller.images.mesh_files import read_mesh
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.types import BodyPose
 from tests.helpers.command import snakewalk
@@ -29,7 +30,7 @@ from tests.oracles.gltf_player import GltfPlayer
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
-    execute(prepare_gait("sidewinding", seconds=1.0), folder)
+    run_robot(RunRequest(prepare_gait("sidewinding", seconds=1.0), folder))
     return folder
 
 

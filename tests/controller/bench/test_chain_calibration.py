@@ -32,8 +32,9 @@ from snakewalk.controller.bench.homing_offset import (
     plan_homing,
 )
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -168,7 +169,9 @@ def test_a_chain_is_found_out_completely_and_then_walks(
     # the same servos, mounted as they are, under a run with the file that was found
     monkeypatch.setattr(Mounting, "of", staticmethod(lambda _: Mounting(*mounted(truth))))
     near = {"waypoints_m": ((1.0, 0.2),), "time_limit_s": 15.0}
-    finished = execute(prepare_walk("flat-square", robot=str(file), **near), tmp_path / "run")
+    finished = run_robot(
+        RunRequest(prepare_walk("flat-square", robot=str(file), **near), tmp_path / "run")
+    )
     assert finished.outcome.complete
     assert finished.summary.path_error_mean_m is not None
     assert finished.summary.path_error_mean_m < 0.1
@@ -183,7 +186,7 @@ def test_a_chain_that_was_found_out_walks_the_square(
     file = tmp_path / "found.toml"
     file.write_text(robot_toml(bench.calibrate().robot))
     monkeypatch.setattr(Mounting, "of", staticmethod(lambda _: Mounting(*mounted(bench.truth))))
-    finished = execute(prepare_walk("flat-square", robot=str(file)), tmp_path / "run")
+    finished = run_robot(RunRequest(prepare_walk("flat-square", robot=str(file)), tmp_path / "run"))
     assert (finished.outcome.reached, finished.outcome.missed) == (4, 0)
     assert finished.outcome.tripped is None
     assert finished.summary.path_error_mean_m is not None

@@ -17,8 +17,9 @@ from snakewalk.controller.bench import emergency_stop
 from snakewalk.controller.bench.emergency_stop import Stop, _read
 from snakewalk.controller.bench.torque_off import DYNAMIXEL_OFF, FEETECH_OFF
 from snakewalk.controller.cli.main import main
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.protocol.feetech import FeetechInstruction
@@ -234,7 +235,7 @@ def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
             other.append(command("stop", "--json"))
 
     job = prepare_gait("lateral-undulation", seconds=3600.0)
-    finished = execute(job, tmp_path / "run", on_progress=on_progress)
+    finished = run_robot(RunRequest(job, tmp_path / "run", on_progress=on_progress))
     said, _ = other[0].communicate()
     (stopped,) = json.loads(said)["stopped"]
     assert other[0].returncode == 0

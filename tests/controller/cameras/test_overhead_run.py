@@ -11,9 +11,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.device_camera import DeviceCamera
 from snakewalk.controller.cameras.overhead_camera import CameraModel
 from snakewalk.controller.kinematics.links import pose_at
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.clock import WallClock
@@ -52,7 +53,7 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
         waypoints_m=((0.9, 0.2),),
         time_limit_s=25.0,
     )
-    finished = execute(run, tmp_path)
+    finished = run_robot(RunRequest(run, tmp_path))
     assert finished.outcome.complete
     found = finished.pose.facts()
     assert found["waypoints_truly_reached"] == 1
@@ -69,7 +70,7 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("drawn")
 def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_path: Path) -> None:
     small = SMALL | {"centre_m": (-0.62, 0.0), "field_width_m": 1.4}
-    finished = execute(short(pose="camera", camera=small, time_limit_s=3.0), tmp_path)
+    finished = run_robot(RunRequest(short(pose="camera", camera=small, time_limit_s=3.0), tmp_path))
     events = [event.text for event in read_log(finished.log).events if event.kind == "camera"]
     assert "lost the body: cut by the edge of the image" in events[0]
     assert finished.pose.facts()["frames_used"] < finished.pose.facts()["frames"]
@@ -78,7 +79,7 @@ def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_pat
 @pytest.mark.usefixtures("drawn")
 def test_a_robot_out_of_view_at_its_start_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not seen whole at its start: nothing seen"):
-        execute(short(pose="camera", camera={"centre_m": (30.0, 0.0)}), tmp_path)
+        run_robot(RunRequest(short(pose="camera", camera={"centre_m": (30.0, 0.0)}), tmp_path))
 
 
 @pytest.mark.usefixtures("drawn")
@@ -100,7 +101,7 @@ def test_the_rendered_view_agrees_with_the_camera_model() -> None:
 
 
 def test_joints_alone_are_told_to_be_off(tmp_path: Path) -> None:
-    finished = execute(short(pose="joints", time_limit_s=3.0), tmp_path)
+    finished = run_robot(RunRequest(short(pose="joints", time_limit_s=3.0), tmp_path))
     assert float(str(finished.pose.facts()["head_error_rms_m"])) > 0.0
 
 
@@ -124,7 +125,7 @@ def test_what_cannot_work_is_refused_before_anything_is_written(
         )
         changes = changes | {"robot": str(tmp_path / robot)}
     with pytest.raises(InputError, match=line):
-        execute(short(**changes), tmp_path / "run", port=port)
+        run_robot(RunRequest(short(**changes), tmp_path / "run", port=port))
     assert not (tmp_path / "run").exists()
 
 

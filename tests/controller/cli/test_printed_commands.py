@@ -112,12 +112,12 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     from snakewalk.controller.console import pool
     from snakewalk.controller.repertoire import crowd_film, repertoire_recording
     from snakewalk.controller.report import artifacts
-    from snakewalk.controller.run import execute
+    from snakewalk.controller.run import run_robot
     from snakewalk.controller.run.kinds import walk_run
     from snakewalk.controller.studies import graph_study, trials
 
     now = Budget()
-    drive, make, run_study = execute.Drive, artifacts.make_artifacts, graph_study.run_study
+    drive, make, run_study = run_robot.Drive, artifacts.make_artifacts, graph_study.run_study
 
     def short_drive(**parts: Any) -> Any:
         now.was_cut = True
@@ -132,7 +132,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     def few_artifacts(record: Any, folder: Path, numbers: Any = None, **options: Any) -> Any:
         if numbers is None:  # of ``log report``
             return make(record, folder, numbers, **options)
-        execute.write_summary(numbers, folder)
+        run_robot.write_summary(numbers, folder)
         return artifacts.Artifacts(None, None, ())
 
     each = pool.each
@@ -141,7 +141,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
         return each(work, items[:1], **options)
 
     work_in_this_process(monkeypatch)
-    monkeypatch.setattr(execute, "Drive", short_drive)
+    monkeypatch.setattr(run_robot, "Drive", short_drive)
     monkeypatch.setattr(walk_run, "forecast", short_forecast)
     monkeypatch.setattr(artifacts, "make_artifacts", few_artifacts)
     monkeypatch.setattr(artifacts, "_draw", lambda record, made="": artifacts._Drawn([], "", made))

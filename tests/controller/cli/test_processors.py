@@ -22,10 +22,11 @@ except ImportError:  # numpy 1
 RUN = """
 import sys
 from pathlib import Path
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.run.factory import prepare_walk
 near = prepare_walk("jacksboro-traverse", waypoints_m=((0.6, 0.2),), time_limit_s=1.0)
-execute(near, Path(sys.argv[1]))
+run_robot(RunRequest(near, Path(sys.argv[1])))
 """
 COMMAND = """
 import sys

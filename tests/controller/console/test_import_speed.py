@@ -19,7 +19,7 @@ def test_a_gait_on_a_port_imports_no_simulator_and_no_walk() -> None:
     found = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     ).stdout.split()
-    assert "snakewalk.controller.run.execute" in found
+    assert "snakewalk.controller.run.run_robot" in found
     for unneeded in (
         "snakewalk.sim.line.sim_line",
         "snakewalk.sim.feetech.line",

@@ -27,9 +27,10 @@ from snakewalk.controller.console.result_files import (
     run_folder,
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.run.execute import execute
-from snakewalk.controller.run.finish import write_artifacts
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.results import write_artifacts
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.studies.tune import Tuned
@@ -132,10 +133,10 @@ def test_a_run_never_mixes_with_another(tmp_path: Path) -> None:
         (tmp_path / name).write_text("old")
     job = prepare_gait("lateral-undulation", seconds=0.2)
     with pytest.raises(InputError, match=r"holds a run \(log\.mcap, .*--force"):
-        execute(job, tmp_path)
+        run_robot(RunRequest(job, tmp_path))
     assert {path.read_text() for path in tmp_path.iterdir()} == {"old"}
     (tmp_path / "notes.txt").write_text("mine")
-    execute(job, tmp_path, force=True)
+    run_robot(RunRequest(job, tmp_path, overwrite=True))
     left = sorted(path.name for path in tmp_path.iterdir())
     assert left == ["log.mcap", "notes.txt", "summary.json"], "no film and page of the old run"
 
@@ -150,15 +151,15 @@ def test_force_does_not_touch_the_folder_of_a_run_under_way(tmp_path: Path) -> N
     def on_progress(progress: Progress) -> None:
         if not refused:
             with pytest.raises(InputError) as info:
-                execute(job, folder, force=True)
+                run_robot(RunRequest(job, folder, overwrite=True))
             refused.append(str(info.value))
 
-    finished = execute(job, folder, on_progress=on_progress)
+    finished = run_robot(RunRequest(job, folder, on_progress=on_progress))
     assert refused == [
         f"{folder}: another run uses this folder; give another --out, or wait for its end"
     ]
     assert finished.log.exists()
-    execute(job, folder, force=True)
+    run_robot(RunRequest(job, folder, overwrite=True))
 
 
 def test_runs_that_start_together_in_one_folder_are_told_apart(tmp_path: Path) -> None:
@@ -181,7 +182,7 @@ def test_report_and_film_of_a_run_that_is_made_anew_are_left_alone(
     tmp_path: Path,
 ) -> None:
     pytest.importorskip("mujoco")
-    finished = execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
+    finished = run_robot(RunRequest(prepare_gait("lateral-undulation", seconds=0.2), tmp_path))
     with locked_folder(tmp_path), pytest.raises(InputError, match="another run uses this folder"):
         write_artifacts(finished.record, tmp_path, film=False)
     assert not (tmp_path / "report.html").exists()
@@ -324,7 +325,7 @@ def test_a_full_disk_ends_a_run_and_says_what_became_of_torque_and_log(
 ) -> None:
     pytest.importorskip("mujoco")
     job = prepare_gait("lateral-undulation", seconds=2.0)  # what numba keeps is written by now
-    execute(job, tmp_path / "before")
+    run_robot(RunRequest(job, tmp_path / "before"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["snakewalk", "gait", "run", "lateral-undulation"])
     with full_disk(60_000), pytest.raises(SystemExit) as end:

@@ -15,9 +15,10 @@ from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.world import RandomGround, WorldConfig
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.mapping.stereo_head import StereoHead
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_walk, with_map
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.sim.physics.plant import MujocoPlant
 from tests.helpers.command import snakewalk
@@ -92,15 +93,15 @@ def test_the_body_is_not_taken_for_ground() -> None:
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+def finished(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     """Some seconds of a walk over hills that it does not know."""
     folder = tmp_path_factory.mktemp("unknown")
     often = MappingConfig(replan_bodies=0.3)
     walks = prepared(motion="serpenoid", time_limit_s=2.5, mapping=often, seed=1)
-    return execute(walks, folder, stoppable=False)
+    return run_robot(RunRequest(walks, folder, stoppable=False))
 
 
-def test_a_run_maps_as_it_goes_and_plans_on_what_it_knows(finished: Finished) -> None:
+def test_a_run_maps_as_it_goes_and_plans_on_what_it_knows(finished: RunResult) -> None:
     facts = finished.map.facts()
     assert facts["pictures"] >= 5
     assert facts["seen_m2"] > 1.0
@@ -116,7 +117,7 @@ def test_a_run_maps_as_it_goes_and_plans_on_what_it_knows(finished: Finished) ->
     assert all(np.hypot(*(point[:2] - path_m[0, :2])) < 0.5 for point in unknown)
 
 
-def test_the_map_of_a_run_is_left_in_its_folder(finished: Finished) -> None:
+def test_the_map_of_a_run_is_left_in_its_folder(finished: RunResult) -> None:
     held = read_map(finished.log.parent / "map.npz")
     assert held.known is not None
     seen_m2 = held.known.sum() * held.spacing_m**2
@@ -157,7 +158,7 @@ def test_what_cannot_map_is_refused(
     keys = {key: value for key, value in changes.items() if key not in parts}
     found = replace(found, run=found.run.model_copy(update=keys), **parts)
     with pytest.raises(InputError, match=message):
-        execute(found, tmp_path, stoppable=False)
+        run_robot(RunRequest(found, tmp_path, stoppable=False))
     assert not list(tmp_path.iterdir())
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import summary
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runtime.drive import Progress
 from tests.helpers.short_run import SHORT_RUN
@@ -32,7 +33,9 @@ def test_terminal_summary_and_report_agree(tmp_path: Path) -> None:
     file = tmp_path / "short.toml"
     file.write_text(SHORT_RUN, encoding="utf-8")
     shown: list[Progress] = []
-    finished = execute(prepare_job(str(file)), tmp_path / "out", on_progress=shown.append)
+    finished = run_robot(
+        RunRequest(prepare_job(str(file)), tmp_path / "out", on_progress=shown.append)
+    )
     record, numbers = finished.record, finished.summary
     assert record.torque_on_s > 0.05  # connecting takes a while, so the two zeros differ
     assert numbers.duration_s == pytest.approx(finished.outcome.duration_s, abs=1e-4)

@@ -122,7 +122,8 @@ def test_a_run_states_its_evidence(
         assert numbers["outcome"] == "believes it reached 1 of 1 (dead reckoning)"
         page = (folder / "report.html").read_text(encoding="utf-8")
         assert "fair outcome" in page
-        assert "believes it reached 1 of 1 waypoint" in page
+        assert "by dead reckoning" in page
+        assert "exit code 3: the arrival is dead-reckoned" in page
     record = read_log(folder / "log.mcap")
     assert record.header.pose_evidence.source == source
     claims = [event.text for event in record.events if event.kind in ("waypoint", "stop")]

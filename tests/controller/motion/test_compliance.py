@@ -13,7 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.run import RunConfig, SafetyConfig
 from snakewalk.controller.motion.compliance import Compliance, chatters
-from snakewalk.controller.run.execute import check_compliance
+from snakewalk.controller.run.servo_setup import check_compliance
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.vet import SafetyMemory, vet
 from snakewalk.drivers.types import JointCommand, JointState

@@ -10,8 +10,9 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.links import body_in_world, chain_angles_rad, pose_at
 from snakewalk.controller.motion.policy import PolicyWave, load_policy, save_policy
 from snakewalk.controller.motion.policy_motion import PolicyMotion
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_policy
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
@@ -31,8 +32,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="module")
-def finished(file: str, tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return execute(prepare_policy(file, seconds=3.0), tmp_path_factory.mktemp("run"))
+def finished(file: str, tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    return run_robot(RunRequest(prepare_policy(file, seconds=3.0), tmp_path_factory.mktemp("run")))
 
 
 def test_joints_stay_within_the_limits_whatever_is_observed() -> None:
@@ -50,7 +51,7 @@ def test_joints_stay_within_the_limits_whatever_is_observed() -> None:
 
 
 def test_a_run_sends_what_the_policy_says_to_what_was_measured(
-    finished: Finished, file: str
+    finished: RunResult, file: str
 ) -> None:
     record = finished.record
     goals, measured, pose = record.cycle.asked_rad, record.cycle.measured_rad, record.pose
@@ -68,7 +69,7 @@ def test_a_run_sends_what_the_policy_says_to_what_was_measured(
 
 def test_a_policy_runs_on_a_port(file: str, tmp_path: Path) -> None:
     with line_port(OpenedLine(ServoBank(range(1, 17)), BenchPlant(16))) as port:
-        served = execute(prepare_policy(file, seconds=1.0), tmp_path, port)
+        served = run_robot(RunRequest(prepare_policy(file, seconds=1.0), tmp_path, port))
     assert served.record.header.backend == port
     assert served.outcome.tripped is None
     assert np.abs(served.record.cycle.measured_rad).max() > 0.1

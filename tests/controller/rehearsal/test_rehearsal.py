@@ -15,9 +15,10 @@ from snakewalk.controller.rehearsal.commands import rehearse as rehearse_command
 from snakewalk.controller.rehearsal.judgement import judge, true_arrivals
 from snakewalk.controller.rehearsal.metric_errors import metric_errors
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.truth import Truth, read_truth
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.sim.plant import ServoDrive
@@ -25,7 +26,7 @@ from snakewalk.sim.serve.watched_plant import WatchedPlant
 from tests.helpers.command import snakewalk
 
 NOISY = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
-Rehearse = Callable[..., tuple[Finished, Truth, ServedRobot]]
+Rehearse = Callable[..., tuple[RunResult, Truth, ServedRobot]]
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
-    def run(tracker: TrackerConfig, name: str = "run") -> tuple[Finished, Truth, ServedRobot]:
+    def run(tracker: TrackerConfig, name: str = "run") -> tuple[RunResult, Truth, ServedRobot]:
         prepared = prepare_job(str(run_file), pose="udp:9870")
         truth = tmp_path / f"{name}.jsonl"
         served = ServedRobot(
@@ -56,7 +57,9 @@ def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
             truth,
         )
         with served:
-            finished = execute(prepared, tmp_path / name, SimulatedPort(served), stoppable=False)
+            finished = run_robot(
+                RunRequest(prepared, tmp_path / name, SimulatedPort(served), stoppable=False)
+            )
         return finished, read_truth(truth), served
 
     return run

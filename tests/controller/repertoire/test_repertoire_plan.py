@@ -24,8 +24,9 @@ from snakewalk.controller.repertoire.repertoire_planning import (
 from snakewalk.controller.repertoire.repertoire_run import RouteMotion
 from snakewalk.controller.repertoire.replay import replay
 from snakewalk.controller.repertoire.search import MotionPrimitives, plane_pose, search
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.types import BodyPose
 
 
@@ -107,7 +108,7 @@ def test_a_plan_reaches_its_waypoints_on_the_bus_though_each_action_misses_a_lit
     save_plan(job, tmp_path / "plan.json")
     loaded = load_plan(tmp_path / "plan.json")
     assert loaded.route.actions == job.route.actions
-    finished = execute(loaded, tmp_path)
+    finished = run_robot(RunRequest(loaded, tmp_path))
     outcome = finished.outcome
     assert outcome.complete
     assert isinstance(finished.source, RouteMotion)

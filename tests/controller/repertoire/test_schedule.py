@@ -11,8 +11,9 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.schedule_run import ScheduleMotion, read_schedule
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.types import BodyPose
 from tests.helpers.command import snakewalk
 
@@ -39,7 +40,7 @@ def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(
     keys = {"robot.link_length_m": 0.07 * size}
     prepared = prepare_schedule(file, WANTED, keys=keys)
     assert prepared.scale == pytest.approx(size)
-    finished = execute(prepared, tmp_path)
+    finished = run_robot(RunRequest(prepared, tmp_path))
     assert isinstance(finished.source, ScheduleMotion)
     names = [segment.name for segment in prepared.repertoire.segments]
     played = finished.source.played
@@ -147,7 +148,7 @@ def test_a_body_that_goes_backward_comes_to_rest_without_going_forward(
     wanted = ScheduleConfig(
         speed_m_s=((0.0, -0.4), (3.0, -0.4), (3.1, 0.0)), turn_rad_s=0.0, duration_s=7.0
     )
-    finished = execute(prepare_schedule(file, wanted), tmp_path)
+    finished = run_robot(RunRequest(prepare_schedule(file, wanted), tmp_path))
     names = {k: s.name for k, s in enumerate(prepare_schedule(file, wanted).repertoire.segments)}
     assert isinstance(finished.source, ScheduleMotion)
     assert {names[one.action] for one in finished.source.played} == {"reverse", "rest"}

@@ -19,6 +19,7 @@ from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.figures.path import body_outline_m
 from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report import artifacts
 from snakewalk.controller.report import page as page_module
 from snakewalk.controller.report.artifacts import build_report
@@ -119,7 +120,9 @@ def test_what_the_log_says_is_text_not_markup(record: RunRecord, tmp_path: Path)
     evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
     names = replace(summary(record), run="<script>alert(2)", robot="' onload='x")
     html = page(
-        *(names, [Section("<script>alert(3)", "' onload='x", "data:,' onload='x")]),
+        names,
+        verdict(record, names),
+        [Section("<script>alert(3)", "' onload='x", "data:,' onload='x")],
         film=film_on_page(_film(tmp_path), tmp_path),
         events=evil,
         config={"run": "</pre><script>"},

@@ -22,10 +22,12 @@ from snakewalk.controller.ros.command_codec import decode_command
 from snakewalk.controller.ros.ros_link import RosLink
 from snakewalk.controller.ros.ros_node import RobotNode, _make_node, _spinning
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_commanded, prepare_job
+from snakewalk.controller.run.observers import Observers
 from snakewalk.controller.run.prepared_run import PreparedRun
-from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
 from tests.helpers.ros_client import DOMAIN, Client
 
 pytestmark = pytest.mark.usefixtures("alone")
@@ -40,7 +42,7 @@ class Graph:
         self._end = RunEnd(ours)
         self.on_row = self._end.add
         self.node = _make_node(RosOptions(DOMAIN, **options))
-        self.robot = RobotNode(self.node, WatcherEnd(far), RosOptions(DOMAIN, **options))
+        self.robot = RobotNode(self.node, ObserverEnd(far), RosOptions(DOMAIN, **options))
         self.commands_of = RosLink.waypoint_commands
 
     def on_button(self, path: Path) -> None:
@@ -58,14 +60,18 @@ class Graph:
 
     def run(
         self, folder: Path, prepared: PreparedRun, script: Iterator[None], **more: Any
-    ) -> Finished:
+    ) -> RunResult:
         def on_progress(progress: object) -> None:
             self.robot.step(0.0)
             if next(script, self) is self:
                 self.stop()
 
         with _spinning(self.node, self.robot.commands.reject):
-            finished = execute(prepared, folder, view=self, on_progress=on_progress, **more)
+            finished = run_robot(
+                RunRequest(
+                    prepared, folder, observers=Observers(self), on_progress=on_progress, **more
+                )
+            )
             self._end.close(1.0)
             with suppress(EOFError):
                 while True:
@@ -88,7 +94,7 @@ def commanded(graph: Graph, **keys: Any) -> PreparedRun:
     )
 
 
-def texts(finished: Finished, kind: str) -> list[str]:
+def texts(finished: RunResult, kind: str) -> list[str]:
     return [event.text for event in finished.record.events if event.kind == kind]
 
 

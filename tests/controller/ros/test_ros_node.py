@@ -42,10 +42,12 @@ from snakewalk.controller.ros.ros_node import (
     serve,
 )
 from snakewalk.controller.ros.ros_options import RosOptions
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_commanded
+from snakewalk.controller.run.observers import Observers
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import PlanSummary
-from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
 from snakewalk.controller.runlog.topics import PathTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import Progress
@@ -69,7 +71,7 @@ class Graph:
         self._end = RunEnd(ours)
         self.on_row = self._end.add
         self.node = _make_node(self.options)
-        self.robot = RobotNode(self.node, WatcherEnd(far), self.options)
+        self.robot = RobotNode(self.node, ObserverEnd(far), self.options)
         self.cycles = 0
 
     def on_button(self, path: Path) -> None:
@@ -88,7 +90,7 @@ class Graph:
         robot: str = "yaw16",
         port: str | None = None,
         keys: dict[str, object] | None = None,
-    ) -> Finished:
+    ) -> RunResult:
         def on_progress(progress: Progress) -> None:
             self.cycles += 1
             self.robot.step(0.0)
@@ -102,7 +104,11 @@ class Graph:
             keys=keys,
         )
         with _spinning(self.node, self.robot.commands.reject):
-            finished = execute(prepared, folder, port, view=self, on_progress=on_progress)
+            finished = run_robot(
+                RunRequest(
+                    prepared, folder, port, observers=Observers(self), on_progress=on_progress
+                )
+            )
             self._end.close(1.0)
             with suppress(EOFError):
                 while True:

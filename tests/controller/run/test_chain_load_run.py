@@ -10,8 +10,9 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.run.servo_setup import _check_fuse
 from snakewalk.controller.runtime.derating import LEAST, Derating
 from snakewalk.drivers.types import JointState
@@ -19,7 +20,7 @@ from snakewalk.drivers.types import JointState
 
 def test_a_run_logs_and_reports_its_supply(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    finished = execute(prepare_gait("lateral-undulation", seconds=3.0), tmp_path)
+    finished = run_robot(RunRequest(prepare_gait("lateral-undulation", seconds=3.0), tmp_path))
     battery, summary = finished.record.battery, finished.summary.battery
     assert len(battery.time_s) >= 3
     assert np.diff(battery.time_s) == pytest.approx(np.ones(len(battery.time_s) - 1), abs=0.03)
@@ -35,7 +36,7 @@ def test_a_run_logs_and_reports_its_supply(tmp_path: Path) -> None:
 def test_a_run_slows_down_before_the_fuse(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     job = prepare_gait("lateral-undulation", seconds=3.0, keys={"robot.power.fuse_a": 0.9})
-    finished = execute(job, tmp_path)
+    finished = run_robot(RunRequest(job, tmp_path))
     assert finished.outcome.tripped is None
     assert finished.outcome.least_rate < 0.95
     (event,) = [each for each in finished.record.events if each.kind == "derating"][:1]

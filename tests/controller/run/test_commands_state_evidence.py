@@ -10,9 +10,10 @@ import pytest
 
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.metrics.travel import travel
-from snakewalk.controller.run import carry_out, execute, finish, job
-from snakewalk.controller.run.execute import Finished
-from snakewalk.controller.run.finish import Artifacts
+from snakewalk.controller.run import results, run_for_user
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.results import Artifacts
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.studies import sweep_measure, trials
 from snakewalk.controller.studies.run_comparison import compared_run
@@ -60,7 +61,7 @@ def check(numbers: Mapping[str, Any], evidence: PoseEvidence) -> None:
     assert numbers["pose_source"] == evidence.source
 
 
-def known_by(finished: Finished, evidence: PoseEvidence) -> Finished:
+def known_by(finished: RunResult, evidence: PoseEvidence) -> RunResult:
     """Return what a run leaves if its pose is known in this way."""
     header = dataclasses.replace(finished.record.header, pose_evidence=evidence)
     record = dataclasses.replace(finished.record, header=header)
@@ -73,8 +74,7 @@ def known_by(finished: Finished, evidence: PoseEvidence) -> Finished:
 def patched() -> Iterator[pytest.MonkeyPatch]:
     with pytest.MonkeyPatch.context() as patch:
         none = Artifacts(None, None, ())
-        for module in (finish, job):
-            patch.setattr(module, "write_artifacts", lambda *args, **options: none)
+        patch.setattr(results, "write_artifacts", lambda *args, **options: none)
         yield patch
 
 
@@ -90,16 +90,16 @@ def command(
     points = [f"{0.2 * k},{k},{p},{-0.05 * p},0" for k in range(8) for p in range(21)]
     text = "\n".join(["t,frame,point,x_m,y_m", *points])
     (folder / "still.csv").write_text(text, encoding="utf-8")
-    kept: list[Finished] = []
+    kept: list[RunResult] = []
     words = [str(folder / w) if (folder / w).exists() else w for w in COMMANDS[request.param]]
 
-    def once(*args: Any, **options: Any) -> Finished:
+    def once(request: RunRequest) -> RunResult:
         if not kept:
-            kept.append(execute.execute(*args, **options))
+            kept.append(run_robot(request))
         return known_by(kept[0], given[0])
 
     given: list[PoseEvidence] = [SIMULATED]
-    patched.setattr(carry_out, "execute", once)
+    patched.setattr(run_for_user, "run_robot", once)
 
     def said(evidence: PoseEvidence) -> Mapping[str, Any]:
         given[0] = evidence
@@ -118,20 +118,20 @@ def test_a_command_states_the_evidence_of_its_numbers(command: Run, evidence: Po
 
 
 @pytest.fixture(scope="module")
-def gait_run(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+def gait_run(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
     prepared = trials.prepare_case(
         trials.Case("lateral-undulation", "gait"), 0, 0.0, {"seconds": 5.0}
     )
-    return execute.execute(prepared, tmp_path_factory.mktemp("gait"), stoppable=False)
+    return run_robot(RunRequest(prepared, tmp_path_factory.mktemp("gait"), stoppable=False))
 
 
 @pytest.mark.parametrize("evidence", EVIDENCE, ids=lambda evidence: evidence.source)
 def test_a_study_states_the_evidence_of_its_numbers(
-    gait_run: Finished, evidence: PoseEvidence, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    gait_run: RunResult, evidence: PoseEvidence, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     finished = known_by(gait_run, evidence)
     for module in (sweep_measure, trials):
-        monkeypatch.setattr(module, "execute", lambda *args, **options: finished)
+        monkeypatch.setattr(module, "run_robot", lambda request: finished)
     trial = trials.run_trial(trials.Case("lateral-undulation", "gait"), 0, 0.0, {"seconds": 5.0})
     assert trial.cause == ""
     check({**dataclasses.asdict(trial), "peak_current_a": 0.0}, evidence)
@@ -148,7 +148,7 @@ def test_a_study_states_the_evidence_of_its_numbers(
 
 
 def test_a_sweep_computes_the_travel_of_a_point_once(
-    gait_run: Finished, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    gait_run: RunResult, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from snakewalk.controller.metrics import displacement
     from snakewalk.controller.metrics import travel as travels

@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 
 from snakewalk.config.faults import FaultPlan
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.external import simulated_bus
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_keys import with_compliance
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.trials import Case, prepare_case
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.sim.faults.fault_player import FaultPlayer
 
 
-def ran(folder: Path, *, compliance: bool | None, name: str = "pegs-undulation") -> Finished:
+def ran(folder: Path, *, compliance: bool | None, name: str = "pegs-undulation") -> RunResult:
     prepared = prepare_gait(name, seconds=6.0)
-    return execute(replace(prepared, run=with_compliance(prepared.run, compliance)), folder)
+    return run_robot(
+        RunRequest(replace(prepared, run=with_compliance(prepared.run, compliance)), folder)
+    )
 
 
 @pytest.mark.costs("a whole run")

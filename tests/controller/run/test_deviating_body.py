@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 
 
 def prepared(**told: float) -> GaitRun:
@@ -20,7 +21,7 @@ def prepared(**told: float) -> GaitRun:
 
 def current_a(folder: Path, **told: float) -> float:
     """Root mean square over a cycle and more."""
-    record = execute(prepared(**told), folder, stoppable=False).record
+    record = run_robot(RunRequest(prepared(**told), folder, stoppable=False)).record
     assert record.header.run.deviation.mass == told.get("mass", 1.0)  # so it can be replayed
     cycle = record.cycle
     return float(np.sqrt((cycle.current_a[cycle.time_s > cycle.time_s[0] + 1.5] ** 2).mean()))
@@ -39,5 +40,5 @@ def test_friction_of_a_heavier_body_takes_current_in_proportion(tmp_path: Path) 
 
 def test_a_robot_on_a_port_is_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="deviation: changes a simulated robot only"):
-        execute(prepared(mass=1.5), tmp_path / "run", port="/dev/nosuch")
+        run_robot(RunRequest(prepared(mass=1.5), tmp_path / "run", port="/dev/nosuch"))
     assert not (tmp_path / "run").exists()

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import RunSummary
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 
 
 def walked(folder: Path, run: str, **told: object) -> tuple[RunRecord, RunSummary]:
     """Its first seconds."""
     keys = {"run.time_limit_s": 12.0} | {f"run.{key}": value for key, value in told.items()}
-    finished = execute(prepare_job(run, keys=keys), folder, stoppable=False)
+    finished = run_robot(RunRequest(prepare_job(run, keys=keys), folder, stoppable=False))
     return finished.record, finished.summary
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import summary
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.gait_batch import run_together
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from tests.oracles.compiled_bodies import CompiledBodies
 
@@ -23,7 +24,7 @@ def test_robots_of_a_batch_move_as_robots_on_a_bus(tmp_path: Path) -> None:
     logs = [tmp_path / f"{number}.mcap" for number in range(len(runs))]
     outcomes = run_together(runs, logs, CompiledBodies)
     for number, (run, log, outcome) in enumerate(zip(runs, logs, outcomes, strict=True)):
-        alone = execute(run, tmp_path / f"{number}", stoppable=False)
+        alone = run_robot(RunRequest(run, tmp_path / f"{number}", stoppable=False))
         assert (outcome.tripped, outcome.least_rate) == (None, alone.outcome.least_rate)
         record = read_log(log)
         numbers = summary(record)

@@ -21,10 +21,11 @@ from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.motion.operator import Operator
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_run, prepare_walk
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.replay import differences, replay
 from tests.helpers.in_process import leave_out_pages
@@ -104,7 +105,7 @@ def test_bad_input_ends_with_code_2_and_one_line(
 @pytest.fixture(scope="module")
 def sidewound(tmp_path_factory: pytest.TempPathFactory):
     folder = tmp_path_factory.mktemp("side")
-    return execute(prepare_gait("sidewinding", seconds=9.0), folder)
+    return run_robot(RunRequest(prepare_gait("sidewinding", seconds=9.0), folder))
 
 
 def test_a_gait_runs_over_the_bus_without_clamp_or_miss_and_goes_its_way(sidewound) -> None:
@@ -145,7 +146,7 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
     run = prepared.run.model_copy(update={"safety": tight})
     said: list[str] = []
     job = GaitRun(run, prepared.robot, prepared.world)
-    finished = execute(job, tmp_path, on_event=lambda kind, text: said.append(text))
+    finished = run_robot(RunRequest(job, tmp_path, on_event=lambda kind, text: said.append(text)))
     assert finished.outcome.tripped is None
     assert finished.outcome.least_rate < 0.9
     assert any(text.startswith("slowing down: joint") for text in said)
@@ -157,7 +158,7 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
 @pytest.mark.costs("a command and its run")
 def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
     prepared = prepare_gait("lateral-undulation", seconds=6.0, look_heading_rad=0.3)
-    record = read_log(execute(prepared, tmp_path).log)
+    record = read_log(run_robot(RunRequest(prepared, tmp_path)).log)
     r = record.pose.rotation
     late = record.pose.time_s > record.pose.time_s[0] + 3.0
     heading = np.arctan2(r[late, 1, 0], r[late, 0, 0])[:-60]
@@ -178,7 +179,7 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
         seconds=6.0,
         make_operator=lambda m, r, on_event: Operator(m, r, keys, on_event),
     )
-    finished = execute(job, tmp_path, on_event=lambda kind, text: said.append(text))
+    finished = run_robot(RunRequest(job, tmp_path, on_event=lambda kind, text: said.append(text)))
     assert finished.summary.clamps == 0
     assert {"frequency_hz = 0.55", "mirror = True", "gait rolling"} <= set(said)
     kinds = [e.text for e in read_log(finished.log).events if e.kind == "operator"]

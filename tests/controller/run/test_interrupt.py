@@ -13,8 +13,9 @@ from pytest_mock import MockerFixture
 
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.metrics.summary import summary
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.chain.servo_chain import ServoChain
@@ -33,7 +34,7 @@ def after(cycles: int, stop: Callable[[], None]) -> Callable[[Progress], None]:
 
 def run(out: Path, stop: Callable[[], None]) -> None:
     job = prepare_gait("lateral-undulation", seconds=2.0)
-    execute(job, out, on_progress=after(20, stop))
+    run_robot(RunRequest(job, out, on_progress=after(20, stop)))
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -69,7 +70,9 @@ def test_a_torque_off_that_is_not_confirmed_says_what_tripped_and_where_the_log_
     mocker.patch.object(ServoChain, "disable", side_effect=kind("joint 3 is not confirmed"))
 
     def run_into_a_trip() -> None:
-        execute(job, tmp_path, stop_requested=lambda: reasons.pop() if reasons else "a hand")
+        run_robot(
+            RunRequest(job, tmp_path, stop_requested=lambda: reasons.pop() if reasons else "a hand")
+        )
 
     mocker.patch(
         "snakewalk.controller.cli.main._check_words",
@@ -93,9 +96,9 @@ def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(
     tmp_path: Path, mocker: MockerFixture
 ) -> None:
     pytest.importorskip("mujoco")
-    mocker.patch("snakewalk.controller.run.execute.summary", side_effect=KeyboardInterrupt)
+    mocker.patch("snakewalk.controller.run.run_robot.summary", side_effect=KeyboardInterrupt)
     with pytest.raises(KeyboardInterrupt) as stop:
-        execute(prepare_gait("lateral-undulation", seconds=0.2), tmp_path)
+        run_robot(RunRequest(prepare_gait("lateral-undulation", seconds=0.2), tmp_path))
     log = tmp_path / "log.mcap"
     assert stop.value.__notes__ == [
         "torque is off",
@@ -126,10 +129,10 @@ def test_the_command_line_prints_it(
 NOT_ON, OFF = "torque was not switched on", "torque is off"
 PHASES = {
     "plan": ("snakewalk.controller.run.kinds.gait_run.GaitRun.check_plan", NOT_ON, None),
-    "port": ("snakewalk.controller.run.execute._Execution._backend", NOT_ON, None),
+    "port": ("snakewalk.controller.run.run_robot._backend", NOT_ON, None),
     "log": ("snakewalk.controller.runlog.writer.Writer.start", NOT_ON, None),
     "header": ("snakewalk.controller.runlog.writer.RunLog.config", NOT_ON, None),
-    "shadow is made": ("snakewalk.controller.run.execute._shadow", NOT_ON, "log"),
+    "shadow is made": ("snakewalk.controller.run.run_robot._shadow", NOT_ON, "log"),
     "cycle": ("snakewalk.controller.console.progress.TimeBar.on_progress", OFF, "log"),
     "after the last cycle": (
         "snakewalk.drivers.safety.stop_button.StopButton.report_end",
@@ -141,10 +144,10 @@ PHASES = {
         OFF,
         "the run is whole",
     ),
-    "log is read": ("snakewalk.controller.run.execute.read_log", OFF, "the run is whole"),
+    "log is read": ("snakewalk.controller.run.run_robot.read_log", OFF, "the run is whole"),
     "report": ("snakewalk.controller.report.artifacts._draw", OFF, "the run is whole"),
     "film": ("snakewalk.controller.report.artifacts._film", OFF, "the run is whole"),
-    "result": ("snakewalk.controller.run.finish.show", OFF, "the run is whole"),
+    "result": ("snakewalk.controller.run.results.show", OFF, "the run is whole"),
 }
 """What a signal interrupts: the function called then, the state of torque, the name of the log."""
 

@@ -11,12 +11,12 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
-from snakewalk.controller.run.observer_watch import ObserverWatch
-from snakewalk.controller.run.watcher import WatcherProcess
-from snakewalk.controller.run.watchers import Watchers
-from snakewalk.controller.runlog.row_line import WatcherEnd
+from snakewalk.controller.run.observer_process import ObserverProcess
+from snakewalk.controller.run.observers import Observers
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.controller.runlog.row_line import ObserverEnd
 from snakewalk.controller.runtime.drive import Progress
 from tests.helpers.tiers import slow_after
 
@@ -40,7 +40,7 @@ class Observer:
     def on_picture(self, image: np.ndarray, time_s: float) -> None: ...
 
 
-def run(folder: Path, observer: Observer, policy: str, at_cycle: int = 20) -> tuple[Finished, int]:
+def run(folder: Path, observer: Observer, policy: str, at_cycle: int = 20) -> tuple[RunResult, int]:
     """A second of a gait, in which the observer is lost; returns the cycles that follow, too."""
     cycles = 0
 
@@ -51,11 +51,13 @@ def run(folder: Path, observer: Observer, policy: str, at_cycle: int = 20) -> tu
             observer.reason = "page: its process has ended"
             observer.faults = ["page: a command of 1.2 MB"] * 3
 
-    finished = execute(
-        prepare_gait("anguilliform", seconds=1.0, keys={"run.safety.lost_observer": policy}),
-        folder,
-        view=observer,
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepare_gait("anguilliform", seconds=1.0, keys={"run.safety.lost_observer": policy}),
+            folder,
+            observers=Observers(observer),
+            on_progress=on_progress,
+        )
     )
     return finished, cycles - at_cycle
 
@@ -83,15 +85,16 @@ def test_the_run_goes_on_with_a_warning_if_the_user_chose_so(
 
 
 def test_an_observer_without_an_e_stop_is_not_watched() -> None:
-    watch = ObserverWatch(None, "stop", lambda kind, text: None)
-    assert watch.stop_requested() is None
-    watch.report(0.0)
+    observers = Observers()
+    assert observers.stop_requested() is None
+    progressed: list[Progress] = []
+    assert observers.reporting(progressed.append) == progressed.append
 
 
 def serve(line: socket.socket) -> None:
     """An observer's process that asks for rows once a cycle and obeys two of them."""
     line.sendall(b'{"process": %d}\n' % os.getpid())
-    end = WatcherEnd(line)
+    end = ObserverEnd(line)
     end.ask()
     try:
         while True:
@@ -108,20 +111,20 @@ def serve(line: socket.socket) -> None:
 @pytest.mark.parametrize("name", slow_after(1, ["SIGKILL", "SIGSTOP"]))
 def test_a_process_that_is_killed_or_stopped_is_lost(name: str) -> None:
     now_s = 0.0
-    with WatcherProcess(serve, what="page", fault="page") as observer:
-        watchers = Watchers(observer, None)  # type: ignore[arg-type]
+    with ObserverProcess(serve, what="page", fault="page") as observer:
+        observers = Observers(observer, now_s=lambda: now_s)
 
         def cycle() -> str | None:
             nonlocal now_s
             now_s += 0.02
-            watchers.on_row("/cycle", b"{}")
-            watchers.on_row("/pose", b"{}")
-            return watchers.lost(now_s)
+            observers.on_row("/cycle", b"{}")
+            observers.on_row("/pose", b"{}")
+            return observers.lost()
 
         while observer._end._requests < 5:
             assert cycle() is None
             now_s -= 0.02  # as long as it takes
-        watchers.on_row("/event", json.dumps({"signal": name}).encode())
+        observers.on_row("/event", json.dumps({"signal": name}).encode())
         reason, began_s = None, now_s
         while reason is None:
             reason = cycle()

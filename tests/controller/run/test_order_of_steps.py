@@ -14,12 +14,14 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console.result_files import RUN_FILES
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.observers import Observers
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runtime.drive import Progress
-from snakewalk.drivers.safety.stop_button import StopButton
+from snakewalk.drivers.safety.stop_button import PressedButton
 from tests.helpers.calls import calls_of
 
 ORDER = (
@@ -31,8 +33,8 @@ ORDER = (
     "WalkRun.check_plan",
     "SimulatedPort.open",
     "Logger.warning",  # the pose is not measured
-    "clear_run",
     "StopButton.__init__",
+    "clear_run",
     "RunLog.__init__",
     "Observer.on_button",
     "RunLog.config",
@@ -63,6 +65,7 @@ class Observer:
     def __init__(self) -> None:
         self.reason: str | None = None
         self.rows = 0
+        self.button: Path | None = None
 
     def lost(self, now_s: float) -> str | None:
         return self.reason
@@ -75,6 +78,7 @@ class Observer:
 
     def on_button(self, path: Path) -> None:
         assert path.exists()
+        self.button = path
 
     def on_picture(self, image: np.ndarray, time_s: float) -> None: ...
 
@@ -88,14 +92,13 @@ def served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
 
 
 @pytest.mark.costs("a whole run")
-def test_a_run_keeps_the_order_of_its_steps(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+def test_a_run_keeps_the_order_of_its_steps(tmp_path: Path) -> None:
     prepared = prepare_job("flat-square", pose="joints", time_limit_s=0.2)
     with served(prepared, tmp_path) as port, calls_of(ORDER) as calls:
         observer = Observer()
-        execute(prepared, tmp_path / "run", port, view=observer, shadow=True)
+        run_robot(
+            RunRequest(prepared, tmp_path / "run", port, observers=Observers(observer), shadow=True)
+        )
     assert calls == list(ORDER)
     assert observer.rows > 0
 
@@ -105,16 +108,15 @@ def test_a_port_that_fails_leaves_the_files_of_the_folder(tmp_path: Path) -> Non
         (tmp_path / name).write_text("of an earlier run")
     prepared = prepare_gait("lateral-undulation", seconds=0.2)
     with pytest.raises(InputError, match="/dev/nosuch"):
-        execute(prepared, tmp_path, "/dev/nosuch", force=True)
+        run_robot(RunRequest(prepared, tmp_path, "/dev/nosuch", overwrite=True))
     assert all((tmp_path / name).read_text() == "of an earlier run" for name in RUN_FILES)
 
 
 @pytest.mark.parametrize("source", ["operator", "button", "observer"])
 def test_a_stop_is_asked_of_operator_button_and_observers_in_this_order(
-    source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    source: str, tmp_path: Path
 ) -> None:
     """All of them stop from the same cycle on; those before ``source`` do not."""
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     order = ("operator", "button", "observer")
     stopping = order[order.index(source) :]
     observer = Observer()
@@ -123,18 +125,22 @@ def test_a_stop_is_asked_of_operator_button_and_observers_in_this_order(
     def on_progress(progress: Progress) -> None:
         nonlocal is_due
         is_due = True
+        if "button" in stopping and observer.button is not None:
+            with PressedButton(observer.button) as button:
+                button.press("the button")
         observer.reason = "the observer" if "observer" in stopping else None
 
-    def reason(name: str) -> str | None:
-        return f"the {name}" if is_due and name in stopping else None
+    def stop_requested() -> str | None:
+        return "the operator" if is_due and "operator" in stopping else None
 
-    monkeypatch.setattr(StopButton, "pressed", lambda button: reason("button"))
     prepared = prepare_gait("lateral-undulation", seconds=0.2)
-    finished = execute(
-        prepared,
-        tmp_path / "run",
-        view=observer,
-        stop_requested=lambda: reason("operator"),
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepared,
+            tmp_path / "run",
+            observers=Observers(observer),
+            stop_requested=stop_requested,
+            on_progress=on_progress,
+        )
     )
-    assert (finished.outcome.tripped or "").startswith(f"the {source}")
+    assert f"the {source}" in (finished.outcome.tripped or "")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.mechanics.traction import quasi_static_gain
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 
 
 def test_the_gain_is_the_quasi_static_gain_of_the_shape() -> None:
@@ -32,7 +33,7 @@ def test_a_simulated_body_on_level_ground_comes_near_its_prediction_without_an_a
     prepared = prepare_walk(
         "flat-slalom", motion="serpenoid", waypoints_m=((2.0, 0.0),), time_limit_s=30.0
     )
-    finished = execute(prepared, tmp_path)
+    finished = run_robot(RunRequest(prepared, tmp_path))
     eta, predicted = finished.summary.eta, finished.summary.eta_predicted
     assert eta is not None
     assert predicted is not None

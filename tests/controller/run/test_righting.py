@@ -8,8 +8,9 @@ import pytest
 from pytest_mock import MockerFixture
 
 from snakewalk.controller.metrics.ground_contact import roll_rad
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
 from tests.helpers.tiers import slow_except
@@ -46,7 +47,7 @@ def test_a_body_on_its_back_turns_home_on_hills_and_says_so(
     mocker.patch.object(MujocoPlant, "head_pose", watched)
     robot, run = "alternating16-imu", "jacksboro-traverse"
     prepared = prepare_walk(run, seed=1, robot=robot, pose=pose, time_limit_s=SECONDS)
-    record = execute(prepared, tmp_path / "run").record
+    record = run_robot(RunRequest(prepared, tmp_path / "run")).record
     time_s, roll = np.array(rolls).T
     assert roll[0] > 2.5
     assert len(record.imu.time_s) == len(record.cycle.time_s)

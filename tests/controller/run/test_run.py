@@ -11,9 +11,10 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.console.options import DEFAULT_RUN
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 
 
@@ -24,7 +25,7 @@ def short(**changes: object) -> WalkRun:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory):
-    return execute(short(seed=4), tmp_path_factory.mktemp("run"))
+    return run_robot(RunRequest(short(seed=4), tmp_path_factory.mktemp("run")))
 
 
 def test_the_waypoint_is_reached_without_a_trip_or_a_missed_deadline(finished) -> None:
@@ -64,13 +65,13 @@ def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
     cores = sorted(os.sched_getaffinity(0))[:2] if hasattr(os, "sched_getaffinity") else [0, 1]
     for core in cores:
         with on_core(core):
-            again = execute(short(seed=4), tmp_path / f"core{core}")
+            again = run_robot(RunRequest(short(seed=4), tmp_path / f"core{core}"))
         assert again.log.read_bytes() == finished.log.read_bytes()
 
 
 @pytest.mark.costs("a whole run")
 def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:
-    other = execute(short(seed=5), tmp_path / "other")
+    other = run_robot(RunRequest(short(seed=5), tmp_path / "other"))
     sent = [read_log(f.log).cycle.sent_rad[200:500] for f in (finished, other)]
     assert not np.array_equal(*sent)
 
@@ -87,7 +88,7 @@ def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -
             super().__init__(like.run, like.robot, like.world.model_copy(update={"friction": same}))
             self.__dict__["gain"] = like.gain
 
-    finished = execute(Slippery(prepared), tmp_path)
+    finished = run_robot(RunRequest(Slippery(prepared), tmp_path))
     assert finished.outcome.reached == 0
     assert finished.outcome.alarms > 0
     kinds = [event.kind for event in read_log(finished.log).events]
@@ -96,7 +97,7 @@ def test_isotropic_ground_sounds_the_alarm_for_missing_advance(tmp_path: Path) -
 
 def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="/dev/nosuch"):
-        execute(short(motion="serpenoid"), tmp_path / "run", port="/dev/nosuch")
+        run_robot(RunRequest(short(motion="serpenoid"), tmp_path / "run", port="/dev/nosuch"))
     assert not (tmp_path / "run").exists()
 
 
@@ -104,7 +105,7 @@ def test_a_port_that_is_not_there_is_refused_before_anything_is_written(tmp_path
 def test_the_default_job_starts_over_the_hills(tmp_path: Path) -> None:
     prepared = prepare_walk(DEFAULT_RUN, time_limit_s=4.0)
     assert prepared.ground is not None
-    finished = execute(prepared, tmp_path)
+    finished = run_robot(RunRequest(prepared, tmp_path))
     assert finished.outcome.tripped is None
     record = read_log(finished.log)
     pitch = list(prepared.robot.pitch_joints)

@@ -12,10 +12,11 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_robot, with_keys
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.run import backend
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external import simulated_backend
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.errors import BusError, PortError
 from snakewalk.drivers.port import network_port
@@ -75,7 +76,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 def test_a_gait_runs_over_two_ports(bench: Bench, tmp_path: Path) -> None:
     port = f"1-8={bench.paths[0]},9-16={bench.paths[1]}"
     gait = prepare_gait("lateral-undulation", seconds=1.0)
-    finished = execute(gait, tmp_path, port, stoppable=False)
+    finished = run_robot(RunRequest(gait, tmp_path, port, stoppable=False))
     assert finished.outcome.tripped is None
     assert finished.outcome.duration_s > 1.0
     assert bench.torque_on() == [False, False]
@@ -195,12 +196,12 @@ def test_a_walk_goes_on_with_some_servos_real_and_the_others_simulated(
     bench.lines[1].taps.append(tap)
     walk = prepare_walk("flat-square", robot="yaw16", keys={"run.time_limit_s": 6.0})
     port = f"1-8=sim,9-16={bench.paths[1]}"
-    finished = execute(walk, tmp_path, port, stoppable=False)
+    finished = run_robot(RunRequest(walk, tmp_path, port, stoppable=False))
     assert finished.outcome.tripped is None
     record = finished.record
     assert record.header.backend == port
     # the body walks: as far as one whose servos are all simulated, at its head
-    whole = execute(walk, tmp_path / "whole", stoppable=False).record
+    whole = run_robot(RunRequest(walk, tmp_path / "whole", stoppable=False)).record
     ways_m = [
         np.linalg.norm(np.diff(each.pose.head_m[[0, -1], :2], axis=0)) for each in (record, whole)
     ]
@@ -226,7 +227,7 @@ def test_a_real_servo_that_dies_stops_the_simulated_ones_as_well(
     gait = prepare_gait("lateral-undulation", seconds=3.0)
     name = f"joint yaw_12 (ID 12 on {bench.paths[1]})"
     with pytest.raises(BusError, match="torque off is not confirmed") as silent:
-        execute(gait, tmp_path, f"1-8=sim,9-16={bench.paths[1]}", stoppable=False)
+        run_robot(RunRequest(gait, tmp_path, f"1-8=sim,9-16={bench.paths[1]}", stoppable=False))
     assert str(silent.value).startswith(name)  # and nobody else: the simulated ones confirm it
     trips = [each.text for each in read_log(tmp_path / "log.mcap").events if each.kind == "trip"]
     assert [each.startswith(f"{name}: not read for 0.1") for each in trips] == [True]

@@ -16,8 +16,9 @@ from snakewalk.controller.kinematics.links import BodyView, body_in_world
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.report.artifacts import build_report
-from snakewalk.controller.run.execute import Finished, execute
 from snakewalk.controller.run.factory import prepare_run, prepare_source, prepare_walk
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.replay import differences, replay
 from snakewalk.drivers.types import BodyPose
@@ -92,11 +93,11 @@ class Jump(Bend):
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    return execute(prepare_source(Bend, name="bend"), tmp_path_factory.mktemp("run"))
+def finished(tmp_path_factory: pytest.TempPathFactory) -> RunResult:
+    return run_robot(RunRequest(prepare_source(Bend, name="bend"), tmp_path_factory.mktemp("run")))
 
 
-def test_the_goals_in_the_log_are_those_of_the_source(finished: Finished) -> None:
+def test_the_goals_in_the_log_are_those_of_the_source(finished: RunResult) -> None:
     record, robot = finished.record, finished.record.header.robot
     head = BodyPose(0.0, np.zeros(3), np.eye(3))
     alone, expected = Bend(robot), []
@@ -109,7 +110,7 @@ def test_the_goals_in_the_log_are_those_of_the_source(finished: Finished) -> Non
     assert np.abs(record.cycle.measured_rad[:, 7]).max() == pytest.approx(0.6, abs=0.05)
 
 
-def test_the_run_ends_when_the_source_is_done(finished: Finished) -> None:
+def test_the_run_ends_when_the_source_is_done(finished: RunResult) -> None:
     assert finished.outcome.tripped is None
     assert finished.record.events[-1].text == "torque off; the motion came to its end"
     assert finished.summary.motion == "source"
@@ -117,7 +118,7 @@ def test_the_run_ends_when_the_source_is_done(finished: Finished) -> None:
 
 
 def test_a_run_lasts_no_longer_than_asked(tmp_path: Path) -> None:
-    cut = execute(prepare_source(Bend, seconds=0.5), tmp_path)
+    cut = run_robot(RunRequest(prepare_source(Bend, seconds=0.5), tmp_path))
     assert cut.record.events[-1].text == "torque off; the motion was cut off"
     assert cut.outcome.duration_s == pytest.approx(0.8, abs=0.05)  # and 0.3 s before the motion
 
@@ -143,7 +144,7 @@ def test_what_breaks_a_limit_is_refused_before_torque(
     make: Callable[[RobotConfig], MotionSource], fault: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=fault):
-        execute(prepare_source(make), tmp_path / "run")
+        run_robot(RunRequest(prepare_source(make), tmp_path / "run"))
     assert not (tmp_path / "run").exists()
 
 
@@ -177,14 +178,14 @@ def test_a_motion_of_the_library_passes_as_a_source() -> None:
     prepare_source(lambda robot: GaitMotion(gait, robot), seconds=4.0).check_plan()
 
 
-def test_report_and_replay_need_the_log_alone(finished: Finished, tmp_path: Path) -> None:
+def test_report_and_replay_need_the_log_alone(finished: RunResult, tmp_path: Path) -> None:
     again = finished.log.parent / "again.mcap"
     assert build_report(finished.record, tmp_path).stat().st_size > 10_000
     replayed = read_log(replay(finished.record, again))
     assert differences(finished.record, replayed, 0.0, 0.0).identical
 
 
-def test_a_run_is_not_made_again_from_its_log(finished: Finished) -> None:
+def test_a_run_is_not_made_again_from_its_log(finished: RunResult) -> None:
     header = finished.record.header
     with pytest.raises(
         InputError, match=r"its motion was the user's own.*snakewalk log replay LOG"
@@ -201,13 +202,13 @@ def test_no_walk_is_prepared_of_another_motion(motion: str) -> None:
 
 def test_a_run_on_a_port_is_replayed(tmp_path: Path) -> None:
     with line_port(OpenedLine(ServoBank(range(1, 17)), BenchPlant(16))) as port:
-        served = execute(prepare_source(Bend, seconds=0.4), tmp_path, port)
+        served = run_robot(RunRequest(prepare_source(Bend, seconds=0.4), tmp_path, port))
     assert served.record.header.backend == port
     assert served.record.header.initial_pose is None
     replay(served.record, tmp_path / "again.mcap")
 
 
-def test_actions_run_on_a_port_are_replayed(finished: Finished, tmp_path: Path) -> None:
+def test_actions_run_on_a_port_are_replayed(finished: RunResult, tmp_path: Path) -> None:
     fields = {"motion": "repertoire", "waypoints_m": ((1.0, 0.0),)}
     run = finished.record.header.run.model_copy(update=fields)
     header = replace(finished.record.header, run=run, initial_pose=None)

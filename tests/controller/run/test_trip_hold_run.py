@@ -7,9 +7,10 @@ import pytest
 from pytest_mock import MockerFixture
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.drivers.errors import BusError
@@ -31,7 +32,7 @@ def test_an_interrupted_run_holds_and_then_ends(tmp_path: Path) -> None:
             signal.raise_signal(signal.SIGINT)
 
     job = prepare_gait("lateral-undulation", seconds=2.0, keys=KEYS)
-    finished = execute(job, tmp_path, on_progress=interrupt_once)
+    finished = run_robot(RunRequest(job, tmp_path, on_progress=interrupt_once))
     assert finished.outcome.tripped == INTERRUPTED
     record = read_log(tmp_path / "log.mcap")
     (trip,) = [each for each in record.events if each.kind == "trip"]
@@ -68,7 +69,7 @@ def test_the_stop_output_of_a_simulated_run_opens_its_supply(
     keys = {"run.safety.stop_output": "rts:/dev/nowhere"}
     job = prepare_gait("lateral-undulation", seconds=0.5, keys=keys)
     with pytest.raises(BusError) as raised:
-        execute(job, tmp_path)
+        run_robot(RunRequest(job, tmp_path))
     assert cut.call_count == 1
     assert any("stop output simulated supply: activated" in x for x in raised.value.__notes__)
     log = read_log(tmp_path / "log.mcap")

@@ -12,10 +12,11 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run import backend
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.served_robot import simulated_line
 from snakewalk.controller.run.external.simulated_bus import SimulatedBus
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import DriverError
@@ -41,7 +42,7 @@ def robot_file(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=3.0)
-    finished = execute(gait, tmp_path / "run", stoppable=False)
+    finished = run_robot(RunRequest(gait, tmp_path / "run", stoppable=False))
     assert finished.outcome.tripped is None
     record = finished.record
     assert [each.port for each in record.header.robot.ports] == ["/dev/ttyUSB0", "/dev/ttyUSB1"]
@@ -115,7 +116,7 @@ def ports(robot_file: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Ports]:
 @pytest.mark.costs("a run on two ports")
 def test_a_gait_runs_on_both_ports(ports: Ports, robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=1.0)
-    finished = execute(gait, tmp_path / "run", "robot", stoppable=False)
+    finished = run_robot(RunRequest(gait, tmp_path / "run", "robot", stoppable=False))
     assert finished.outcome.tripped is None
     for line in ports.lines:
         line.settle()
@@ -131,7 +132,7 @@ def test_a_servo_that_dies_stops_the_run_on_both_ports(
     FaultPlayer(ports.lines[silent > 4], checked(FaultPlan, dies, "faults"))
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=3.0)
     with pytest.raises(DriverError, match="torque off is not confirmed"):
-        execute(gait, tmp_path / "run", "robot", stoppable=False)
+        run_robot(RunRequest(gait, tmp_path / "run", "robot", stoppable=False))
     log = read_log(tmp_path / "run" / "log.mcap")
     (trip,) = [each.text for each in log.events if each.kind == "trip"]
     assert f"(ID {silent} on /dev/ttyUSB{int(silent > 4)}): not read for" in trip

@@ -5,14 +5,14 @@ import socket
 
 import pytest
 
-from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
 
 CYCLE = b'{"k":%d,"values":"' + b"1.234567," * 800 + b'"}'
 
 
-def ends() -> tuple[RunEnd, WatcherEnd, socket.socket]:
+def ends() -> tuple[RunEnd, ObserverEnd, socket.socket]:
     ours, far = socket.socketpair()
-    return RunEnd(ours), WatcherEnd(far), far
+    return RunEnd(ours), ObserverEnd(far), far
 
 
 def cycle(run: RunEnd, k: int) -> None:

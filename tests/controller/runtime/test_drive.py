@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runtime import drive
 
 
@@ -19,7 +20,11 @@ def test_a_garbage_collection_in_motion_goes_over_what_the_run_itself_has_made(
     before = len(gc.get_objects())
     met: list[int] = []
     try:
-        execute(prepared, tmp_path, on_progress=lambda progress: met.append(len(gc.get_objects())))
+        run_robot(
+            RunRequest(
+                prepared, tmp_path, on_progress=lambda progress: met.append(len(gc.get_objects()))
+            )
+        )
         assert len(met) > 20
         assert max(met) < before / 4
         assert gc.get_freeze_count() == 0
@@ -39,7 +44,7 @@ def test_a_process_of_many_runs_does_not_grow(
     objects = []
     try:
         for number in range(6):
-            execute(prepared, tmp_path / str(number))
+            run_robot(RunRequest(prepared, tmp_path / str(number)))
             objects.append(len(gc.get_objects()))
     finally:
         gc.freeze()

@@ -10,8 +10,9 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.replay import differences, replay
@@ -24,7 +25,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     prepared = prepare_walk(
         "flat-square", motion="serpenoid", waypoints_m=((3.0, 0.0),), time_limit_s=4
     )
-    return execute(prepared, tmp_path_factory.mktemp("run")).log
+    return run_robot(RunRequest(prepared, tmp_path_factory.mktemp("run"))).log
 
 
 @pytest.fixture(scope="module")

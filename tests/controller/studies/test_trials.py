@@ -58,7 +58,7 @@ def test_a_run_that_raises_is_a_row_as_well(monkeypatch: pytest.MonkeyPatch) -> 
     def fails(*_: object, **__: object) -> None:
         raise ZeroDivisionError("by zero")
 
-    monkeypatch.setattr(study, "execute", fails)
+    monkeypatch.setattr(study, "run_robot", fails)
     trial = study.run_trial(FLAT, 7, 0.04, {})
     assert (trial.seed, trial.complete, trial.cause) == (7, False, "error")
     assert trial.why == "ZeroDivisionError: by zero"

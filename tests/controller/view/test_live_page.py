@@ -25,13 +25,15 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.command import Refused
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.hands import Hands
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.observers import Observers
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.row_line import RunEnd, WatcherEnd
+from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.command_line import fresh_commands
@@ -107,7 +109,7 @@ class View:
         server, self.url = open_page("127.0.0.1", 0, stop, freshness=freshness)
         self.gamepad = BrowserGamepad(lambda: self.now_s)
         self.dead_man = DeadMan(lambda: self.now_s)
-        self.page = _LivePage(server, WatcherEnd(far), self.gamepad, stop, freshness)
+        self.page = _LivePage(server, ObserverEnd(far), self.gamepad, stop, freshness)
 
     def on_row(self, topic: str, row: bytes) -> None:
         LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
@@ -149,11 +151,13 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
             assert np.ptp(view.page._scene._body.batched_positions, axis=0).max() > 0.5
             view.page._stop.pressed()
 
-    finished = execute(
-        prepare_gait("lateral-undulation", seconds=10.0),
-        tmp_path / "run",
-        view=view,
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepare_gait("lateral-undulation", seconds=10.0),
+            tmp_path / "run",
+            observers=Observers(view),
+            on_progress=on_progress,
+        )
     )
     view.page.step()
     view.page._server.stop()
@@ -181,12 +185,14 @@ def test_what_is_set_in_the_page_changes_the_gait(
             moved_by_a_browser(panel, "frequency_hz", 0.3)
             panel._inputs["frequency_hz"].value = 0.3
 
-    finished = execute(
-        prepare_gait("lateral-undulation", seconds=1.0, make_operator=hands.operator),
-        tmp_path / "run",
-        view=view,
-        stop_requested=hands.torque_off,
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepare_gait("lateral-undulation", seconds=1.0, make_operator=hands.operator),
+            tmp_path / "run",
+            observers=Observers(view),
+            stop_requested=hands.torque_off,
+            on_progress=on_progress,
+        )
     )
     view.page._server.stop()
     said = [event.text for event in finished.record.events if event.kind == "operator"]
@@ -218,12 +224,14 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
             assert view.page._gamepad_panel is not None
             texts.append(view.page._gamepad_panel._shown)
 
-    finished = execute(
-        prepare_gait("lateral-undulation", seconds=10.0, make_operator=hands.operator),
-        tmp_path / "run",
-        view=view,
-        stop_requested=hands.torque_off,
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepare_gait("lateral-undulation", seconds=10.0, make_operator=hands.operator),
+            tmp_path / "run",
+            observers=Observers(view),
+            stop_requested=hands.torque_off,
+            on_progress=on_progress,
+        )
     )
     view.page._server.stop()
     assert finished.outcome.tripped == "stop requested by E-STOP of a gamepad"
@@ -278,12 +286,14 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
             assert "no waypoint is left: it holds" in panel._text.content
             panel._commanding("end")(None)
 
-    finished = execute(
-        prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),)),
-        tmp_path / "run",
-        view=view,
-        waypoint_commands=view.pressed,
-        on_progress=on_progress,
+    finished = run_robot(
+        RunRequest(
+            prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),)),
+            tmp_path / "run",
+            observers=Observers(view),
+            waypoint_commands=view.pressed,
+            on_progress=on_progress,
+        )
     )
     view.page._server.stop()
     assert finished.outcome.complete
@@ -305,12 +315,14 @@ def test_on_servos_it_is_the_same(
     robot = str(tmp_path / "quartet.toml")
     commands = [["next=1,0.3"], ["waypoint=99,0"], *[[]] * 5, ["end"]]
     said: list[tuple[str, str]] = []
-    finished = execute(
-        prepare_walk("flat-slalom", motion="serpenoid", robot=robot, keys=PATIENT),
-        tmp_path / "run",
-        servo_bus("1-4").path,
-        waypoint_commands=lambda: commands.pop(0) if commands else [],
-        on_event=lambda kind, text: said.append((kind, text)),
+    finished = run_robot(
+        RunRequest(
+            prepare_walk("flat-slalom", motion="serpenoid", robot=robot, keys=PATIENT),
+            tmp_path / "run",
+            servo_bus("1-4").path,
+            waypoint_commands=lambda: commands.pop(0) if commands else [],
+            on_event=lambda kind, text: said.append((kind, text)),
+        )
     )
     assert [kind for kind, _ in said] == ["operator", "refused", "operator"]
     assert finished.outcome.tripped is None

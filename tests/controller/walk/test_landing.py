@@ -10,8 +10,9 @@ from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.walk.landing import Landing
 
 ROBOT = load_robot("salamander")
@@ -68,7 +69,9 @@ def test_a_run_swims_to_the_beach_and_walks_over_it(tmp_path: Path) -> None:
         job, run=job.run.model_copy(update={"start_m": (-0.9, 0.0), "waypoints_m": ((0.1, 0.0),)})
     )
     told: list[tuple[str, str]] = []
-    finished = execute(job, tmp_path, on_event=lambda kind, text: told.append((kind, text)))
+    finished = run_robot(
+        RunRequest(job, tmp_path, on_event=lambda kind, text: told.append((kind, text)))
+    )
     assert finished.outcome.complete
     assert finished.outcome.missed == 0
     assert [kind for kind, _ in told].count("ashore") == 1

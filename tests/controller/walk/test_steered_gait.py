@@ -11,9 +11,10 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.metrics.failure import failure
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.factory import prepare_job, prepare_run, prepare_walk
 from snakewalk.controller.run.kinds.steered_run import SteeredRun
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.steered_gait import CYCLES_PER_BODY, TURN_LIMIT, SteeredGait
@@ -81,7 +82,7 @@ def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path)
     job = prepare_job("salamander-square", keys={"run.waypoint_radius_m": 0.25})
     near = job.run.model_copy(update={"waypoints_m": ((0.4, 0.1), (0.7, 0.35))})
     job = replace(job, run=near)
-    finished = execute(job, tmp_path)
+    finished = run_robot(RunRequest(job, tmp_path))
     assert finished.outcome.complete
     assert finished.outcome.missed == 0
     record = finished.record
@@ -94,7 +95,7 @@ def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path)
 
 def test_a_run_out_of_time_is_told_by_its_way_not_by_a_pulse(tmp_path: Path) -> None:
     job = prepare_job("salamander-square", keys={"run.time_limit_s": 8.0})
-    ended = failure(execute(job, tmp_path).record)
+    ended = failure(run_robot(RunRequest(job, tmp_path)).record)
     assert ended is not None
     assert ended.cause == "time"
 

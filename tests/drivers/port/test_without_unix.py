@@ -24,7 +24,8 @@ for name in ("getuid", "sched_setscheduler", "setpriority", "O_NOFOLLOW", "O_CLO
     delattr(os, name)
 os.environ["USERNAME"] = "somebody"
 from snakewalk.controller.cli.main import main
-from snakewalk.controller.run.execute import execute
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.drivers.safety.stop_button import StopButton, stoppable_runs
 
@@ -43,7 +44,7 @@ with StopButton("mine") as button:
     other.close()
 print(list(stoppable_runs()))
 run, table = sys.argv[1:]
-execute(prepare_gait("lateral-undulation", seconds=0.2), Path(run))
+run_robot(RunRequest(prepare_gait("lateral-undulation", seconds=0.2), Path(run)))
 print("export", command("export", run + "/log.mcap", "--csv", table))
 print("port", command("scan", "--port", "/dev/null"))
 print("serve", command("bus", "serve"))

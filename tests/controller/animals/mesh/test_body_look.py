@@ -15,7 +15,7 @@ from snakewalk.controller.animals.mesh.body_look import skin_look
 from snakewalk.controller.animals.mesh.body_motion import from_poses, robot_skin
 from snakewalk.controller.animals.mesh.body_skin import body_skin
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
-from snakewalk.controller.run.film_look import check_look, film_look
+from snakewalk.controller.run.results import check_look, film_look
 from snakewalk.sim.rendering.looks import dressed_model
 
 

@@ -13,8 +13,9 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.run import execute
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.identification.friction_fit import (
@@ -38,7 +39,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     world = prepared.world.model_copy(update={"friction": friction})
     folder = tmp_path_factory.mktemp("run") / "planted"
     short = replace(prepared, robot=robot, run=run, world=world)
-    return execute.execute(short, folder, stoppable=False).log
+    return run_robot(RunRequest(short, folder, stoppable=False)).log
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +128,9 @@ def lifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
     robot = RobotConfig(name="short", joint_axes="ypypyp", link_mass_kg=0.13)
     run = prepared.run.model_copy(update={"physics_step_s": 0.005, "cycle_hz": 25.0})
     folder = tmp_path_factory.mktemp("run") / "lifting"
-    return execute.execute(replace(prepared, robot=robot, run=run), folder, stoppable=False).log
+    return run_robot(
+        RunRequest(replace(prepared, robot=robot, run=run), folder, stoppable=False)
+    ).log
 
 
 @pytest.mark.slow

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.run import execute
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.external import simulated_backend
 from snakewalk.controller.run.external.simulated_backend import simulated
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, RunShadow, ShadowAlarm
 from snakewalk.drivers.types import JointCommand, JointState
 from tests.controller.studies.shadow.test_run_shadow import short_run
@@ -72,7 +73,9 @@ def alarms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Alarms:
             return replace(made, chain=BusyChain(made, seed, host_s, line_s))  # type: ignore[arg-type]
 
         monkeypatch.setattr(simulated_backend, "simulated", busy)
-        finished = execute.execute(short_run(8.0), tmp_path / "run", shadow=True, stoppable=False)
+        finished = run_robot(
+            RunRequest(short_run(8.0), tmp_path / "run", shadow=True, stoppable=False)
+        )
         assert finished.outcome.tripped is None
         return [event.text for event in finished.record.events if event.kind == "shadow"]
 

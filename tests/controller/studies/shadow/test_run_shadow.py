@@ -17,10 +17,11 @@ from snakewalk.controller.bench.emergency_stop import StopOutcome, runs_of, stop
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.result_files import SUMMARY
 from snakewalk.controller.metrics.comparison import compare
-from snakewalk.controller.run import execute
 from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.external import simulated_backend
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.shadow.diagnosis import MOST_S, goals_of
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, RunShadow
 
@@ -40,12 +41,14 @@ def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     weaker = partial(simulated_backend.simulated, deviation=weak)
     monkeypatch.setattr(simulated_backend, "simulated", weaker)
     told: list[tuple[str, str]] = []
-    finished = execute.execute(
-        short_run(4.0),
-        tmp_path / "run",
-        shadow=True,
-        stoppable=False,
-        on_event=lambda kind, text: told.append((kind, text)),
+    finished = run_robot(
+        RunRequest(
+            short_run(4.0),
+            tmp_path / "run",
+            shadow=True,
+            stoppable=False,
+            on_event=lambda kind, text: told.append((kind, text)),
+        )
     )
     record = finished.record
     np.testing.assert_array_equal(record.shadow.time_s, record.cycle.time_s)
@@ -75,7 +78,7 @@ def test_a_stop_during_the_diagnosis_learns_that_the_run_has_ended(
         stopped.extend(stop_runs(runs_of(), "test"))
 
     monkeypatch.setattr(RunShadow, "end", diagnose)
-    execute.execute(short_run(0.5), tmp_path / "run", shadow=True)
+    run_robot(RunRequest(short_run(0.5), tmp_path / "run", shadow=True))
     ((how, text, safe),) = [(each.how, each.text, each.safe) for each in stopped]
     assert (how, text, safe) == ("latched", "it had come to its end", True)
     assert runs_of() == []
@@ -83,7 +86,9 @@ def test_a_stop_during_the_diagnosis_learns_that_the_run_has_ended(
 
 @pytest.mark.costs("half a minute of a run with its shadow")
 def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) -> None:
-    finished = execute.execute(short_run(30.0), tmp_path / "run", shadow=True, stoppable=False)
+    finished = run_robot(
+        RunRequest(short_run(30.0), tmp_path / "run", shadow=True, stoppable=False)
+    )
     record = finished.record
     assert record.cycle.time_s[-1] - record.cycle.time_s[0] > 30.0
     assert len(record.shadow.time_s) == len(record.cycle.time_s)
@@ -99,7 +104,9 @@ def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) ->
 
 def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Path) -> None:
     runs = [
-        execute.execute(short_run(1.0), tmp_path / name, shadow=shadow, stoppable=False).record
+        run_robot(
+            RunRequest(short_run(1.0), tmp_path / name, shadow=shadow, stoppable=False)
+        ).record
         for name, shadow in (("with", True), ("without", False))
     ]
     beside = runs[0].shadow
@@ -112,5 +119,5 @@ def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Pa
 def test_ground_on_which_a_shadow_means_nothing_is_refused(tmp_path: Path) -> None:
     prepared = replace(short_run(1.0), world=load_world("ramp-10"))
     with pytest.raises(InputError, match="a shadow needs a level floor without obstacles"):
-        execute.execute(prepared, tmp_path / "run", shadow=True, stoppable=False)
+        run_robot(RunRequest(prepared, tmp_path / "run", shadow=True, stoppable=False))
     assert not (tmp_path / "run").exists()

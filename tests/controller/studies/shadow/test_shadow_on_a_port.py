@@ -13,8 +13,9 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_world
 from snakewalk.controller.run import backend
 from snakewalk.controller.run.backend import Backend
-from snakewalk.controller.run.execute import execute
 from snakewalk.controller.run.external.simulated_backend import simulated
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.shadow import shadow
 from snakewalk.controller.studies.shadow.run_shadow import ALARM_A, ALARM_RAD
 from snakewalk.drivers.errors import PortError
@@ -57,7 +58,9 @@ class Bench:
         prepared = short_run(seconds)
         limits = prepared.run.safety.model_copy(update=safety)
         prepared = replace(prepared, run=prepared.run.model_copy(update={"safety": limits}))
-        return execute(prepared, folder, self.server.path, shadow=True, stoppable=False)
+        return run_robot(
+            RunRequest(prepared, folder, self.server.path, shadow=True, stoppable=False)
+        )
 
 
 @pytest.fixture

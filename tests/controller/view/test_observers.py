@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakewalk.controller.run.watchers import Watchers, watched
+from snakewalk.controller.run.observers import Observers, open_observers
 
 
 class Taker:
@@ -23,7 +23,7 @@ class Taker:
 
 def test_both_get_every_row_and_the_button() -> None:
     page, node = Taker(), Taker()
-    both = Watchers(page, node)  # type: ignore[arg-type]
+    both = Observers(node, page=page)  # type: ignore[arg-type]
     both.on_button(Path("b"))
     both.on_row("/pose", b"{}")
     both.on_picture(np.zeros((1, 1, 3), np.uint8), 0.5)
@@ -31,5 +31,5 @@ def test_both_get_every_row_and_the_button() -> None:
 
 
 def test_nobody_looks_on_unless_asked() -> None:
-    with watched(False, "nowhere", False) as watchers:
-        assert watchers is None
+    with open_observers(False, "nowhere", False) as observers:
+        assert not observers

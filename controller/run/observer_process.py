@@ -17,8 +17,8 @@ _START_S: Final = 60.0
 _END_S: Final = 2.0
 
 
-class WatcherProcess:
-    """A watcher in a process of its own, as a context manager.
+class ObserverProcess:
+    """An observer in a process of its own, as a context manager.
 
     Raises:
         InputError: it did not start; with the reason.
@@ -32,7 +32,7 @@ class WatcherProcess:
             serve: a function of a module; sends one line of JSON when it is ready, with ``fault``
                 if it cannot be, and ends when the line does.
             options: options that can be pickled.
-            what: name of the watcher in messages.
+            what: name of the observer in messages.
             fault: beginning of the sentence that says what could not be started.
 
         """
@@ -87,5 +87,5 @@ class WatcherProcess:
         """Let a picture go by."""
 
     def on_button(self, path: Path) -> None:
-        """Store the run's stop button for the watcher."""
+        """Store the run's stop button for the observer."""
         self._end.add(BUTTON, json.dumps({"path": str(path)}).encode())

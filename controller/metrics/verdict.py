@@ -1,0 +1,129 @@
+"""Verdict on a run: one sentence, how it is known, exit code, cause, and the next command."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Final
+
+from snakewalk.controller.metrics.failure import failure
+from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.runlog.record import RunRecord
+
+NOT_MEASURED: Final = 3
+"""Exit code of a run that ended as planned, but whose arrival nothing measured."""
+_MISSED: Final = 1
+"""Exit code of a run that safety stopped, or that missed a waypoint."""
+_SIMULATED: Final = "sim"
+_ADVICE: Final = {
+    "roll": "snakewalk plan {run}",
+    "climb": "snakewalk plan {run}",
+    "time": "snakewalk plan {run}",
+    "joint": "snakewalk log shadow {log}",
+    "slip": "snakewalk log shadow {log}",
+    "steering": "snakewalk log report {log}",
+}
+"""Command that shows more of a cause."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunVerdict:
+    """How a run ended, as every result states it."""
+
+    sentence: str
+    """Waypoints or distance, error of the path, duration."""
+    evidence: str
+    """How the sentence is known: ``simulated``, ``measured (udp)``, ``dead-reckoned (joints)``."""
+    exit_code: int
+    """0: as planned; 1: safety stopped it, or a waypoint was missed; 3: as planned, but nothing
+    measured the arrival."""
+    cause: str | None
+    """Why the exit code is not 0; None if it is."""
+    next_command: str | None
+    """Command that shows more of the cause; None without one."""
+
+    def accepted(self, dead_reckoning: bool) -> "RunVerdict":
+        """Return the verdict if a user accepts a dead-reckoned arrival."""
+        if not dead_reckoning or self.exit_code != NOT_MEASURED:
+            return self
+        return RunVerdict(self.sentence, self.evidence, 0, None, None)
+
+    @property
+    def explanation(self) -> str:
+        """Exit code, cause and next command in a line; empty for 0."""
+        if not self.exit_code:
+            return ""
+        more = "" if self.next_command is None else f"; more: {self.next_command}"
+        return f"exit code {self.exit_code}: {self.cause}{more}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys and values for JSON."""
+        return asdict(self)
+
+
+def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> RunVerdict:
+    """Return the verdict on a run, from its log alone.
+
+    Args:
+        record: the log.
+        numbers: its summary.
+        log: name of the log in the next command.
+
+    """
+    exit_code, cause, more = _judged(record, numbers)
+    next_command = more.format(run=numbers.run, log=log, port=numbers.backend) or None
+    return RunVerdict(_sentence(numbers), _evidence(numbers), exit_code, cause, next_command)
+
+
+def _judged(record: RunRecord, numbers: RunSummary) -> tuple[int, str | None, str]:
+    """Return the exit code, the cause, and the form of the next command."""
+    if numbers.trip is not None:
+        on_port = numbers.backend != _SIMULATED
+        more = "snakewalk doctor --port {port}" if on_port else "snakewalk log report {log}"
+        return _MISSED, f"stopped by safety: {numbers.trip}", more
+    if _reached(numbers) < numbers.waypoints:
+        found = failure(record)
+        cause = "a waypoint was missed" if found is None else found.text
+        return _MISSED, cause, "" if found is None else _ADVICE.get(found.cause, "")
+    if numbers.waypoints and not numbers.is_measured:
+        return (
+            NOT_MEASURED,
+            "the arrival is dead-reckoned, nothing measured the pose; give a pose source with "
+            "--pose, or accept it with --accept-dead-reckoning",
+            "",
+        )
+    return 0, None, ""
+
+
+def _reached(numbers: RunSummary) -> int:
+    measured = numbers.waypoints_reached
+    return (numbers.dead_reckoned_waypoints_reached if measured is None else measured) or 0
+
+
+def _sentence(numbers: RunSummary) -> str:
+    """Return the sentence; numbers that nothing measured are marked."""
+    is_measured = numbers.is_measured
+    error_m = numbers.path_error_mean_m if is_measured else numbers.dead_reckoned_path_error_mean_m
+    travelled_m = numbers.travelled_m if is_measured else numbers.dead_reckoned_travelled_m
+    parts = []
+    if numbers.waypoints:
+        noun = "waypoint" if numbers.waypoints == 1 else "waypoints"
+        parts.append(f"{_reached(numbers)} of {numbers.waypoints} {noun}")
+        if error_m is not None:
+            parts.append(f"{100.0 * error_m:.1f} cm from its path")
+    elif travelled_m is not None:
+        parts.append(f"moved {travelled_m:.2f} m")
+    if numbers.duration_s is not None:
+        parts.append(f"{numbers.duration_s:.1f} s")
+    if not is_measured:
+        parts.append("by dead reckoning")
+    if numbers.trip is not None:
+        parts.insert(0, "stopped by safety")
+    elif numbers.outcome.startswith("interrupted"):
+        parts.insert(0, "interrupted")
+    return ", ".join(parts)
+
+
+def _evidence(numbers: RunSummary) -> str:
+    if numbers.pose_source == "simulator":
+        return "simulated"
+    is_simulated = numbers.pose_is_simulated or numbers.port_is_pseudo_terminal
+    source = f"{numbers.pose_source}, simulated" if is_simulated else numbers.pose_source
+    return f"{numbers.pose_evidence} ({source})"

@@ -1,0 +1,189 @@
+"""Results of a run: report, film, and the answer of its command."""
+
+import platform
+import shlex
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Protocol
+
+from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.options import show
+from snakewalk.controller.console.plugins import find, require
+from snakewalk.controller.console.result_files import SUMMARY, locked_folder
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.console.shared_text import without_folders
+from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.metrics.verdict import RunVerdict
+from snakewalk.controller.run.request import RunResult
+from snakewalk.controller.runlog.record import Header, RunRecord
+
+if TYPE_CHECKING:
+    from snakewalk.sim.rendering.looks import SkinLook
+
+SERVOS: Final = "servos"
+"""Look of the body in a film: a capsule per link."""
+ANIMAL: Final = "animal"
+"""The animal of the run's recording."""
+_BODY: Final = "body"
+"""Plug-in of all other looks: names and files of bodies."""
+
+
+class LookPlugin(Protocol):
+    """A look, as a plug-in provides it."""
+
+    def check(self, look: str) -> None:
+        """Reject an impossible look before a run."""
+        ...
+
+    def make(self, look: str, header: Header) -> "SkinLook":
+        """Return the skin of a run's film."""
+        ...
+
+
+def check_look(look: str) -> None:
+    """Reject an impossible look before a run.
+
+    Raises:
+        InputError: the look does not exist, or an extra is missing.
+
+    """
+    if look != SERVOS:
+        _look_plugin(look).check(look)
+
+
+def film_look(look: str, header: Header) -> "SkinLook | None":
+    """Return the skin of a run's film; None is a capsule per link.
+
+    Raises:
+        InputError: the look does not exist, or an extra is missing.
+
+    """
+    return None if look == SERVOS else _look_plugin(look).make(look, header)
+
+
+def _look_plugin(look: str) -> LookPlugin:
+    found = find("look", look) or find("look", _BODY) or require("look", look, "--look", [SERVOS])
+    made: LookPlugin = found.load()()
+    return made
+
+
+@dataclass(frozen=True, slots=True)
+class Artifacts:
+    """Files of a run next to its log; ``notes`` has the reasons for missing ones."""
+
+    report: Path | None
+    film: Path | None
+    notes: tuple[str, ...]
+    """One line each."""
+
+    def to_dict(self) -> dict[str, str | None]:
+        """Names of the files, for a command's answer."""
+        return {
+            "report": None if self.report is None else str(self.report),
+            "film": None if self.film is None else str(self.film),
+        }
+
+
+def _what_made_it(folders: bool) -> str:
+    given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
+    words = shlex.join(["snakewalk", *given])
+    when = datetime.now().astimezone().isoformat(" ", "seconds")
+    return f"Made by {words} on {platform.node()} ({platform.machine()}), {when}."
+
+
+def write_artifacts(
+    record: RunRecord,
+    folder: Path,
+    numbers: RunSummary | None = None,
+    *,
+    film: bool,
+    fine: bool = False,
+    look: str = "servos",
+    folders: bool = False,
+) -> Artifacts:
+    """Make report and film of a run; print on standard error why a file is missing.
+
+    ``folders`` shows the folders of the user's files in the report.
+
+    Raises:
+        InputError: another run uses the folder.
+
+    """
+    what = _what_made_it(folders)
+    folder.mkdir(parents=True, exist_ok=True)
+    with locked_folder(folder):
+        made: Artifacts = require("results", "report", "--film").load()(
+            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
+        )
+    for line in made.notes:
+        LOGGER.warning("%s", line)
+    return made
+
+
+def show_result(
+    result: RunResult,
+    facts: Mapping[str, object],
+    options: RunOptions,
+    *,
+    look: str = SERVOS,
+    accept_dead_reckoning: bool = False,
+) -> None:
+    """Make report and film, and print facts and files.
+
+    Raises:
+        SystemExit: with the exit code of the run if it is not 0.
+
+    """
+    found = result.verdict.accepted(accept_dead_reckoning)
+    with result.ending.noted():
+        artifacts = write_artifacts(
+            result.record, result.folder, result.summary, film=options.film, look=look
+        )
+        _show(result, found, facts, artifacts, options.as_json)
+    if found.exit_code:
+        raise SystemExit(found.exit_code)
+
+
+def _show(
+    result: RunResult,
+    found: RunVerdict,
+    facts: Mapping[str, object],
+    artifacts: Artifacts,
+    as_json: bool,
+) -> None:
+    """Print facts, files and verdict; the last line of a table is the verdict."""
+    names = {"log": str(result.log), "summary": str(result.folder / SUMMARY)}
+    files = {**names, **artifacts.to_dict()}
+    if as_json:
+        stated = {"verdict": found.sentence, "cause": found.cause, "exit_code": found.exit_code}
+        stated["next_command"] = found.next_command
+        show({**facts, **stated, **result.summary.evidence, **files}, True)
+    else:
+        own = {key: value for key, value in facts.items() if key not in result.summary.evidence}
+        show({**own, "pose": found.evidence, **files}, False)
+    if found.explanation:
+        LOGGER.warning("%s", found.explanation)
+    if not as_json:
+        shown = artifacts.report or result.log
+        print(f"{found.sentence}; {'report' if artifacts.report else 'log'}: {shown}")
+
+
+def by_evidence(result: RunResult, values: Mapping[str, object]) -> dict[str, object]:
+    """Return values that need a measured pose, and its evidence.
+
+    Otherwise they are None, each with a counterpart ``dead_reckoned_*``.
+    """
+    numbers = result.summary
+    if numbers.is_measured:
+        return {**values, **numbers.evidence}
+    believed = {f"dead_reckoned_{key}": value for key, value in values.items()}
+    return {**dict.fromkeys(values), **believed, **numbers.evidence}
+
+
+def summarized(numbers: RunSummary, *keys: str) -> dict[str, object]:
+    """Return numbers that need a measured pose, or their ``dead_reckoned_*``."""
+    believed = () if numbers.is_measured else tuple(f"dead_reckoned_{key}" for key in keys)
+    return {key: getattr(numbers, key) for key in (*keys, *believed)}

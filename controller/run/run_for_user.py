@@ -1,0 +1,87 @@
+"""A run of a command: result folder, bar, pace, observers, and the question whether to go on."""
+
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+
+import typer
+
+from snakewalk.controller.console.progress import PathBar, TimeBar, in_real_time
+from snakewalk.controller.console.result_files import run_folder
+from snakewalk.controller.console.run_options import RunOptions
+from snakewalk.controller.run.kinds.path_run import PathRun
+from snakewalk.controller.run.observers import Observers, open_observers
+from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.request import RunRequest, RunResult
+from snakewalk.controller.run.run_robot import run_robot
+
+
+def observers_of(
+    options: RunOptions, observe: Sequence[str] | None = None, *, live: bool = False
+) -> AbstractContextManager[Observers]:
+    """Open the observers that the options name, and ``observe``: ``NAME[:ARGUMENT]``."""
+    return open_observers(options.view, options.view_at, options.ros, observe, live=live)
+
+
+def run_for_user(
+    prepared: PreparedRun,
+    name: str,
+    options: RunOptions,
+    *,
+    seconds: float | None = None,
+    motion_at: Callable[[float], str] | None = None,
+    observers: Observers | None = None,
+    observe: Sequence[str] | None = None,
+    live: bool = False,
+    shadow: bool = False,
+    stop_requested: Callable[[], str | None] | None = None,
+) -> RunResult:
+    """Run with a progress bar; an observed or operated simulation runs in real time.
+
+    Args:
+        prepared: the motion.
+        name: of the folder below ``runs``, without ``--out``.
+        options: of the command.
+        seconds: duration that the bar shows; default: the path, or the time limit.
+        motion_at: name of the motion at an elapsed time in s, for the bar.
+        observers: opened ones; default: those that the options and ``observe`` name.
+        observe: ``NAME[:ARGUMENT]`` of plug-ins.
+        live: whether page and ROS node command the waypoints.
+        shadow: whether a simulated chain follows the same goals.
+        stop_requested: asks an operator, who also has the terminal.
+
+    Raises:
+        InputError: as ``run_robot``; or the folder cannot be made.
+
+    """
+    bar: PathBar | TimeBar
+    if isinstance(prepared, PathRun) and seconds is None:
+        bar = PathBar(prepared.path.length_m)
+    else:
+        bar = TimeBar(prepared.run.name, seconds or prepared.run.time_limit_s, motion_at)
+    opened = nullcontext(observers) if observers else observers_of(options, observe, live=live)
+    with opened as watching, run_folder(name, options.out) as folder, bar:
+        if live and watching.page is not None:
+            watching.page.on_course()
+        is_paced = (watching or stop_requested is not None) and not options.port
+        can_ask = stop_requested is None and sys.stdin.isatty()
+        return run_robot(
+            RunRequest(
+                prepared,
+                folder,
+                options.port,
+                overwrite=options.force,
+                shadow=shadow,
+                observers=watching,
+                confirm=_confirm if can_ask else None,
+                stop_requested=stop_requested or (lambda: None),
+                waypoint_commands=watching.waypoint_commands if live else None,
+                on_progress=in_real_time(bar.on_progress) if is_paced else bar.on_progress,
+                on_event=bar.on_event,
+            )
+        )
+
+
+def _confirm(found: str) -> bool:
+    """Ask whether an interrupted chain may continue; the servos hold meanwhile."""
+    return typer.confirm(f"{found}; go on?", err=True)
