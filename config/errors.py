@@ -16,6 +16,11 @@ class InputError(Exception):
         super().__init__("\n".join(self.faults))
 
 
+def first_line(error: Exception) -> str:
+    """Return the first line of an error's text, or its type if it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
 class ConfigError(InputError):
     """A configuration file is missing, is not TOML, or breaks its schema."""
 

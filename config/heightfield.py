@@ -54,6 +54,15 @@ class HeightField:
         self.z_m.setflags(write=False)
 
     @property
+    def axes_m(self) -> tuple[Floats, Floats]:
+        """Places of the samples: x (columns,) and y (rows,)."""
+        rows, columns = self.z_m.shape
+        return (
+            self.x0_m + np.arange(columns, dtype=np.float64) * self.spacing_m,
+            self.y0_m + np.arange(rows, dtype=np.float64) * self.spacing_m,
+        )
+
+    @property
     def size_m(self) -> tuple[float, float]:
         """Extent in x and in y, m."""
         rows, columns = self.z_m.shape

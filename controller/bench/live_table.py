@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Final
 
 from rich.console import Group
@@ -55,12 +54,7 @@ class LiveScreen:
     def __enter__(self) -> "LiveScreen":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self._line.close()
         self._process.join(_END_S)
         if self._process.is_alive():

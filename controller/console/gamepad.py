@@ -8,7 +8,6 @@ import os
 import stat
 import struct
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 from snakewalk.config.errors import InputError
@@ -86,12 +85,7 @@ class Gamepad:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         os.close(self._file)
 
     def pressed(self) -> list[str]:

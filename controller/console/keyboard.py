@@ -3,7 +3,6 @@
 import os
 import select
 import sys
-from types import TracebackType
 from typing import Self
 
 from snakewalk.config.errors import InputError
@@ -63,12 +62,7 @@ class Keyboard:
         tty.setcbreak(self._file)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
 
     def pressed(self) -> list[str]:

@@ -5,7 +5,6 @@ import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Final, Self
 
 from snakewalk.config.archive import read_text
@@ -80,12 +79,7 @@ class CsvTable:
         )
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Close; delete a table without rows."""
         empty = self._file.tell() == 0
         self._file.close()

@@ -22,11 +22,8 @@ def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
         figure = Figure(figsize=(wide_in, tall_in), layout="constrained", dpi=110)
         axes = figure.subplots(1, 1)
         draw_ground(axes, ground)
-        rows, columns = ground.z_m.shape
-        x = ground.x0_m + np.arange(columns) * ground.spacing_m
-        y = ground.y0_m + np.arange(rows) * ground.spacing_m
-        at = np.meshgrid(x, y)
-        known = np.ones((rows, columns), bool) if ground.known is None else ground.known
+        at = np.meshgrid(*ground.axes_m)
+        known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
         safe = relief.safe(*at)
         marks = [Patch(facecolor=BLUE, alpha=0.35, label="safe for a path")]
         if safe.any():

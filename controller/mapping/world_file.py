@@ -58,8 +58,7 @@ class MapWorld:
         """Extent, holes, share of safe ground, and the most open place."""
         ground = self.ground
         rows, columns = ground.z_m.shape
-        x = ground.x0_m + np.arange(columns) * ground.spacing_m
-        y = ground.y0_m + np.arange(rows) * ground.spacing_m
+        x, y = ground.axes_m
         safe = self.relief.safe(*np.meshgrid(x, y))
         room = np.asarray(distance_transform_edt(np.pad(safe, 1)))[1:-1, 1:-1]
         row, column = np.unravel_index(int(room.argmax()), room.shape)

@@ -22,9 +22,7 @@ from snakewalk.controller.mechanics.rigid_motion import LANES, link_table
 from snakewalk.controller.mechanics.rollout_kernel import (
     ALONG,
     COLUMNS,
-    END_OFF,
     HALF,
-    HEAD_OFF,
     HEADING,
     OFF_PATH,
     PASSED,
@@ -110,16 +108,6 @@ class Rolled:
     def off_path_m(self) -> Floats:
         """(C,) root mean square distance of the centre from the path."""
         return self.columns[:, OFF_PATH]
-
-    @property
-    def end_off_m(self) -> Floats:
-        """(C,) final signed distance of the centre from the path, positive to its left."""
-        return self.columns[:, END_OFF]
-
-    @property
-    def head_off_m(self) -> Floats:
-        """(C,) final signed distance of the head link."""
-        return self.columns[:, HEAD_OFF]
 
     @property
     def heading_rad(self) -> Floats:

@@ -5,7 +5,7 @@ It is built from points, triangles or rasters, and gives a height field for plan
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal, Self, get_args
+from typing import Final, Literal, Self
 
 import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
@@ -263,7 +263,3 @@ def _rasterise(vertices: Floats, faces: Ints, z_m: Floats) -> None:
                 if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9:
                     z = az + v * (bz - az) + w * (cz - az)
                     z_m[row, column] = max(z_m[row, column], z)
-
-
-CELL_HEIGHTS: Final = get_args(CellHeight)
-"""Choices of a cell's height."""

@@ -71,9 +71,7 @@ def _is_joined(relief: Relief, risk: Floats, margin_m: float, points_m: Floats) 
     Samples within ``margin_m`` of the border do not count.
     """
     ground = relief.ground
-    rows, columns = risk.shape
-    x = ground.x0_m + np.arange(columns) * ground.spacing_m
-    y = ground.y0_m + np.arange(rows) * ground.spacing_m
+    x, y = ground.axes_m
     w, h = ground.size_m
     inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x)[None, :] >= margin_m - 1e-9
     inside = inside & (np.minimum(y - ground.y0_m, ground.y0_m + h - y)[:, None] >= margin_m - 1e-9)

@@ -70,10 +70,7 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
         ahead = np.gradient(at, axis=0)
         ahead = ahead / np.hypot(*ahead.T)[:, None]
         steepest = np.arctan(planner.graph.footprint.slopes(at, ahead).max(axis=-1))
-        rows, columns = ground.z_m.shape
-        x = ground.x0_m + np.arange(columns) * ground.spacing_m
-        y = ground.y0_m + np.arange(rows) * ground.spacing_m
-        world = planner.relief.slope_rad(*np.meshgrid(x, y))
+        world = planner.relief.slope_rad(*np.meshgrid(*ground.axes_m))
         share = planner.graph.safe_share
     return PathRelief(
         length_m=path.length_m,

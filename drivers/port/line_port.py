@@ -4,7 +4,6 @@
 
 from abc import ABC, abstractmethod
 from contextlib import suppress
-from types import TracebackType
 from typing import ClassVar, Self
 
 import serial
@@ -43,12 +42,7 @@ class LinePort(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.closePort()
 
     @property

@@ -31,8 +31,6 @@ RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9)."""
 CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
 CURRENT_POSITION_MODE, PWM_MODE = 5, 16
-CURRENT_MODES = (CURRENT_MODE, CURRENT_POSITION_MODE)
-"""Those that a model without current sensing lacks."""
 
 NO_SECONDARY_ID = 255
 """Secondary(Shadow) ID(12): values from 253 mean that it is not used."""

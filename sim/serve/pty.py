@@ -16,7 +16,6 @@ import termios
 import tty
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import Clock
@@ -88,12 +87,7 @@ class PtyServer:
     def __enter__(self) -> "PtyServer":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def close(self) -> None:

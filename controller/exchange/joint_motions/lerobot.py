@@ -12,7 +12,7 @@ import numpy as np
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
@@ -105,8 +105,9 @@ def _rows(path: Path, feature: str, episode: int) -> tuple[Floats, Floats]:
             times += table["timestamp"].to_pylist()
             rows += table[feature].to_pylist()
         except (arrow_fault, KeyError, OSError) as error:
-            reason = (str(error).splitlines() or [type(error).__name__])[0]
-            raise InputError(f"{file}: is not a Parquet file of LeRobot: {reason}") from None
+            raise InputError(
+                f"{file}: is not a Parquet file of LeRobot: {first_line(error)}"
+            ) from None
     if not rows:
         raise InputError(f"{path}: episode {episode} has no rows in {path / 'data'}")
     try:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from snakewalk.config.archive import check_expansion
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
@@ -49,8 +49,9 @@ class RosJoints:
         except InputError:
             raise
         except Exception as error:
-            reason = (str(error).splitlines() or [type(error).__name__])[0]
-            raise InputError(f"{path}: cannot be read as a ROS 2 bag: {reason}") from None
+            raise InputError(
+                f"{path}: cannot be read as a ROS 2 bag: {first_line(error)}"
+            ) from None
 
 
 def _topic(path: Path, bag: Any, request: JointRequest) -> tuple[str, str]:

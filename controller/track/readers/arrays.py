@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import InputError, first_line
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.resample import body_points
@@ -83,9 +83,8 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
     except InputError:
         raise
     except Exception as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"{file}: is no MAT file that can be read: {reason}; known: {KNOWN}"
+            f"{file}: is no MAT file that can be read: {first_line(error)}; known: {KNOWN}"
         ) from None
     arrays = {name: np.asarray(data) for name, data in held.items() if not name.startswith("__")}
     return track_from_arrays(file, arrays, rate_hz, least_score)

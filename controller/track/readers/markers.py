@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.track.readers.keypoints import FEWEST, PLANES, Choice, Keypoints
 
@@ -76,8 +76,7 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
         stated = float(about["RATE"]["value"][0])
         places = np.asarray(held["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
     except Exception as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{file}: is no C3D that can be read: {reason}") from None
+        raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
     if unit not in UNITS:
         raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
     return projected(
