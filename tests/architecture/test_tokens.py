@@ -62,6 +62,7 @@ LIMITS: Final = {
 """Tokens of each package."""
 RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.console": (8200, "0188-options-are-fields.md"),
+    "controller.view": (9200, "0193-budget-of-the-live-page.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""
 
