@@ -49,7 +49,7 @@ class DescribedFilm:
         """Read a description; None if its film is not in the folder.
 
         Raises:
-            InputError: a file that is no description of a film.
+            InputError: a file that does not describe a film.
 
         """
         try:
@@ -105,7 +105,7 @@ def _videos(folder: Path) -> Iterator[Path]:
 
 
 def _within(name: str, beside: Path, folder: Path) -> Path | None:
-    """The file or folder of that name beside the description or in the folder of films."""
+    """The file or folder of that name next to the description or in the folder of films."""
     for place in (beside / name, folder / name):
         if place.exists():
             return place.resolve()

@@ -15,7 +15,7 @@ from snakewalk.controller.capture.capture import Capture, load_capture
 from snakewalk.controller.images.video import open_footage
 from tests.oracles.skeleton_accuracy import point_error, swapped
 
-_HEAD_PART = 20  # of 101 points: the point between the eyes lies beside these
+_HEAD_PART = 20  # of 101 points: the point between the eyes lies next to these
 _TWICE = 2.0
 _COMMAND = "from snakewalk.controller.cli.main import main; raise SystemExit(main())"
 _LENGTH = 0.06  # of the known length: a used line that is off by more is wrong
