@@ -8,6 +8,7 @@ from snakewalk.config.base import Name, Strict
 from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
+from snakewalk.config.friction_law import LawName
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
@@ -263,6 +264,9 @@ class DeviationConfig(Strict):
     )
     friction_across: float = Field(
         1.0, gt=0.0, le=10.0, description="across the body over the world's"
+    )
+    friction_law: LawName | None = Field(
+        None, description="law of friction of the ground; default: the world's"
     )
     mass: float = Field(1.0, gt=0.0, le=10.0, description="of every link over the robot's")
     torque: float = Field(

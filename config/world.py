@@ -6,10 +6,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
+from snakewalk.config.friction_law import LAWS, LawName
 
 
 class FrictionConfig(Strict):
-    """Coulomb ellipse of the belly: along the body, forward and back, and across it."""
+    """Friction of the belly: along the body, forward and back, and across it; and its law."""
 
     along: float = Field(0.1, gt=0.0, le=5.0, description="sliding forward")
     across: float = Field(0.7, gt=0.0, le=5.0, description="friction coefficient across the body")
@@ -17,10 +18,31 @@ class FrictionConfig(Strict):
         None, gt=0.0, le=5.0, description="sliding backward, as scales resist; default: as forward"
     )
 
+    law: LawName | None = Field(
+        None,
+        description="how both coefficients act on a link that slides obliquely (docs/physics.md);"
+        " default: the ellipse, reported as assumed",
+    )
+
     @property
     def backward(self) -> float:
         """Coefficient of sliding backward."""
         return self.along if self.back is None else self.back
+
+    @property
+    def law_name(self) -> LawName:
+        """The law in use."""
+        return self.law or LAWS[0]
+
+    @property
+    def law_text(self) -> str:
+        """The law in use, and whether the file leaves it open."""
+        return self.law or f"{LAWS[0]} (assumed)"
+
+    @property
+    def grip(self) -> tuple[float, float, float, float]:
+        """Coefficients forward, across and back, and the code of the law, for compiled loops."""
+        return self.along, self.across, self.backward, float(LAWS.index(self.law_name))
 
 
 class FlatGround(Strict):

@@ -18,6 +18,8 @@ from snakewalk.drivers.compilation import report_compiled
 from snakewalk.drivers.fallbacks import is_forced, report_fallback
 
 F = TypeVar("F", bound=Callable[..., object])
+_CALLABLE: set[Callable[..., object]] = set()
+"""Functions that loops may call."""
 
 
 def readonly_array(number: str = "float64", dimensions: int = 1, layout: str = "A") -> str:
@@ -111,12 +113,12 @@ def is_compiling() -> bool:
 
 
 def callable_in_loops(function: F) -> F:
-    """Let compiled loops call a Python function."""
+    """Let compiled loops call a Python function; several packages may ask for the same one."""
     numba = _numba()
-    if numba is None:
-        return function
-    registered: F = numba.extending.register_jitable(function)
-    return registered
+    if numba is not None and function not in _CALLABLE:
+        _CALLABLE.add(function)
+        numba.extending.register_jitable(function)
+    return function
 
 
 def _numba() -> Any:

@@ -5,7 +5,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.mechanics.rigid_motion import (
+from snakewalk.controller.mechanics.link_table import (
     FORWARD_X,
     FORWARD_Y,
     LANES,
@@ -15,9 +15,9 @@ from snakewalk.controller.mechanics.rigid_motion import (
     POINT_Y,
     SHAPE_X,
     SHAPE_Y,
-    balance,
     link_table,
 )
+from snakewalk.controller.mechanics.rigid_motion import balance
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 
@@ -29,14 +29,14 @@ class BodySlide:
 
         Args:
             normal: (L,) load of each link on the ground, in weights of a link.
-            friction: the ellipse.
+            friction: of the ground.
 
         """
         self._normal, self._friction = normal, friction
         self._table = link_table(len(normal))
         self._velocity, self._linear = np.zeros(3), np.zeros(3)
         self._inertia = np.zeros((3, 3))
-        self._work = np.empty((6, 3))
+        self._work = np.empty((9, 3))
 
     def set_shapes(self, before: BodyView, after: BodyView, step_s: float) -> float:
         """Set two shapes in one frame, ``step_s`` apart; return the fastest link's speed.
@@ -55,7 +55,7 @@ class BodySlide:
         """Return (3,) the velocity as ``rigid_velocity``; the array is reused."""
         friction = self._friction
         balance(
-            *(self._table, OTHERS, len(self._normal), friction.along, friction.across),
+            *(self._table, OTHERS, len(self._normal), friction.grip),
             *(self._linear, self._inertia, self._velocity, self._work),
         )
         return self._velocity

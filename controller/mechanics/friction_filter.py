@@ -222,4 +222,4 @@ class FrictionFilter:
         file, along, across = self._file, math.exp(_ROOT * (u + v)), math.exp(_ROOT * (u - v))
         back = None if file.back is None else min(file.back * along, 5.0)
         given = {"along": min(file.along * along, 5.0), "across": min(file.across * across, 5.0)}
-        return FrictionConfig(**given, back=back)
+        return FrictionConfig(**given, back=back, law=file.law)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.friction_law import gauges
 from snakewalk.config.world import FrictionConfig
 
 _STILL_M_S = 1e-4
@@ -16,15 +17,19 @@ def friction_n(
     Args:
         velocity_m_s: (L, 2) of the link centres.
         headings_rad: (L,) link headings.
-        friction: the ellipse; the force opposes the velocity weighted by its axes.
+        friction: of the ground.
         weight_n: on each link.
 
     """
     cos, sin = np.cos(headings_rad), np.sin(headings_rad)
-    along = friction.along * (cos * velocity_m_s[:, 0] + sin * velocity_m_s[:, 1])
-    across = friction.across * (cos * velocity_m_s[:, 1] - sin * velocity_m_s[:, 0])
-    size = np.sqrt(along**2 + across**2 + (_STILL_M_S * friction.across) ** 2)
-    ahead, left = -friction.along * along / size, -friction.across * across / size
+    along = cos * velocity_m_s[:, 0] + sin * velocity_m_s[:, 1]
+    across = cos * velocity_m_s[:, 1] - sin * velocity_m_s[:, 0]
+    mu_forward, mu_across, mu_back, law = friction.grip
+    mu_along = np.where(along >= 0.0, mu_forward, mu_back)
+    share_a, share_c, gauge_a, gauge_c = gauges(int(law), mu_along, mu_across, along, across)
+    still = share_c * _STILL_M_S
+    ahead = -mu_along * share_a * along / np.hypot(gauge_a, still)
+    left = -mu_across * share_c * across / np.hypot(gauge_c, still)
     return np.asarray(weight_n * np.stack([cos * ahead - sin * left, sin * ahead + cos * left], 1))
 
 

@@ -1,15 +1,36 @@
-"""The rigid velocity (vx, vy, omega) of a planar body whose shape changes on Coulomb friction.
+"""The rigid velocity (vx, vy, omega) of a planar body whose shape changes on dry friction.
 
 Without inertia the ground's forces and moment sum to zero. With the Coulomb ellipse this is the
 minimum of the dissipated power, which is convex, so Newton's method finds it. On a slope gravity's
 power, linear in the velocity, is subtracted; a minimum is missing if the slope exceeds friction.
+
+The other laws (``config.friction_law``), and an ellipse with a coefficient backward, go through
+``force_balance``. ``wheels`` has such a power as well. ``scales`` has none: Newton's method finds
+where the forces vanish, and falls back to a fixed point iteration.
 """
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
+from snakewalk.config.friction_law import ELLIPSE
 from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.mechanics.force_balance import balance_forces
+from snakewalk.controller.mechanics.link_table import (
+    FORWARD_X,
+    FORWARD_Y,
+    GRIP,
+    LANES,
+    MOVING_X,
+    MOVING_Y,
+    NORMAL,
+    OTHERS,
+    POINT_X,
+    POINT_Y,
+    SHAPE_X,
+    SHAPE_Y,
+    link_table,
+)
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
@@ -18,15 +39,6 @@ _CLOSE = 1e-8
 """Share of the power from which on what Newton's next step leaves is beyond notice: it squares."""
 _NONE = np.zeros((3, 3))
 
-LANES = 8
-"""Number of links side by side in a table, which the processor handles at once."""
-POINT_X, POINT_Y, FORWARD_X, FORWARD_Y, SHAPE_X, SHAPE_Y = range(0, 6 * LANES, LANES)
-"""Where rows of a table begin: a link's centre, the unit vector along it, its velocity relative to
-the body frame."""
-NORMAL, MOVING_X, MOVING_Y = range(6 * LANES, 9 * LANES, LANES)
-"""A link's load, and how it moved in the step before."""
-OTHERS = 34 * LANES
-"""First row that is free for other users of the table."""
 _SLIDES = 9 * LANES
 """Where the rows of ``_power`` begin: 14 that it reads, 11 that it writes."""
 
@@ -51,7 +63,7 @@ def rigid_velocity(
         points_m: (L, 2) link centres in the body frame.
         headings_rad: (L,) link headings in the body frame.
         shape_m_s: (L, 2) velocities of the links relative to the body frame.
-        friction: the ellipse.
+        friction: of the ground.
         guess: start of the iteration, the last solution in a sequence.
         tangential: (L, 2) gravity along the ground on each link, in the body frame, in weights of a
             link: ``sin(slope)`` down the slope. None is level ground.
@@ -111,15 +123,6 @@ def inertial_velocity(
     return velocity
 
 
-def link_table(links: int, rows: int = OTHERS) -> Floats:
-    """Zeros (n,) for a table of ``links`` links with ``rows`` numbers per group.
-
-    Groups have ``LANES`` links: number ``k`` of a row that begins at ``ROW`` is at ``k // LANES *
-    rows + ROW + k % LANES``. Places beyond the last link stay zero and bear nothing.
-    """
-    return np.zeros(-(-links // LANES) * rows)
-
-
 def _table(
     points_m: Floats,
     headings_rad: Floats,
@@ -162,8 +165,8 @@ def _minimise(
         quadratic = np.empty((3, 3))
         add_inertia(table, OTHERS, links, step_s, linear, quadratic)
     return balance(
-        *(table, OTHERS, links, friction.along, friction.across),
-        *(linear, quadratic, velocity, np.empty((6, 3))),
+        *(table, OTHERS, links, friction.grip),
+        *(linear, quadratic, velocity, np.empty((9, 3))),
     )
 
 
@@ -331,7 +334,7 @@ def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
 
 
 @compiled(
-    "boolean(float64[::1], int64, int64, float64, float64, float64[::1], float64[:, ::1],"
+    f"boolean(float64[::1], int64, int64, {GRIP}, float64[::1], float64[:, ::1],"
     " float64[::1], float64[:, ::1])",
     makes_arrays=False,
 )
@@ -339,21 +342,24 @@ def balance(
     table: Floats,
     rows: int,
     links: int,
-    along: float,
-    across: float,
+    grip: tuple[float, float, float, float],
     linear: Floats,
     quadratic: Floats,
     w: Floats,
     work: Floats,
 ) -> bool:
-    """Newton's method on the power from ``w`` (3,), in place; whether there is a minimum.
+    """Balance friction by Newton's method from ``w`` (3,), in place; whether it is possible.
 
-    ``table`` is from ``link_table``, with ``rows``. ``linear`` (3,) is gravity's power per (vx, vy,
-    omega), ``quadratic`` (3, 3) that of inertia. ``work`` (6, 3) is overwritten.
+    ``table`` is from ``link_table``, with ``rows``; ``grip`` is ``FrictionConfig.grip``. ``linear``
+    (3,) is gravity's power per (vx, vy, omega), ``quadratic`` (3, 3) that of inertia. ``work`` (9,
+    3) is overwritten.
     """
+    along, across, back, law = grip
+    if law != ELLIPSE or back != along:
+        return balance_forces(table, rows, links, grip, linear, quadratic, w, work)
     _set_up(table, rows, along, across)
     still = _STILL_M_S * across
-    gradient, step, trial, hessian = work[0], work[1], work[2], work[3:]
+    gradient, step, trial, hessian = work[0], work[1], work[2], work[3:6]
     may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
     best, _ = _power(table, rows, links, still, linear, quadratic, w, gradient, hessian)
     for _ in range(_STEPS):
@@ -392,8 +398,7 @@ def planar_slide(
     points_m: Floats,
     step_s: Floats,
     heading_rad: float,
-    along: float,
-    across: float,
+    friction: FrictionConfig,
     load: Floats | None = None,
 ) -> tuple[float, float, float]:
     """Return the slide of a body that passes through ``n`` shapes.
@@ -403,8 +408,7 @@ def planar_slide(
         points_m: (n, L, 2) their centres about the body's, in its frame.
         step_s: (n - 1,) between the shapes.
         heading_rad: initial heading of the body.
-        along: friction along the links.
-        across: friction across the links.
+        friction: of the ground.
         load: (n, L, 3) gravity on each link in weights of a link, x and y along the ground in the
             world and z into it. None: a level floor, on which every link carries the same weight.
 
@@ -418,7 +422,7 @@ def planar_slide(
         load = np.zeros((shapes, links, 3))
         load[:, :, 2] = 1.0
     return _slide_through(
-        *(headings_rad, points_m, step_s, heading_rad, along, across, load, link_table(links))
+        *(headings_rad, points_m, step_s, heading_rad, friction.grip, load, link_table(links))
     )
 
 
@@ -432,23 +436,22 @@ def _note_movement(table: Floats, links: int, velocity: Floats) -> None:
 
 
 @compiled(
-    "UniTuple(float64, 3)(float64[:, ::1], float64[:, :, ::1], float64[::1], float64, float64,"
-    " float64, float64[:, :, ::1], float64[::1])"
+    f"UniTuple(float64, 3)(float64[:, ::1], float64[:, :, ::1], float64[::1], float64, {GRIP},"
+    " float64[:, :, ::1], float64[::1])"
 )
 def _slide_through(
     headings: Floats,
     points: Floats,
     step_s: Floats,
     heading: float,
-    along: float,
-    across: float,
+    grip: tuple[float, float, float, float],
     load: Floats,
     table: Floats,
 ) -> tuple[float, float, float]:
     """``planar_slide`` with a ``link_table``, which is overwritten."""
     links = headings.shape[1]
     linear, velocity, quadratic = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    work, x_m, y_m = np.empty((6, 3)), 0.0, 0.0
+    work, x_m, y_m = np.empty((9, 3)), 0.0, 0.0
     for n in range(len(step_s)):
         dt, c, s = step_s[n], np.cos(heading), np.sin(heading)
         linear[:] = 0.0
@@ -468,9 +471,9 @@ def _slide_through(
             linear[1] += pull[1]
             linear[2] += east * pull[1] - north * pull[0]
         quadratic[:] = 0.0
-        if not balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work):
+        if not balance(table, OTHERS, links, grip, linear, quadratic, velocity, work):
             add_inertia(table, OTHERS, links, dt, linear, quadratic)
-            balance(table, OTHERS, links, along, across, linear, quadratic, velocity, work)
+            balance(table, OTHERS, links, grip, linear, quadratic, velocity, work)
         _note_movement(table, links, velocity)
         x_m, y_m = x_m + velocity[0] * dt, y_m + velocity[1] * dt
         heading += velocity[2] * dt

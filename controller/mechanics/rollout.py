@@ -18,7 +18,7 @@ from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import half_lengths_m, link_weights
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.mechanics.ground_step import plane
-from snakewalk.controller.mechanics.rigid_motion import LANES, link_table
+from snakewalk.controller.mechanics.link_table import LANES, link_table
 from snakewalk.controller.mechanics.rollout_kernel import (
     ALONG,
     COLUMNS,
@@ -180,7 +180,7 @@ class Rollout:
 
     def use_friction(self, friction: FrictionConfig) -> None:
         """Use this friction; pieces that have begun keep the earlier one."""
-        self._body = np.array([friction.along, friction.across, self._speed_limit_rad_s])
+        self._body = np.array([*friction.grip, self._speed_limit_rad_s])
 
     def change_ground(self, ground: HeightField) -> None:
         """Use another ground from now on."""

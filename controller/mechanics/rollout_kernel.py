@@ -4,7 +4,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.mechanics.ground_step import FIELD, plane
-from snakewalk.controller.mechanics.rigid_motion import (
+from snakewalk.controller.mechanics.link_table import (
     FORWARD_X,
     FORWARD_Y,
     LANES,
@@ -16,9 +16,8 @@ from snakewalk.controller.mechanics.rigid_motion import (
     POINT_Y,
     SHAPE_X,
     SHAPE_Y,
-    add_inertia,
-    balance,
 )
+from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
 _BACK, _FORTH = 5, 40
@@ -251,14 +250,15 @@ def _slide(
 ) -> None:
     """Balance friction, with inertia beyond the friction limit; write body and link velocities.
 
-    ``velocity`` (3,) and the table's velocities are those of the previous step; ``work`` is (9, 3).
+    ``velocity`` (3,) and the velocities in the table are those of the previous step; ``work`` is
+    (12, 3).
     """
-    quadratic = work[6:]
+    quadratic = work[9:]
     quadratic[:] = 0.0
-    along, across = body[0], body[1]
-    if not balance(table, ROWS, links, along, across, linear, quadratic, velocity, work[:6]):
+    grip = body[0], body[1], body[2], body[3]
+    if not balance(table, ROWS, links, grip, linear, quadratic, velocity, work[:9]):
         add_inertia(table, ROWS, links, step_s, linear, quadratic)
-        balance(table, ROWS, links, along, across, linear, quadratic, velocity, work[:6])
+        balance(table, ROWS, links, grip, linear, quadratic, velocity, work[:9])
     x, y, turn = velocity[0], velocity[1], velocity[2]
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
@@ -366,7 +366,7 @@ def roll_pieces(
         table: of the links: half lengths and weights are read, the rest is overwritten.
         edges: of the groups of links.
         group: (L,) of each link.
-        body: (3,) friction along and across; speed limit of the joints.
+        body: (5,) ``FrictionConfig.grip``; speed limit of the joints.
         path: (m, 2) points.
         path_at: index on the path.
         waypoint: (3,) the next waypoint, and its index on the path.
@@ -383,7 +383,7 @@ def roll_pieces(
     known, new, links, steps = len(samples), pieces.shape[1], len(group), states.shape[1] - 1
     track, total = np.empty(known + new), np.zeros(known + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
-    velocity, linear, work = np.empty(3), np.empty(3), np.empty((9, 3))
+    velocity, linear, work = np.empty(3), np.empty(3), np.empty((12, 3))
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(LANES):
@@ -412,7 +412,7 @@ def roll_pieces(
         for n in range(begin, steps):
             at += step
             _lay(total, track, at, edges, group, next_g, table)
-            dt = step / _pulse_rate(here_g, next_g, step, cruise, body[2])
+            dt = step / _pulse_rate(here_g, next_g, step, cruise, body[4])
             mean = _turned(table, links, phi, dt)
             linear[:] = 0.0
             if not level:

@@ -84,7 +84,7 @@ class SlideWindow:
             at = np.array([*range(begin, end, STRIDE), end])
             x, y, heading = planar_slide(
                 *(self.headings_rad[at], self.points_m[at], np.diff(self.time_s[at])),
-                *(float(rows[-1][2]), friction.along, friction.across),
+                *(float(rows[-1][2]), friction),
                 None if self.load is None else self.load[at],
             )
             rows.append(np.array([rows[-1][0] + x, rows[-1][1] + y, heading]))

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.mechanics.rigid_motion import (
+from snakewalk.controller.mechanics.link_table import (
     FORWARD_X,
     FORWARD_Y,
     LANES,
@@ -15,9 +15,8 @@ from snakewalk.controller.mechanics.rigid_motion import (
     POINT_Y,
     SHAPE_X,
     SHAPE_Y,
-    NoBalanceError,
-    balance,
 )
+from snakewalk.controller.mechanics.rigid_motion import NoBalanceError, balance
 
 _LINKS = 20
 
@@ -63,7 +62,7 @@ def rigid_velocities(
         points_m: (S, L, 2) link centres in the body frames.
         headings_rad: (S, L) link headings in the body frames.
         shape_m_s: (S, L, 2) velocities of the links relative to the body frames.
-        friction: the ellipse; every link carries the same weight.
+        friction: of the ground; every link carries the same weight.
 
     Raises:
         NoBalanceError: the iteration does not converge.
@@ -88,8 +87,8 @@ def rigid_velocities(
     velocities, linear, quadratic = np.zeros((bodies, 3)), np.zeros(3), np.zeros((3, 3))
     for table, velocity in zip(tables.reshape(bodies, -1), velocities, strict=True):
         is_balanced = balance(
-            *(table, OTHERS, links, friction.along, friction.across),
-            *(linear, quadratic, velocity, np.empty((6, 3))),
+            *(table, OTHERS, links, friction.grip),
+            *(linear, quadratic, velocity, np.empty((9, 3))),
         )
         if not is_balanced:
             raise NoBalanceError

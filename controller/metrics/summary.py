@@ -336,6 +336,10 @@ def _assumptions(header: Header) -> dict[str, dict[str, object]]:
     values = {
         "friction_along": (world.friction.along, f"world {world.name}"),
         "friction_across": (world.friction.across, f"world {world.name}"),
+        "friction_law": (
+            world.friction.law_name,
+            f"world {world.name}" if world.friction.law else f"default: {world.name} has no law",
+        ),
         "mass_kg": (float(f"{robot.mass_kg:.6g}"), f"robot {robot.name}"),
         "supply_v": (robot.servo.supply_v, f"robot {robot.name}"),
     }

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.friction_law import LawName
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig
 from snakewalk.config.world import WorldConfig
@@ -29,6 +30,8 @@ class Deviation:
     """(J,) factor on each servo's torque for a current."""
     slip_rad: Floats | None = None
     """(J,) angle by which each joint is bent more than its servo reports: a slipped horn."""
+    law: LawName | None = None
+    """Law of friction; None: the world's."""
 
     @classmethod
     def of_run(cls, by: DeviationConfig, robot: RobotConfig) -> "Deviation":
@@ -39,6 +42,7 @@ class Deviation:
             by.friction_across,
             more * np.array(robot.link_masses_kg) if more else None,
             np.full(robot.joint_count, by.torque) if by.torque != 1.0 else None,
+            law=by.friction_law,
         )
 
     def robot(self, robot: RobotConfig) -> RobotConfig:
@@ -55,7 +59,8 @@ class Deviation:
         told = world.friction
         back = None if told.back is None else told.back * self.along
         changes = {"along": told.along * self.along, "across": told.across * self.across}
-        friction = told.model_copy(update=changes | {"back": back})
+        law = self.law or told.law
+        friction = told.model_copy(update=changes | {"back": back, "law": law})
         return world.model_copy(update={"friction": friction})
 
     def shaft_rad(self, joint_rad: Floats) -> Floats:

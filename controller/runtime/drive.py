@@ -420,10 +420,8 @@ class Drive:
             self._alarms += 1
             share = self._slip_monitor.window.share if self._slip_monitor.window else float("nan")
             text = f"the body moves {share:.0%} of the predicted distance"
-            if self._friction_monitor is not None and self._friction_monitor.confirms_file:
-                text += "; the friction found is that of the world's file, so it is not the ground"
-            else:
-                text += ": is the ground too slippery?"
+            monitor = self._friction_monitor
+            text += f"; {monitor.alarm_text}" if monitor else ": is the ground too slippery?"
             log.event(now_s, "alarm", text, "warning")
         return goal
 

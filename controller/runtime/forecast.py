@@ -102,7 +102,7 @@ def forecast(
     Args:
         pilot: used up by this; the run needs a fresh one.
         robot: links and joints.
-        friction: the ellipse, the same under every link.
+        friction: of the ground, the same under every link.
         start_m: (2,) centre of the head link.
         heading_rad: of the mean body line.
         ground: under the run; None is a level floor.

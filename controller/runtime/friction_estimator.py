@@ -42,6 +42,19 @@ class FrictionEstimator(ABC):
         """Whether the newest motion that was judged agrees with the world's file."""
         return self._confirmed > 0
 
+    @property
+    def alarm_text(self) -> str:
+        """Estimate and its data, for an alarm; it excludes no cause."""
+        used = self._used
+        values = f"{used.along:.2g} along and {used.across:.2g} across, law {used.law_text}"
+        if not self.confirms_file:
+            return f"friction estimated from the body's motion: {values}; check ground and belly"
+        return (
+            f"the body's motion in the last {self._confirmed} spans agrees with the file's "
+            f"friction ({values}); the ground is not excluded: check it, the belly and "
+            "`world.friction.law`"
+        )
+
     def event_text(self) -> str | None:
         """A line when the friction in use has changed notably since the last one."""
         used, reported = self._used, self._reported

@@ -108,9 +108,7 @@ class OnPaper:
         if self._span is not span:  # the shapes are those of every friction
             self._span, self._shapes = span, _shapes(span)
         begin = span.views[1]
-        *place_m, heading = planar_slide(
-            *self._shapes, begin.heading_rad, friction.along, friction.across
-        )
+        *place_m, heading = planar_slide(*self._shapes, begin.heading_rad, friction)
         return span.slid_to(begin.centre_m[:2] + place_m, heading)
 
 

@@ -58,7 +58,7 @@ class BatchBodies(ABC):
         self.pwm_limit, self.supply_v = np.ones((2, count, joints))
         self.current_limit_a = np.full((count, joints), np.inf)
         self.friction: Floats = np.tile(np.array(self.template.mechanics.mu), (count, 1))
-        """(W, 3) friction forward, across and back."""
+        """(W, 4) ``FrictionConfig.grip``."""
         self.motors = MotorColumns(motors_of(robot))
         self.qpos, self.qvel = np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints))
         self.current_a, self.pwm = np.zeros((2, count, joints))

@@ -8,11 +8,14 @@ list.
 
 import warp as wp
 
+from snakewalk.config.friction_law import ELLIPSE, SCALES
 from snakewalk.sim.physics.friction import BENT_STOP_SHARE, STOP_SHARE
 from snakewalk.sim.physics.mechanics import FOOT, GROUND, LEAST_DEPTH_M
 
 _GROUND = wp.constant(GROUND)
 _FOOT = wp.constant(FOOT)
+_ELLIPSE = wp.constant(ELLIPSE)
+_SCALES = wp.constant(SCALES)
 _LEAST_DEPTH_M = wp.constant(LEAST_DEPTH_M)
 _STOP_SHARE = wp.constant(STOP_SHARE)
 _BENT_STOP_SHARE = wp.constant(BENT_STOP_SHARE)
@@ -128,6 +131,22 @@ def add_depths(
     wp.atomic_add(depth, worlds[c], bodies[geom[1]] - 1, wp.max(-dist[c], _LEAST_DEPTH_M))
 
 
+@wp.func
+def gauges(
+    law: int, mu_along: float, mu_across: float, along_m_s: float, across_m_s: float
+) -> wp.vec4:
+    """``config.friction_law.gauges``, because Warp compiles no functions of others."""
+    if law == _ELLIPSE:
+        a = mu_along * along_m_s
+        b = mu_across * across_m_s
+        gauge = wp.sqrt(a * a + b * b)
+        return wp.vec4(mu_along, mu_across, gauge, gauge)
+    if law == _SCALES:
+        speed = wp.sqrt(along_m_s * along_m_s + across_m_s * across_m_s)
+        return wp.vec4(1.0, 1.0, speed, speed)
+    return wp.vec4(1.0, 1.0, wp.abs(along_m_s), wp.abs(across_m_s))
+
+
 @wp.kernel(enable_backward=False)
 def rub(
     contacts: wp.array[int],
@@ -154,7 +173,7 @@ def rub(
 ) -> None:
     """Friction of each belly's ground contact: ``sim.physics.friction`` in single precision.
 
-    ``mu`` (W, 3): friction forward, across, back. ``push`` and ``twist`` (W, L) sum forces, and
+    ``mu`` (W, 4): ``FrictionConfig.grip``. ``push`` and ``twist`` (W, L) sum forces, and
     torques about the world's origin.
     """
     c = wp.tid()
@@ -181,17 +200,15 @@ def rub(
     if along_m_s < 0.0:
         mu_along = mu[w, 2]
     mu_across = mu[w, 1]
-    a = mu_along * along_m_s
-    b = mu_across * across_m_s
-    gauge = wp.sqrt(a * a + b * b)
+    grip = gauges(int(mu[w, 3]), mu_along, mu_across, along_m_s, across_m_s)
     least = carried / (still[w] * mass_kg[i])
-    slow_along = wp.max(gauge, mu_along * mu_along * least)
-    slow_across = wp.max(gauge, mu_across * mu_across * least)
+    slow_along = wp.max(grip[2], mu_along * grip[0] * least)
+    slow_across = wp.max(grip[3], mu_across * grip[1] * least)
     normal_n = share * carried
     if normal_n <= 0.0 or slow_along <= 0.0 or slow_across <= 0.0:
         return
-    along_n = -normal_n * mu_along * mu_along * along_m_s / slow_along
-    across_n = -normal_n * mu_across * mu_across * across_m_s / slow_across
+    along_n = -normal_n * mu_along * grip[0] * along_m_s / slow_along
+    across_n = -normal_n * mu_across * grip[1] * across_m_s / slow_across
     force = along_n * along + across_n * across
     wp.atomic_add(push, w, i, force)
     wp.atomic_add(twist, w, i, wp.cross(p, force))

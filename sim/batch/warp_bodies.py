@@ -121,7 +121,7 @@ class _DeviceState:
             )
             self.depth, self.load = (warp.zeros((worlds, links), dtype=float) for _ in range(2))
             self.still = warp.zeros(worlds, dtype=float)
-            self.mu = warp.zeros((worlds, 3), dtype=float)
+            self.mu = warp.zeros((worlds, 4), dtype=float)
             self.energies = warp.zeros((4, worlds, joints), dtype=warp.float64)
             self.totals = warp.zeros((worlds, 2), dtype=warp.float64)
         self.spine, self.radius_m = mechanics.spine_links, mechanics.radius_m

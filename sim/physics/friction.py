@@ -1,10 +1,8 @@
-"""Coulomb's ellipse: little friction along a link, much across it.
+"""Dry friction with a direction: little along a link, much across it.
 
-The half axes are ``mu_along N`` and ``mu_across N``. For a sliding velocity (v_a, v_c), maximum
-dissipation gives the force ``-N (mu_a^2 v_a, mu_c^2 v_c) / s`` with the *gauge* ``s = hypot(mu_a
-v_a, mu_c v_c)``. If friction backward differs, the forces fill two half ellipses with one axis
-across. Near rest each component is limited to a share of the force that would stop the link within
-the step.
+``config.friction_law`` has the laws. Sliding backward may have its own coefficient. Near rest each
+component is limited to a share of the force that would stop the link within the step, whatever the
+law: the drag is passive, and the same along and across.
 """
 
 import math
@@ -13,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.friction_law import gauges
 
 LANES = 8
 """Number of contacts side by side in a table, which the processor handles at once."""
@@ -59,31 +58,32 @@ def stop_share(centre_m: Floats, radius_m: float) -> float:
     return min(STOP_SHARE / lightness, BENT_STOP_SHARE)
 
 
-def ellipse_force(
+def friction_force(
     normal_n: float,
     along_m_s: float,
     across_m_s: float,
-    mu: tuple[float, float, float],
+    mu: tuple[float, float, float, float],
     still_n_s_m: float,
     link_normal_n: float,
 ) -> tuple[float, float]:
     """Force along and across a link at one contact, N.
 
-    ``mu`` are the coefficients forward, across and back; ``still_n_s_m`` the drag that stops a
-    link, see ``stop_share``; ``link_normal_n`` the sum of the link's normal forces.
+    ``mu`` is ``FrictionConfig.grip``; ``still_n_s_m`` the drag that stops a link, see
+    ``stop_share``; ``link_normal_n`` the sum of the link's normal forces.
     """
-    mu_forward, mu_across, mu_back = mu
+    mu_forward, mu_across, mu_back, law = mu
     mu_along = mu_forward if along_m_s >= 0.0 else mu_back
-    u, v = mu_along * along_m_s, mu_across * across_m_s
-    gauge = math.sqrt(u * u + v * v)
+    share_along, share_across, gauge_along, gauge_across = gauges(
+        int(law), mu_along, mu_across, along_m_s, across_m_s
+    )
     floor = link_normal_n / still_n_s_m
-    slow_along = max(gauge, mu_along * mu_along * floor)
-    slow_across = max(gauge, mu_across * mu_across * floor)
+    slow_along = max(gauge_along, mu_along * share_along * floor)
+    slow_across = max(gauge_across, mu_across * share_across * floor)
     if normal_n <= 0.0 or slow_along <= 0.0 or slow_across <= 0.0:
         return 0.0, 0.0
     return (
-        -normal_n * mu_along * mu_along * along_m_s / slow_along,
-        -normal_n * mu_across * mu_across * across_m_s / slow_across,
+        -normal_n * mu_along * share_along * along_m_s / slow_along,
+        -normal_n * mu_across * share_across * across_m_s / slow_across,
     )
 
 
@@ -93,7 +93,7 @@ def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
     return np.zeros(groups * ROWS), np.zeros(groups * LANES, np.int64)
 
 
-def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
+def rub(table: Floats, contacts: int, mu: tuple[float, float, float, float]) -> None:
     """Write the friction of contacts; those of a link share its load by depth.
 
     Contact ``k`` has its value of the row at ``ROW`` at ``k // LANES * ROWS + ROW + k % LANES``.
@@ -114,7 +114,7 @@ def rub(table: Floats, contacts: int, mu: tuple[float, float, float]) -> None:
             along_m_s = s0 * e0 + s1 * e1 + s2 * e2
             across_m_s = s0 * g0 + s1 * g1 + s2 * g2
             load = lane[LOAD + j]
-            along_n, across_n = ellipse_force(
+            along_n, across_n = friction_force(
                 share * load, along_m_s, across_m_s, mu, lane[STILL + j], load
             )
             lane[FORCE + j] = along_n * e0 + across_n * g0

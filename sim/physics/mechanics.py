@@ -37,8 +37,8 @@ class Mechanics:
 
     model: mujoco.MjModel
     data: mujoco.MjData
-    mu: tuple[float, float, float]
-    """Coefficients of friction: sliding forward, across and back."""
+    mu: tuple[float, float, float, float]
+    """``FrictionConfig.grip`` of the ground."""
     spine_links: int
     link_mass_kg: Floats
     """(L,) of each link; a leg's counts as a plain one of the spine."""
@@ -72,13 +72,12 @@ class Mechanics:
         ground: HeightField | None,
     ) -> "Mechanics":
         """Collect the data of the steps."""
-        mu = world.friction
         load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
         legs_kg = (robot.limbs[joint.pair].segment_mass_kg for joint in robot.limb_joints)
         mass = np.array([*robot.link_masses_kg, *legs_kg])
         water = water_constants(world, robot)
-        grip = mu.along, mu.across, mu.backward
+        grip = world.friction.grip
         planes = TangentPlanes.of(model, ground)
         role = np.zeros(model.ngeom, dtype=np.int32)
         role[model.geom("ground").id] = GROUND

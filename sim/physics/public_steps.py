@@ -71,8 +71,7 @@ class PublicSteps:
 
     def _body(self) -> Body:
         m = self._mechanics
-        along, across, back = (float(value) for value in m.mu)
-        law = Law((along, across, back), float(m.radius_m), m.step_s, m.spine_links)
+        law = Law(m.mu, float(m.radius_m), m.step_s, m.spine_links)
         return Body(self._state, self._chain, self._links, self._geoms, law, m.totals)
 
     def _contacts(self) -> Contacts:

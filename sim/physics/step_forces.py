@@ -13,6 +13,8 @@ the last step (``dof_frictionloss``: BAM's own simulation does the same).
 from numba.extending import register_jitable
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.friction_law import gauges
+from snakewalk.drivers.compiling import callable_in_loops
 from snakewalk.sim.physics.friction import (
     AXIS,
     DEPTH,
@@ -26,7 +28,7 @@ from snakewalk.sim.physics.friction import (
     SIDEWAYS,
     SLIDE,
     STILL,
-    ellipse_force,
+    friction_force,
     rub,
     stop_share,
 )
@@ -303,7 +305,9 @@ def _weigh(body: Body, contacts: Contacts, force_n: Floats) -> None:
             load[geom_body[integers[2 * at.size * c + at.geom + 1]] - 1] += force_n[row]
 
 
-register_jitable(error_model="numpy", inline="always")(ellipse_force)
+callable_in_loops(gauges)
+
+register_jitable(error_model="numpy", inline="always")(friction_force)
 
 register_jitable(error_model="numpy")(rub)
 

@@ -63,7 +63,9 @@ BELLIES = (
     "plane_axes",
 )
 ARRAYS = (*(*STATE, *LINKS, *MODEL, *GROUND, *GEARS, *BELLIES, *Motors._fields, "totals", "work"),)
-CONSTANTS = ("along", "across", "back", "radius_m", "step_s", "x0_m", "y0_m", "spacing_m")
+GRIP = ("along", "across", "back", "law")
+"""``FrictionConfig.grip``."""
+CONSTANTS = (*GRIP, "radius_m", "step_s", "x0_m", "y0_m", "spacing_m")
 
 STEP_MEMORY = np.dtype(
     [
@@ -157,7 +159,7 @@ def body_at(m: Any) -> Body:
         _chain(m),
         _links(m),
         Geoms(integers_at(m.geom_bodyid_at, (geoms,)), integers_at(m.contact_role_at, (geoms,))),
-        Law((m.along, m.across, m.back), m.radius_m, m.step_s, m.count_spine),
+        Law((m.along, m.across, m.back, m.law), m.radius_m, m.step_s, m.count_spine),
         reals_at(m.totals_at, (3,)),
     )
 

@@ -98,8 +98,8 @@ class Gears(NamedTuple):
 class Law(NamedTuple):
     """Constants of ground friction."""
 
-    mu: tuple[float, float, float]
-    """Coefficients of sliding forward, across and back."""
+    mu: tuple[float, float, float, float]
+    """``FrictionConfig.grip``."""
     radius_m: float
     step_s: float
     spine: int

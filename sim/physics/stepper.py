@@ -31,6 +31,7 @@ from snakewalk.sim.physics.mechanics import Mechanics
 from snakewalk.sim.physics.public_steps import PublicSteps
 from snakewalk.sim.physics.step_forces import apply_forces, has_friction, settle
 from snakewalk.sim.physics.step_memory import (
+    GRIP,
     STEP_MEMORY,
     addresses,
     body_at,
@@ -217,7 +218,7 @@ class CompiledSteps:
         mu = self._mechanics.mu
         if mu is not self._mu:
             self._mu = mu
-            set_fields(self._memory, dict(zip(("along", "across", "back"), mu, strict=True)))
+            set_fields(self._memory, dict(zip(GRIP, mu, strict=True)))
         return float(run_steps(steps, self._memory))
 
 

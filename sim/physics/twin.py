@@ -39,7 +39,7 @@ class PlantTwin:
 
     def use_friction(self, friction: FrictionConfig) -> None:
         """Set the friction of its ground."""
-        self._plant.mechanics.mu = friction.along, friction.across, friction.backward
+        self._plant.mechanics.mu = friction.grip
 
     def step(self, goal_rad: Floats, dt_s: float) -> tuple[BodyPose, Floats]:
         """Hold goals (J,) for ``dt_s``; return the head's pose and the joints (J,) then.

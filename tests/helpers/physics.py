@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.friction_law import LawName
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import FrictionConfig
@@ -23,10 +24,12 @@ def a_body(
     mu: tuple[float, ...] = (0.1, 0.7),
     step_s: float = 0.002,
     ground: HeightField | None = None,
+    law: LawName | None = None,
     **options: float,
 ) -> MujocoPlant:
     """A ``yaw16`` with friction ``mu`` (along, across, and perhaps back), straight, at rest."""
-    friction = FrictionConfig(along=mu[0], across=mu[1], back=mu[2] if len(mu) > 2 else None)
+    back = mu[2] if len(mu) > 2 else None
+    friction = FrictionConfig(along=mu[0], across=mu[1], back=back, law=law)
     world = FLAT.model_copy(update={"friction": friction})
     return MujocoPlant(ROBOT, world, ground, step_s, **options)  # type: ignore[arg-type]
 

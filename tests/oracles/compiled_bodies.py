@@ -35,8 +35,8 @@ class CompiledBodies(BatchBodies):
                 self._placed[row] = False
             for name in INPUTS:
                 getattr(drive, name)[:] = getattr(self, name)[row]
-            along, across, backward = (float(each) for each in self.friction[row])
-            mechanics.mu = along, across, backward
+            forward, across, back, law = (float(each) for each in self.friction[row])
+            mechanics.mu = forward, across, back, law
             plant.steps.run(steps, drive)
             self.qpos[row], self.qvel[row] = mechanics.data.qpos, mechanics.data.qvel
             self.current_a[row], self.pwm[row] = drive.current_a, drive.pwm

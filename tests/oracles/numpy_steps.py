@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.friction_law import LAWS
 from snakewalk.sim.physics.friction import stop_share
 from snakewalk.sim.physics.mechanics import FOOT, GROUND, LEAST_DEPTH_M, Mechanics, velocities
 from snakewalk.sim.physics.plant import MujocoPlant
@@ -100,7 +101,7 @@ def friction_forces(m: Mechanics) -> Floats:
     across = np.cross(up, along)
     v_along, v_across = (sliding * along).sum(axis=1), (sliding * across).sum(axis=1)
     still = stop_share(centre[: m.spine_links], m.radius_m) * m.link_mass_kg[link] / m.step_s
-    f_along, f_across = ellipse_forces(normal_n, v_along, v_across, m.mu, still, load)
+    f_along, f_across = dry_forces(normal_n, v_along, v_across, m.mu, still, load)
     m.totals[0] -= float(f_along @ v_along + f_across @ v_across) * m.step_s
     m.totals[1] += float((np.abs(v_across) * share).sum()) * m.step_s / len(centre)
     force = f_along[:, None] * along + f_across[:, None] * across
@@ -118,27 +119,36 @@ def friction_forces(m: Mechanics) -> Floats:
     return out
 
 
-def ellipse_forces(
+def dry_forces(
     normal_n: Floats,
     along_m_s: Floats,
     across_m_s: Floats,
-    mu: tuple[float, float, float],
+    mu: tuple[float, float, float, float],
     still_n_s_m: float,
     link_normal_n: Floats,
 ) -> tuple[Floats, Floats]:
-    """``ellipse_force`` of C contacts at once; all arrays (C,)."""
-    mu_forward, mu_across, mu_back = mu
+    """``friction_force`` of C contacts at once; all arrays (C,)."""
+    mu_forward, mu_across, mu_back, law = mu
     mu_along = np.where(along_m_s >= 0.0, mu_forward, mu_back)
-    gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
     floor = link_normal_n / still_n_s_m
-    slow_along = np.maximum(gauge, mu_along**2 * floor)
-    slow_across = np.maximum(gauge, mu_across**2 * floor)
+    match LAWS[int(law)]:
+        case "ellipse":
+            along, across = mu_along**2, mu_across**2
+            gauge = np.hypot(mu_along * along_m_s, mu_across * across_m_s)
+            slow = gauge, gauge
+        case "scales":
+            along, across = mu_along, mu_across
+            slow = np.hypot(along_m_s, across_m_s), np.hypot(along_m_s, across_m_s)
+        case "wheels":
+            along, across = mu_along, mu_across
+            slow = np.abs(along_m_s), np.abs(across_m_s)
+    slow_along, slow_across = (
+        np.maximum(slow[0], along * floor),
+        np.maximum(slow[1], across * floor),
+    )
     slow_along[slow_along <= 0.0] = np.inf
     slow_across[slow_across <= 0.0] = np.inf
-    return (
-        -normal_n * mu_along**2 * along_m_s / slow_along,
-        -normal_n * mu_across**2 * across_m_s / slow_across,
-    )
+    return -normal_n * along * along_m_s / slow_along, -normal_n * across * across_m_s / slow_across
 
 
 def drive_shafts(drive: ServoDrive, position_rad: Floats, velocity_rad_s: Floats) -> Floats:

@@ -35,6 +35,10 @@ class PlanarBody:
     """Of a link, forward of its centre."""
     mu_back: float | None = None
     """Of sliding backward; None: ``mu_along``."""
+    law: str = "ellipse"
+    """``scales``: Hu, Nirody, Scott, Shelley, PNAS 2009, Eq. 2: the coefficients weigh the
+    components of the sliding *direction*. ``wheels``: Coulomb, on the axle and in rolling.
+    ``ellipse``: Goyal, Ruina, Papadopoulos, Wear 1991: the limit surface that dissipates most."""
     creep_m_s: float = 2e-5
     """Sliding below which Coulomb's jump is a slope; the answer is that of the limit 0."""
 
@@ -49,6 +53,22 @@ class PlanarRun:
     """(T,) of the head."""
     ground_j: float
     """Energy taken by the floor in all."""
+
+
+def _resistance(
+    body: PlanarBody, mu_along: Floats, forth: Floats, aside: Floats
+) -> tuple[Floats, Floats]:
+    """Resistance along and across per load, by the publication of each law."""
+    if body.law == "scales":
+        speed = np.sqrt(forth**2 + aside**2 + body.creep_m_s**2)
+        return mu_along * (forth / speed), body.mu_across * (aside / speed)
+    if body.law == "wheels":
+        creep = body.creep_m_s
+        rolling, axle = np.sqrt(forth**2 + creep**2), np.sqrt(aside**2 + creep**2)
+        return mu_along * forth / rolling, body.mu_across * aside / axle
+    creep = body.mu_across * body.creep_m_s
+    gauge = np.sqrt((mu_along * forth) ** 2 + (body.mu_across * aside) ** 2 + creep**2)
+    return mu_along**2 * forth / gauge, body.mu_across**2 * aside / gauge
 
 
 def simulate(
@@ -98,11 +118,9 @@ def simulate(
         forth, aside = (velocity * ahead).sum(axis=0), (velocity * left).sum(axis=0)
         aside = aside + (turn + w) * offset  # (points, links)
         mu_along = np.where(forth > 0.0, body.mu_along, mu_back)
-        creep = body.mu_across * body.creep_m_s
-        gauge = np.sqrt((mu_along * forth) ** 2 + (body.mu_across * aside) ** 2 + creep**2)
         along, across = (
-            -weight * mu_along**2 * forth / gauge,
-            -weight * body.mu_across**2 * aside / gauge,
+            -weight * each
+            for each in _resistance(body, mu_along * np.ones_like(aside), forth, aside)
         )
         pull = along.sum(axis=0) * ahead + across.sum(axis=0) * left
         torque = (arm[0] * pull[1] - arm[1] * pull[0]).sum() + (offset * across).sum()

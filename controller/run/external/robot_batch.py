@@ -73,8 +73,7 @@ class RobotBatch:
         if fault is not None:
             raise InputError(f"{fault}; use the backend processes")
         table = self._table(robot, pose)
-        friction = world.friction
-        self.bodies.friction[row] = friction.along, friction.across, friction.backward
+        self.bodies.friction[row] = world.friction.grip
         self.bodies.place(row, self._run.start_m, pose.heading_rad, pose.joint_rad)
         self.rows[row] = started = BatchRow(self, row, robot)
         started.set_up(table)

@@ -228,6 +228,7 @@ def _header(
         "goal_delay_s": serving.goal_delay_s,
         "friction_along": deviation.along,
         "friction_across": deviation.across,
+        "friction_law": deviation.law or world.friction.law_name,
         "load_kg": _listed(deviation.load_kg),
         "torque": _listed(deviation.torque),
         "slip_rad": _listed(deviation.slip_rad),

@@ -208,7 +208,7 @@ def test_dc_motors_answer_a_step_as_our_servos_do(name: str, most_rad: float) ->
     """Half a radian, with full output, the back-EMF and, of pitch joints, the current limit."""
     robot = load_robot(name)
     plant = MujocoPlant(robot, load_world("flat"))
-    plant.mechanics.mu = (0.0, 0.0, 0.0)  # a model for others has no friction of the ground
+    plant.mechanics.mu = (0.0, 0.0, 0.0, 0.0)  # a model for others has no friction of the ground
     model = mujoco.MjModel.from_xml_string(mjcf_text(robot, "dcmotor"))
     data, drive = mujoco.MjData(model), drive_of(robot)
     data.qpos[:] = plant.qpos

@@ -152,3 +152,14 @@ def test_news_are_notable_changes_in_words() -> None:
     assert 1 <= len(lines) <= 3
     assert lines[0].startswith("found 0.1")
     assert lines[0].endswith("the world's file has 0.1 and 0.7")
+
+
+def test_an_alarm_states_the_estimate_and_excludes_no_ground() -> None:
+    monitor = FrictionMonitor(FILE, OnPaper(), CYCLE_S, lambda _: None)
+    for view in sliding(FILE, 10.0):
+        monitor.update(view, joints_rad(0.0))
+    assert monitor.confirms_file
+    text = monitor.alarm_text
+    assert "0.1 along and 0.7 across, law ellipse (assumed)" in text
+    assert "the ground is not excluded" in text
+    assert "it is not the ground" not in text

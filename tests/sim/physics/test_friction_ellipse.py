@@ -1,8 +1,9 @@
-"""The law of friction by itself: its ellipse, and how it ends at rest."""
+"""The laws of friction by themselves, and how they end at rest."""
 
 import numpy as np
 import pytest
 
+from snakewalk.config.friction_law import ELLIPSE, LAWS, SCALES, WHEELS
 from snakewalk.sim.physics.friction import (
     AXIS,
     BENT_STOP_SHARE,
@@ -15,15 +16,15 @@ from snakewalk.sim.physics.friction import (
     ROWS,
     SLIDE,
     STILL,
-    ellipse_force,
+    friction_force,
     make_lanes,
     rub,
     stop_share,
 )
-from tests.oracles.numpy_steps import ellipse_forces
+from tests.oracles.numpy_steps import dry_forces
 
-MU = (0.1, 0.7, 0.3)
-"""Forward, across, back."""
+MU = (0.1, 0.7, 0.3, float(ELLIPSE))
+"""Forward, across, back, and the law."""
 LOAD_N = 1.1
 DRAG = 33.0
 RNG = np.random.default_rng(5)
@@ -31,7 +32,7 @@ SLIDING = RNG.normal(size=(200, 2))
 
 
 def force(v: np.ndarray) -> np.ndarray:
-    return np.array(ellipse_force(LOAD_N, v[0], v[1], MU, DRAG, LOAD_N))
+    return np.array(friction_force(LOAD_N, v[0], v[1], MU, DRAG, LOAD_N))
 
 
 def test_sliding_force_lies_on_the_half_ellipse_that_opposes_it() -> None:
@@ -52,9 +53,35 @@ def test_no_other_force_of_the_ellipse_takes_more_energy() -> None:
         assert taken == pytest.approx((-others @ v).max(), rel=1e-4)
 
 
-def test_near_rest_it_is_the_drag_that_stops_a_link() -> None:
+@pytest.mark.parametrize("law", range(len(LAWS)))
+def test_near_rest_it_is_the_drag_that_stops_a_link(law: int) -> None:
     for v in 1e-5 * SLIDING:
-        np.testing.assert_allclose(force(v), -DRAG * v)
+        pulls = friction_force(LOAD_N, v[0], v[1], (*MU[:3], law), DRAG, LOAD_N)
+        np.testing.assert_allclose(pulls, -DRAG * v)
+
+
+def test_scales_weigh_the_components_of_the_direction() -> None:
+    for v in SLIDING:
+        way = v / np.hypot(*v)
+        mu = np.array([MU[0] if v[0] > 0.0 else MU[2], MU[1]])
+        pulls = friction_force(LOAD_N, v[0], v[1], (*MU[:3], SCALES), DRAG, LOAD_N)
+        np.testing.assert_allclose(pulls, -LOAD_N * mu * way)
+
+
+def test_wheels_roll_and_slip_each_by_coulomb() -> None:
+    for v in SLIDING:
+        mu = np.array([MU[0] if v[0] > 0.0 else MU[2], MU[1]])
+        pulls = friction_force(LOAD_N, v[0], v[1], (*MU[:3], WHEELS), 1e8, LOAD_N)
+        np.testing.assert_allclose(pulls, -LOAD_N * mu * np.sign(v))
+
+
+def test_laws_agree_on_the_axes_and_nowhere_else() -> None:
+    laws = [(*MU[:3], law) for law in range(len(LAWS))]
+    for v in np.array([[0.3, 0.0], [-0.3, 0.0], [0.0, 0.3]]):
+        pulls = [friction_force(LOAD_N, v[0], v[1], law, 1e4, LOAD_N) for law in laws]
+        np.testing.assert_allclose(pulls, [pulls[0]] * 3)
+    taken = [-np.dot((0.2, 0.1), friction_force(1.0, 0.2, 0.1, law, 1e4, 1.0)) for law in laws]
+    assert taken[SCALES] < taken[ELLIPSE] < taken[WHEELS]
 
 
 def test_force_shrinks_to_nothing_without_a_jump() -> None:
@@ -64,14 +91,16 @@ def test_force_shrinks_to_nothing_without_a_jump() -> None:
         forces = np.array([force(speed * way) for speed in speeds])
         assert np.abs(np.diff(forces, axis=0)).max() < DRAG * 1.01 * speeds[1]
     assert tuple(force(np.zeros(2))) == (0.0, 0.0)
-    assert ellipse_force(0.0, 1.0, 1.0, MU, DRAG, 0.0) == (0.0, 0.0)
+    assert friction_force(0.0, 1.0, 1.0, MU, DRAG, 0.0) == (0.0, 0.0)
 
 
-def test_many_at_once_are_one_by_one() -> None:
+@pytest.mark.parametrize("law", range(len(LAWS)))
+def test_many_at_once_are_one_by_one(law: int) -> None:
+    mu = (*MU[:3], law)
     v = np.concatenate([SLIDING, 1e-4 * SLIDING, np.zeros((1, 2))])
     load = RNG.uniform(0.0, 3.0, len(v))
-    along, across = ellipse_forces(0.5 * load, v[:, 0], v[:, 1], MU, DRAG, load)
-    single = [ellipse_force(0.5 * n, *each, MU, DRAG, n) for n, each in zip(load, v, strict=True)]
+    along, across = dry_forces(0.5 * load, v[:, 0], v[:, 1], mu, DRAG, load)
+    single = [friction_force(0.5 * n, *each, mu, DRAG, n) for n, each in zip(load, v, strict=True)]
     np.testing.assert_allclose(np.stack([along, across], axis=1), single, atol=1e-15)
 
 
@@ -106,7 +135,7 @@ def test_contacts_side_by_side_rub_on_their_own_plane_and_as_each_would_alone() 
         along /= np.linalg.norm(along)
         across = np.cross(normal, along)
         slides = each[SLIDE] @ along, each[SLIDE] @ across
-        expected = ellipse_force(LOAD_N / 3.0, *slides, MU, DRAG, LOAD_N)
+        expected = friction_force(LOAD_N / 3.0, *slides, MU, DRAG, LOAD_N)
         np.testing.assert_allclose(
             (acts @ along, acts @ across, acts @ normal), (*expected, 0.0), atol=1e-12
         )
