@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.friction_law import LAWS
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.rehearsal.judgement import judge
@@ -88,7 +89,7 @@ def case_of(row: dict[str, Any]) -> RehearsalCase:
 
 
 def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
-    """Draw errors of friction, mass, one servo and the horns."""
+    """Draw errors of friction, mass, one servo, the horns, and the law of friction."""
     along, across, mass = (
         factor ** rng.choice([-1.0, 1.0]) for factor in (FRICTION, FRICTION, MASS)
     )
@@ -100,6 +101,7 @@ def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
         (float(mass) - 1.0) * np.array(robot.link_masses_kg),
         torque,
         np.radians(HORN_DEG) * rng.standard_normal(robot.joint_count),
+        LAWS[rng.integers(len(LAWS))],
     )
 
 
@@ -154,7 +156,8 @@ def _friction_facts(result: RunResult, deviation: Deviation) -> dict[str, Any] |
         "true_along": round(found.along_file * deviation.along, 4),
         "true_across": round(found.across_file * deviation.across, 4),
     }
+    law = deviation.law or result.record.header.world.friction.law_name
     (low, high), (least, most) = found.along_95, found.across_95
     is_inside = low <= true["true_along"] <= high and least <= true["true_across"] <= most
     used = any(event.kind == "friction" for event in result.record.events)
-    return {**asdict(found), **true, "is_inside": is_inside, "was_used": used}
+    return {**asdict(found), **true, "true_law": law, "is_inside": is_inside, "was_used": used}

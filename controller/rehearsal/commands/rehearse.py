@@ -46,8 +46,8 @@ def rehearse_runs(
         bool,
         typer.Option(
             "--errors",
-            help="add wrong friction and mass, a weak servo, horns off by 2 degrees and goals 40 "
-            "ms late",
+            help="add wrong friction and mass, any law of friction, a weak servo, horns off by 2 "
+            "degrees and goals 40 ms late",
         ),
     ] = False,
     tracker: Annotated[

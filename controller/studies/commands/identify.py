@@ -24,6 +24,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,
+    fit_laws,
     with_mass,
 )
 from snakewalk.controller.studies.identification.pendulum_fit import (
@@ -36,6 +37,7 @@ from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
     bam_text,
     check_servo,
+    ranges,
     read_bam,
     robot_comment,
     robot_with,
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
         Found,
         FrictionFit,
         FrictionLog,
+        LawFit,
     )
     from snakewalk.controller.studies.identification.servo_constants import ServoConstants
 
@@ -131,8 +134,8 @@ def identify(
     """Find a servo's constants from its pendulum, or friction and mass from logs of runs.
 
     Recordings of a servo give resistance, torque constant, friction, inertia and P unit. Logs
-    of runs give the friction along and across the body, on the ground --world (default: that of
-    the logs). With --robot-out, gaits that lift the links also give their mass. All results
+    of runs give the friction along and across the body, and its law, on the ground --world
+    (default: that of the logs). With --robot-out, gaits that lift also give the mass. All results
     have 95 % intervals.
     """
     judge = judge or []
@@ -234,6 +237,12 @@ def _friction(
     first = logs[paths[0]].goals
     name = first.world.name if out is None else out.stem
     ground = checked(WorldConfig, first.world.model_dump() | {"name": name}, str(out))
+    with ProgressBar("laws of friction", transient=True) as bar:
+        laws = fit_laws([logs[path] for path in paths], bar.update)
+    if laws.is_decided:
+        logs = {path: log.under(laws.best) for path, log in logs.items()}
+        friction = ground.friction.model_copy(update={"law": laws.best})
+        ground = ground.model_copy(update={"friction": friction})
     with ProgressBar("friction", transient=True) as bar:
         found = fit_friction(
             [logs[path] for path in paths],
@@ -248,11 +257,12 @@ def _friction(
     if found.mass is not None and outs.robot is not None:
         _write_mass(outs.robot, first.robot, found.mass, paths)
     kept = found.world(ground).friction
-    _tell_friction(found, kept, logs, paths, outs, as_json=as_json)
+    _tell_friction(found, laws, kept, logs, paths, outs, as_json=as_json)
 
 
 def _tell_friction(
     found: "FrictionFit",
+    laws: "LawFit",
     kept: "FrictionConfig",
     logs: "dict[Path, FrictionLog]",
     paths: list[Path],
@@ -268,9 +278,13 @@ def _tell_friction(
         for key in ("along", "across", "back")
         if key in found.found
     ]
+    if laws.is_decided:
+        settings.append(f"world.friction.law={laws.best}")
     fitted = {str(path) for path in paths}
     if as_json:
-        result = {
+        result: dict[str, object] = {
+            "law": laws.best if laws.is_decided else None,
+            "law_misfit": {law: round(value, 3) for law, value in laws.misfit.items()},
             "friction": {key: one.value for key, one in found.found.items()},
             "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
             "not_told": [key for key, one in found.found.items() if not one.determined],
@@ -304,6 +318,7 @@ def _tell_friction(
             f"{math.degrees(after_rad):.1f} degrees with this"
             f"{'' if log_name in fitted else ' (not fitted)'}"
         )
+    console.print(laws.text(), soft_wrap=True)
     console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
     if found.mass is not None:
         mass = found.mass.times(_spine_kg(first.robot))
@@ -381,6 +396,7 @@ def _servo(
     }
     mean_deg = round(fmean(error for error, _ in errors.values()), 3)
     rows = list(zip(CONSTANTS, found.values, found.low, found.high, strict=True))
+    reached = _reached_bounds(found) if fit else {}
     if as_json:
         result = {
             "actuator": found.actuator,
@@ -391,17 +407,14 @@ def _servo(
             "mean_error_deg": mean_deg,
             "errors_deg": {path: error for path, (error, _) in errors.items()},
             "fitted": [path for path, (_, used) in errors.items() if used],
+            "on_bound": {name: bound for name, (bound, _) in reached.items()},
             "out": out and str(out),
         }
         if robot_file is not None:
             result |= {"robot_out": str(robot_file.out), "robot_errors_deg": forecasts}
         print(json.dumps(result))
         return
-    table = Table("constant", "value", "95 % interval", box=None)
-    for constant, value, low, high in rows:
-        interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
-        table.add_row(constant.name.replace("_", " "), f"{value:.4g}", interval)
-    console.print(table)
+    console.print(_constants_table(found, reached))
     for path, (error, used) in errors.items():
         console.print(
             f"{path}: {error:.2f} degrees off on average{'' if used else ' (not fitted)'}"
@@ -414,6 +427,29 @@ def _servo(
             f"that of {robot_file.before.name} {before_deg:.2f}",
             soft_wrap=True,
         )
+
+
+def _reached_bounds(found: "ServoConstants") -> dict[str, tuple[float, str]]:
+    """Return the constants on an end of their range, and warn of each."""
+    reached = ranges(found.actuator).bounds_reached(found.values)
+    for name, (bound, which) in reached.items():
+        LOGGER.warning(
+            "%s: %g is the %s end of its range, so other constants may be wrong, too; check mass, "
+            "arm and supply, and do not use the result for another load",
+            *(name, bound, which),
+        )
+    return reached
+
+
+def _constants_table(found: "ServoConstants", reached: dict[str, tuple[float, str]]) -> Table:
+    table = Table("constant", "value", "95 % interval", "", box=None)
+    for constant, value, low, high in zip(
+        CONSTANTS, found.values, found.low, found.high, strict=True
+    ):
+        interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
+        note = f"{reached[constant.name][1]} end of the range" if constant.name in reached else ""
+        table.add_row(constant.name.replace("_", " "), f"{value:.4g}", interval, note)
+    return table
 
 
 def _write_robot(file: _RobotFile, found: "ServoConstants", logs: list[Path]) -> "RobotConfig":

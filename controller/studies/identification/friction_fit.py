@@ -23,6 +23,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.friction_law import LAWS, LawName
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.controller.console.pool import each
@@ -64,6 +65,8 @@ _ALONE, _TOGETHER = 4, 2
 _DETERMINED: Final = 0.35
 """Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
 twice the value (ours)."""
+_DECIDED: Final = 5.0
+"""Difference of log-likelihoods that decides for a law (ours): odds of 150."""
 _NORMAL_95: Final = 1.96
 
 
@@ -162,6 +165,11 @@ class FrictionLog:
                 f"(snakewalk gait run sidewinding --robot {robot.name}, or rectilinear)"
             )
 
+    def under(self, law: LawName) -> "FrictionLog":
+        """Return the same log, of ground with a law of friction."""
+        friction = self.goals.world.friction.model_copy(update={"law": law})
+        return replace(self, goals=self.with_friction(friction))
+
     def with_friction(self, friction: FrictionConfig) -> Goals:
         """Return the same goals on ground of another friction."""
         world = self.goals.world.model_copy(update={"friction": friction})
@@ -259,6 +267,53 @@ def fit_friction(
     return _Fit(logs, mass, workers, on_progress).run()
 
 
+@dataclass(frozen=True, slots=True)
+class LawFit:
+    """How well each law of friction explains the logs."""
+
+    misfit: dict[LawName, float]
+    """Negative logarithm of the likelihood above that of the best law, with the friction that fits
+    best under each; 3 are odds of 20."""
+
+    @property
+    def best(self) -> LawName:
+        """The law with the least misfit."""
+        return min(self.misfit, key=lambda law: self.misfit[law])
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the logs decide between the best law and the others."""
+        return sorted(self.misfit.values())[1] > _DECIDED
+
+    def text(self) -> str:
+        """A line for a person."""
+        others = ", ".join(
+            f"{law} {value:.1f}" for law, value in self.misfit.items() if law != self.best
+        )
+        if self.is_decided:
+            return f"law of friction: {self.best}; worse by (log-likelihood): {others}"
+        return (
+            f"law of friction: these logs cannot decide it; {self.best} fits best; worse by "
+            f"(log-likelihood, {_DECIDED:g} decide): {others}"
+        )
+
+
+def fit_laws(
+    logs: Sequence[FrictionLog], on_progress: Callable[[int, int], None] = lambda done, total: None
+) -> LawFit:
+    """Fit the friction under each law, and compare how well they explain the logs."""
+    misfits: dict[LawName, float] = {}
+    for count, law in enumerate(LAWS):
+        there = [log.under(law) for log in logs]
+
+        def report(done: int, total: int, before: int = count) -> None:
+            on_progress(before * total + done, len(LAWS) * total)
+
+        misfits[law] = _Fit(there, False, 1, report).misfit()[1]
+    least = min(misfits.values())
+    return LawFit({law: value - least for law, value in misfits.items()})
+
+
 class _Fit:
     """Gauss-Newton steps; the vector has the friction's logarithms, then other differences."""
 
@@ -315,6 +370,26 @@ class _Fit:
         curvature, _ = self._normal(effects, self._measured - now)
         return self._fit(values, np.asarray(np.linalg.inv(curvature)))
 
+    def misfit(self) -> tuple[FrictionConfig, float]:
+        """Fit the friction alone; return it, and the negative logarithm of its likelihood."""
+        k, values = len(self._names), self._start.copy()
+        others = np.zeros(len(self._steps))
+        now = self._simulated(np.append(values, others))
+        for _ in range(_ALONE):
+            effects = self._columns(np.append(values, others), now, range(k), 1)
+            self._set_noise(self._measured - now, effects)
+            curvature, pull = self._normal(effects, self._measured - now)
+            pull -= self._prior[:k, :k] @ (values - self._start)
+            step = np.linalg.solve(curvature, pull)
+            values += step * min(1.0, _MOST / np.abs(step).max())
+            now = self._simulated(np.append(values, others))
+        square = (self._measured - now) ** 2
+        misfit = 0.0
+        for kind, (floor, per_sample) in enumerate(zip(_FLOORS, _PER_SAMPLE, strict=True)):
+            of = square[self._kinds == kind]
+            misfit += 0.5 * len(of) / per_sample * math.log(max(floor, float(of.mean())))
+        return _friction(self._names, values, self._logs[0].goals.world.friction), misfit
+
     def _fit(self, values: Floats, covariance: Floats) -> FrictionFit:
         def of(weights: Floats) -> Found:
             spread = math.sqrt(float(weights @ covariance @ weights))
@@ -329,7 +404,9 @@ class _Fit:
             each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
             mass = of(each[k - 1])
         found[RATIO] = of(each[1] - each[0])
-        return FrictionFit(_friction(self._names, values), found, mass)
+        return FrictionFit(
+            _friction(self._names, values, self._logs[0].goals.world.friction), found, mass
+        )
 
     def _simulated(self, values: Floats) -> Floats:
         out: Floats = _simulated(self._logs, self._names, values)[self._known]
@@ -370,15 +447,15 @@ class _Fit:
             self._noise[kind] = max(floor, float((rest[of] ** 2).sum()) / spare)
 
 
-def _friction(names: Sequence[str], logs: Floats) -> FrictionConfig:
+def _friction(names: Sequence[str], logs: Floats, told: FrictionConfig) -> FrictionConfig:
     values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # range that a world accepts
     found = dict(zip(names, map(float, values), strict=True))
-    return FrictionConfig(**{name: value for name, value in found.items() if name != MASS})
+    return told.model_copy(update={name: each for name, each in found.items() if name != MASS})
 
 
 def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats) -> Floats:
     """Answer and motion (N,) of all logs, simulated with these values."""
-    friction = _friction(names, values)
+    friction = _friction(names, values, logs[0].goals.world.friction)
     others = np.concatenate([np.zeros(2), values[len(names) :]])
     deviation = Constants(logs[0].goals.robot).deviation(others)
     goals = [log.with_friction(friction) for log in logs]

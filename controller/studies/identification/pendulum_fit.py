@@ -21,12 +21,10 @@ from snakewalk.controller.studies.identification.pendulum_swing import (
     swing_rad,
 )
 from snakewalk.controller.studies.identification.servo_constants import (
-    CONSTANTS,
     FITTED,
-    HIGH,
-    LOW,
     NAMES,
     ServoConstants,
+    ranges,
 )
 
 BACKLASHES_RAD: Final = (0.003, 0.008, 0.017, 0.035)
@@ -101,9 +99,13 @@ def fit_pendulum(
 
     """
     rng = np.random.default_rng(seed)
-    given = np.array([c.start for c in CONSTANTS]) if start is None else start.values
+    searched = ranges(logs[0].actuator)
+    given = searched.start if start is None else start.values
     first, squares = given[:FITTED], given[FITTED:]
-    width, total = (HIGH - LOW)[:FITTED], starts + hops + 1 + backlash * len(BACKLASHES_RAD)
+    width, total = (
+        (searched.high - searched.low)[:FITTED],
+        starts + hops + 1 + backlash * len(BACKLASHES_RAD),
+    )
     pool: list[OptimizeResult] = []
     for k in range(starts):
         factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
@@ -167,7 +169,7 @@ def _with_backlash(
             if _cost(rigid.x, logs, np.append(backlash_rad, kept[1:]))
             > _cost(rigid.x, logs, none) * (1.0 + _CHI_SQUARE / _blocks(logs))
         ),
-        float(HIGH[_BACKLASH]),
+        float(ranges(logs[0].actuator).high[_BACKLASH]),
     )
     return np.asarray(rigid.x), none, most_rad
 
@@ -191,7 +193,8 @@ def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s
 def _fit(
     logs: Sequence[PendulumLog], values: Floats, squares: Floats, step_s: float, turns: int
 ) -> OptimizeResult:
-    low, high = LOW[: len(values)], HIGH[: len(values)]
+    searched = ranges(logs[0].actuator)
+    low, high = searched.low[: len(values)], searched.high[: len(values)]
     width = high - low
     inside = np.clip(values, low + 1e-6 * width, high - 1e-6 * width)
     turn = [_TURN] if len(values) == FITTED else [*[_TURN] * FITTED, _BACKLASH_TURN]
@@ -222,7 +225,8 @@ def _scaled(values: Floats, factor: float) -> Floats:
 
 def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
     """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
-    lowest, highest = LOW[: len(values)], HIGH[: len(values)]
+    searched = ranges(logs[0].actuator)
+    lowest, highest = searched.low[: len(values)], searched.high[: len(values)]
     limit = _cost(values, logs, squares) * (1.0 + _CHI_SQUARE / _blocks(logs))
     ends = []
     for step in (1.0 / _FACTOR, _FACTOR):
@@ -246,7 +250,8 @@ def _intervals(
     intervals grow with the blocks' sums, not shrink with the number of samples. Values that the
     logs do not determine have an interval as wide as their range.
     """
-    lowest, highest = LOW[: len(values)], HIGH[: len(values)]
+    searched = ranges(logs[0].actuator)
+    lowest, highest = searched.low[: len(values)], searched.high[: len(values)]
     width = highest - lowest
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
     steps[FITTED:] = _BACKLASH_TURN * values[FITTED:]
@@ -286,5 +291,5 @@ def _intervals(
     if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
         # whether friction grows when the shaft is slow is open, so how slow is open, too
         shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
-        low[shape], high[shape] = LOW[shape], HIGH[shape]
+        low[shape], high[shape] = searched.low[shape], searched.high[shape]
     return low, high

@@ -12,8 +12,10 @@ M6.)
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -25,7 +27,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import with_keys
 from snakewalk.config.motor import MotorConfig
 from snakewalk.config.robot import RobotConfig
-from snakewalk.sim.servo.motor import MOTORS
+from snakewalk.config.servo_catalogue import servo_model, shipped_models
+from snakewalk.sim.servo.motor import MOTORS, MotorModel
 
 
 class Constant(NamedTuple):
@@ -37,7 +40,7 @@ class Constant(NamedTuple):
     """In BAM's files."""
     low: float
     high: float
-    """Where it is looked for (ours)."""
+    """Searched range of an XL330 (ours); ``ranges`` has those of other servos."""
     start: float
     absent: float
     """Value for a file of BAM that lacks it."""
@@ -49,7 +52,7 @@ CONSTANTS: Final = (
     Constant("torque_constant_n_m_a", "kt", 0.05, 5.0, 0.4, math.nan),
     Constant("resistance_ohm", "R", 0.3, 20.0, 4.0, math.nan),
     Constant("armature_kg_m2", "armature", 1e-5, 0.1, 2e-3, math.nan),
-    Constant("offset_rad", "q_offset", -0.1, 0.1, 0.0, 0.0),
+    Constant("offset_rad", "q_offset", -0.13, 0.13, 0.0, 0.0),
     Constant("dry_n_m", "friction_base", 0.0, 0.3, 0.01, math.nan),
     Constant("stribeck_n_m", "friction_stribeck", 0.0, 0.3, 0.005, 0.0),
     Constant("by_motor", "load_friction_motor", 0.0, 0.6, 0.2, 0.0),
@@ -67,14 +70,17 @@ CONSTANTS: Final = (
 )
 """``p_unit_per_rad`` is the share of the supply that a radian of error gets for each unit of the P
 gain. ``offset_rad`` and ``delay_s`` are the bench's: the offset of its zero, and the delay until a
-goal has an effect."""
+goal has an effect. The offset is at most half a tooth of a horn with 25."""
 NAMES: Final = tuple(constant.name for constant in CONSTANTS)
-LOW: Final = np.array([constant.low for constant in CONSTANTS])
-HIGH: Final = np.array([constant.high for constant in CONSTANTS])
 _SQUARES: Final = ("by_motor_square", "by_load_square")
 FITTED: Final = NAMES.index("backlash_rad")
 """Number of constants that every fit estimates, the first. The next one, the backlash, is estimated
 on request; squares stay as given (``docs/identify.md`` states the reason)."""
+_OHM_FACTOR: Final = 6.0
+"""Greatest factor of a resistance on nominal voltage over stall current (ours): recordings give
+that of a weaker motor with a smaller torque constant, too."""
+_NEAR: Final = 1e-3
+"""Share of a range within which a constant stands on its end (ours)."""
 _FORMS: Final = ("m1", "m2", "m3", "m4", "m5", "m6")
 _BOTH_SIDES: Final = {
     "load_friction_base": ("load_friction_motor", "load_friction_external"),
@@ -101,6 +107,64 @@ class ServoConstants:
     def __getitem__(self, name: str) -> float:
         """Value of a constant."""
         return float(self.values[NAMES.index(name)])
+
+
+class Ranges(NamedTuple):
+    """Where the constants (18,) of a servo are searched, and where a search begins."""
+
+    low: Floats
+    high: Floats
+    start: Floats
+
+    def bounds_reached(self, values: Floats) -> dict[str, tuple[float, str]]:
+        """Return the constants that stand on an end of their range: the end, and its name.
+
+        A zero of friction, delay or backlash is a value, not an end of a search.
+        """
+        reached = {}
+        for name, value, low, high in zip(NAMES, values, self.low, self.high, strict=True):
+            near = _NEAR * (high - low)
+            if value >= high - near:
+                reached[name] = float(high), "upper"
+            elif low != 0.0 and value <= low + near:
+                reached[name] = float(low), "lower"
+        return reached
+
+
+def is_of(model: str, actuator: str) -> bool:
+    """Whether a servo model may be the one that a recording names; no name fits every model."""
+    return model.lower().replace("-", "").startswith(actuator.lower().replace("-", ""))
+
+
+def _motors(actuator: str) -> list[MotorModel]:
+    models = [servo_model(name) for name in shipped_models() if is_of(name, actuator)]
+    known = [model for model in models if model.motor is not None and model.units.full_pwm]
+    return [MotorModel.of(model) for model in known]
+
+
+@cache
+def ranges(actuator: str) -> Ranges:
+    """Return the searched ranges of the servo that a recording names.
+
+    P unit and resistance follow the data of the shipped models with this name; if none has it, of
+    those with the same letters in front (STS, XL), else of all. The ranges of the other constants
+    hold for every small servo.
+    """
+    motors = _motors(actuator) or _motors(re.split(r"[^a-z]", actuator.lower())[0])
+    motors = motors or _motors("")
+    units = [m.positions_per_rad / m.p_gain_divisor / m.full_pwm / _XL330_P_UNIT for m in motors]
+    ohms = [m.resistance_ohm for m in motors]
+    low, high, start = (
+        np.array([getattr(constant, key) for constant in CONSTANTS])
+        for key in ("low", "high", "start")
+    )
+    unit, ohm = NAMES.index("p_unit_per_rad"), NAMES.index("resistance_ohm")
+    low[unit] *= min(units)
+    high[unit] *= max(units)
+    start[unit] *= math.sqrt(min(units) * max(units))
+    low[ohm] = min(low[ohm], min(ohms) / _OHM_FACTOR)
+    high[ohm] = max(high[ohm], max(ohms) * _OHM_FACTOR)
+    return Ranges(low, high, start)
 
 
 def bam_text(constants: ServoConstants) -> str:
@@ -169,7 +233,7 @@ def check_servo(robot: RobotConfig, actuator: str) -> None:
 
     """
     model = robot.servo.model
-    if not model.lower().replace("-", "").startswith(actuator.lower().replace("-", "")):
+    if not is_of(model, actuator):
         raise InputError(
             f"the constants are of a servo {actuator}, robot {robot.name} has {model}; give "
             "recordings of its own (their motor is the model's name, or its beginning)"

@@ -83,7 +83,10 @@ def test_speed_under_scales_is_that_of_the_publication() -> None:
 @pytest.mark.parametrize("mu", MU)
 @pytest.mark.parametrize("gait", GAITS)
 def test_speed_is_that_of_the_publication(law: LawName, mu: str, gait: str) -> None:
-    """Within 1 %, three gaits, two ratios; the small speeds in steps of half a millisecond."""
+    """Within 1 %, three gaits, two ratios; or within 1.5 mm of a cycle.
+
+    The latter is the creep of wheels near rest, where the long wave travels only 3 cm a cycle.
+    """
     made, expected = way_m(law, MU[mu], GAITS[gait], STEP_S)
     print(f"{law} {mu} {gait}: {made[0] / expected[0] - 1.0:+.2%} of {expected[0]:.4f} m")
-    assert made[0] == pytest.approx(expected[0], rel=0.01)
+    assert made[0] == pytest.approx(expected[0], rel=0.01, abs=0.0015)

@@ -13,6 +13,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.run.deviation import NO_DEVIATION
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
@@ -20,7 +21,9 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
+    LawFit,
     fit_friction,
+    fit_laws,
     with_mass,
 )
 from tests.helpers.uneven import UNEVEN
@@ -40,6 +43,28 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run") / "planted"
     short = replace(prepared, robot=robot, run=run, world=world)
     return run_robot(RunRequest(short, folder, stoppable=False)).log
+
+
+@pytest.mark.costs("fits a simulated body under three laws")
+def test_a_planted_law_is_found(log: Path) -> None:
+    """The same goals on ground with the law of scales, which moves the body far less."""
+    given = FrictionLog.of(read_log(log), load_world("flat"))
+    friction = FrictionConfig(**PLANTED, law="scales")
+    seen = FrictionLog.simulated(given.with_friction(friction), NO_DEVIATION)
+    seen = replace(seen, goals=given.goals)  # the file has another friction, and states no law
+    found = fit_laws([seen])
+    assert found.best == "scales"
+    assert found.misfit["scales"] == 0.0
+    assert min(found.misfit["ellipse"], found.misfit["wheels"]) > 1.0
+
+
+def test_laws_that_fit_alike_are_not_decided() -> None:
+    alike = LawFit({"ellipse": 0.0, "scales": 9.0, "wheels": 1.0})
+    assert not alike.is_decided
+    assert "cannot decide" in alike.text()
+    clear = LawFit({"ellipse": 20.0, "scales": 0.0, "wheels": 17.0})
+    assert clear.is_decided
+    assert clear.text().startswith("law of friction: scales;")
 
 
 @pytest.fixture(scope="module")

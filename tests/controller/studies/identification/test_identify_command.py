@@ -12,7 +12,9 @@ from snakewalk.config.loader import load_robot, with_keys
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
+    NAMES,
     ServoConstants,
+    ranges,
     robot_with,
 )
 from snakewalk.sim.servo.motor import gears_of, motors_of, p_gain_per_rad
@@ -36,7 +38,7 @@ BAM = {
 
 def run(*words: str | Path) -> str:
     done = CliRunner().invoke(app, ["robot", "identify", *map(str, words)], catch_exceptions=False)
-    return done.output
+    return done.stdout
 
 
 def refused(*words: str | Path) -> str:
@@ -176,3 +178,27 @@ def test_a_person_reads_a_table(files: list[Path], tmp_path: Path, line: str) ->
     start = tmp_path / "bam.json"
     start.write_text(json.dumps(BAM))
     assert line in run(files[0], "--start", start, "--no-fit")
+
+
+def test_ranges_follow_the_data_of_a_servo() -> None:
+    """An STS3215 has 0.165 of full output for a radian and unit (Rhoban, on an oscilloscope)."""
+    at = NAMES.index("p_unit_per_rad")
+    feetech, unshipped, xl330 = (ranges(name) for name in ("sts3215", "sts3032", "xl330"))
+    assert feetech.low[at] < 0.165 / 2.0
+    assert feetech.high[at] > 0.165 * 2.0
+    assert unshipped.high[at] == feetech.high[at]
+    assert (xl330.low[at], xl330.high[at]) == pytest.approx((5e-4, 2e-2))
+    assert ranges("").high[at] > feetech.high[at]
+
+
+def test_a_constant_on_a_bound_is_reported() -> None:
+    searched = ranges("sts3215")
+    values = searched.start.copy()
+    values[NAMES.index("dry_n_m")] = 0.0  # no friction is a value
+    assert searched.bounds_reached(values) == {}
+    values[NAMES.index("p_unit_per_rad")] = searched.high[NAMES.index("p_unit_per_rad")]
+    values[NAMES.index("offset_rad")] = searched.low[NAMES.index("offset_rad")]
+    assert searched.bounds_reached(values) == {
+        "offset_rad": (-0.13, "lower"),
+        "p_unit_per_rad": (searched.high[NAMES.index("p_unit_per_rad")], "upper"),
+    }
