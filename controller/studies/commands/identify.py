@@ -24,9 +24,9 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,
-    fit_laws,
     with_mass,
 )
+from snakewalk.controller.studies.identification.law_fit import LawFit, fit_laws
 from snakewalk.controller.studies.identification.pendulum_fit import (
     error_deg,
     fit_pendulum,
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
         Found,
         FrictionFit,
         FrictionLog,
-        LawFit,
     )
     from snakewalk.controller.studies.identification.servo_constants import ServoConstants
 
@@ -262,7 +261,7 @@ def _friction(
 
 def _tell_friction(
     found: "FrictionFit",
-    laws: "LawFit",
+    laws: LawFit,
     kept: "FrictionConfig",
     logs: "dict[Path, FrictionLog]",
     paths: list[Path],

@@ -23,7 +23,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.config.friction_law import LAWS, LawName
+from snakewalk.config.friction_law import LawName
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.controller.console.pool import each
@@ -65,8 +65,6 @@ _ALONE, _TOGETHER = 4, 2
 _DETERMINED: Final = 0.35
 """Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
 twice the value (ours)."""
-_DECIDED: Final = 5.0
-"""Difference of log-likelihoods that decides for a law (ours): odds of 150."""
 _NORMAL_95: Final = 1.96
 
 
@@ -267,51 +265,9 @@ def fit_friction(
     return _Fit(logs, mass, workers, on_progress).run()
 
 
-@dataclass(frozen=True, slots=True)
-class LawFit:
-    """How well each law of friction explains the logs."""
-
-    misfit: dict[LawName, float]
-    """Negative logarithm of the likelihood above that of the best law, with the friction that fits
-    best under each; 3 are odds of 20."""
-
-    @property
-    def best(self) -> LawName:
-        """The law with the least misfit."""
-        return min(self.misfit, key=lambda law: self.misfit[law])
-
-    @property
-    def is_decided(self) -> bool:
-        """Whether the logs decide between the best law and the others."""
-        return sorted(self.misfit.values())[1] > _DECIDED
-
-    def text(self) -> str:
-        """A line for a person."""
-        others = ", ".join(
-            f"{law} {value:.1f}" for law, value in self.misfit.items() if law != self.best
-        )
-        if self.is_decided:
-            return f"law of friction: {self.best}; worse by (log-likelihood): {others}"
-        return (
-            f"law of friction: these logs cannot decide it; {self.best} fits best; worse by "
-            f"(log-likelihood, {_DECIDED:g} decide): {others}"
-        )
-
-
-def fit_laws(
-    logs: Sequence[FrictionLog], on_progress: Callable[[int, int], None] = lambda done, total: None
-) -> LawFit:
-    """Fit the friction under each law, and compare how well they explain the logs."""
-    misfits: dict[LawName, float] = {}
-    for count, law in enumerate(LAWS):
-        there = [log.under(law) for log in logs]
-
-        def report(done: int, total: int, before: int = count) -> None:
-            on_progress(before * total + done, len(LAWS) * total)
-
-        misfits[law] = _Fit(there, False, 1, report).misfit()[1]
-    least = min(misfits.values())
-    return LawFit({law: value - least for law, value in misfits.items()})
+def friction_misfit(logs: Sequence[FrictionLog], on_progress: Callable[[int, int], None]) -> float:
+    """Fit the friction alone; return the negative logarithm of the likelihood that is left."""
+    return _Fit(logs, False, 1, on_progress).misfit()
 
 
 class _Fit:
@@ -370,8 +326,8 @@ class _Fit:
         curvature, _ = self._normal(effects, self._measured - now)
         return self._fit(values, np.asarray(np.linalg.inv(curvature)))
 
-    def misfit(self) -> tuple[FrictionConfig, float]:
-        """Fit the friction alone; return it, and the negative logarithm of its likelihood."""
+    def misfit(self) -> float:
+        """As ``friction_misfit``."""
         k, values = len(self._names), self._start.copy()
         others = np.zeros(len(self._steps))
         now = self._simulated(np.append(values, others))
@@ -388,7 +344,7 @@ class _Fit:
         for kind, (floor, per_sample) in enumerate(zip(_FLOORS, _PER_SAMPLE, strict=True)):
             of = square[self._kinds == kind]
             misfit += 0.5 * len(of) / per_sample * math.log(max(floor, float(of.mean())))
-        return _friction(self._names, values, self._logs[0].goals.world.friction), misfit
+        return misfit
 
     def _fit(self, values: Floats, covariance: Floats) -> FrictionFit:
         def of(weights: Floats) -> Found:

@@ -21,11 +21,10 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
-    LawFit,
     fit_friction,
-    fit_laws,
     with_mass,
 )
+from snakewalk.controller.studies.identification.law_fit import LawFit, fit_laws
 from tests.helpers.uneven import UNEVEN
 
 PLANTED = {"along": 0.16, "across": 0.45}
