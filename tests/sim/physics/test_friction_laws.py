@@ -71,6 +71,7 @@ def way_m(law: LawName, mu: tuple[float, ...], wave: Wave, step_s: float) -> tup
     return centre[-1] - centre[round(1.0 / step_s)], expected[2] - expected[1]
 
 
+@pytest.mark.costs("simulates a body for three seconds, and a planar model of it")
 def test_speed_under_scales_is_that_of_the_publication() -> None:
     """The fast case: a milk snake's coefficients, of which the one backward is another."""
     made, expected = way_m("scales", MU["milk snake"], GAITS["long"], 0.002)
