@@ -252,11 +252,11 @@ def stop_now(words: Sequence[str]) -> int | None:
         InputError: as ``Stop.carry_out``.
 
     """
-    stop = _read(iter(words))
+    stop = stop_of_words(iter(words))
     return None if stop is None else stop.carry_out()
 
 
-def _read(words: Iterator[str]) -> Stop | None:
+def stop_of_words(words: Iterator[str]) -> Stop | None:
     """Return the options; None for words that only the complete command line understands."""
     stop = Stop()
     for word in words:

@@ -61,6 +61,7 @@ LIMITS: Final = {
 }
 """Tokens of each package."""
 RAISED: Final[dict[str, tuple[int, str]]] = {
+    "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "controller.console": (8200, "0188-options-are-fields.md"),
     "controller.view": (9200, "0193-budget-of-the-live-page.md"),
 }

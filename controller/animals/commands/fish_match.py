@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.commands.fish_options import Build, Picture, check_npz
+from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
 from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.accuracy import compare
+from snakewalk.controller.animals.fish.film_options import Build
 from snakewalk.controller.animals.fish.fish_matching import MIDLINES, match_footage, read_midlines
 from snakewalk.controller.animals.fish.postures import load_postures, save_postures
 from snakewalk.controller.console.command import command

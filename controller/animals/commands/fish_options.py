@@ -6,15 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console import completion
 
-Build = Annotated[
-    str,
-    typer.Option(
-        help="model of the body: carp (A0..A3 behind a rigid head) or eel (8 angles)",
-        autocompletion=completion.words("carp", "eel"),
-    ),
-]
 Picture = Annotated[Path | None, typer.Option(help="draw the result here (.png, .svg, .pdf)")]
 
 

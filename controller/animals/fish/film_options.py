@@ -2,12 +2,20 @@
 
 from typing import Annotated
 
+import typer
 from pydantic import Field
 
 from snakewalk.config.base import Strict
-from snakewalk.controller.animals.commands.fish_options import Build
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.option import Flag
+
+Build = Annotated[
+    str,
+    typer.Option(
+        help="model of the body: carp (A0..A3 behind a rigid head) or eel (8 angles)",
+        autocompletion=completion.words("carp", "eel"),
+    ),
+]
 
 
 class FishFilmOptions(Strict):

@@ -26,6 +26,7 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import changed, prepare_job, with_map
+from snakewalk.controller.run.request import RunResult
 from snakewalk.controller.run.results import by_evidence, check_look, show_result
 from snakewalk.controller.run.run_for_user import run_for_user
 from snakewalk.controller.run.run_keys import with_compliance
@@ -106,8 +107,19 @@ def run(
     result = run_for_user(
         changed(prepared, run=job), name, options, observe=observe, live=live, shadow=shadow
     )
+    show_result(
+        result,
+        _facts(result, name),
+        options,
+        look=look,
+        accept_dead_reckoning=accept_dead_reckoning,
+    )
+
+
+def _facts(result: RunResult, name: str) -> dict[str, object]:
+    """Return what the command prints of a run, by key."""
     outcome = result.outcome
-    facts = {
+    return {
         "run": name,
         "waypoints": outcome.waypoints,
         **by_evidence(result, {"waypoints_reached": outcome.reached}),
@@ -117,7 +129,6 @@ def run(
         **result.pose.facts(),
         **result.map.facts(),
     }
-    show_result(result, facts, options, look=look, accept_dead_reckoning=accept_dead_reckoning)
 
 
 def _name(run: RunConfig, *replaced: str | None) -> str:

@@ -14,7 +14,7 @@ import pytest
 
 from snakewalk.config.faults import FaultPlan
 from snakewalk.controller.bench import emergency_stop
-from snakewalk.controller.bench.emergency_stop import Stop, _read
+from snakewalk.controller.bench.emergency_stop import Stop, stop_of_words
 from snakewalk.controller.bench.torque_off import DYNAMIXEL_OFF, FEETECH_OFF
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
@@ -201,7 +201,7 @@ def test_the_bytes_of_torque_off_are_those_of_the_protocols() -> None:
 def test_words_that_are_not_simple_are_left_to_the_command_line(
     words: tuple[str, ...], read: Stop | None
 ) -> None:
-    assert _read(iter(words)) == read
+    assert stop_of_words(iter(words)) == read
 
 
 @pytest.fixture
