@@ -15,6 +15,7 @@ from snakewalk.config.plain_text import plain
 from snakewalk.controller.cli.compilation_notice import CompilationNotice
 from snakewalk.controller.console.import_speed import without_collections
 from snakewalk.controller.console.safe_path import make_path_safe
+from snakewalk.controller.console.safe_streams import make_streams_safe
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError, notes_of
 
@@ -32,6 +33,7 @@ _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _STOP = "snakewalk.controller.bench.emergency_stop"
 """The only command that must not wait for imports."""
+_NO_MEMORY = "not enough memory; end other programs, or raise the limit (ulimit -v)"
 _INTERRUPTED = 130
 """Exit code after Ctrl-C, which has been reported."""
 
@@ -43,6 +45,7 @@ def leave_out_avx512() -> None:
 
 def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
+    make_streams_safe()
     make_path_safe()
     # numba reads .numba_config.yaml of the working folder; this keeps it from loading code there
     os.environ.setdefault("NUMBA_CACHE_DIR", "")
@@ -83,6 +86,11 @@ def main() -> None:
         place = f"{Path(str(error.filename))}: " if error.filename else ""
         notes = notes_of(error)  # of a run: state of torque and log
         _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
+    except (MemoryError, ImportError) as error:
+        if not _is_out_of_memory(error):
+            raise
+        notes = notes_of(error)  # of a run: state of torque and log
+        _end(1 if notes else 2, _with_notes(_NO_MEMORY, error))
     except KeyboardInterrupt as stop:
         _end(_INTERRUPTED, _with_notes("interrupted", stop))
     except SystemExit as stop:
@@ -105,19 +113,32 @@ def _unwind(number: int, frame: FrameType | None) -> None:
     raise SystemExit(_BY_SIGNAL + number)
 
 
+def _is_out_of_memory(error: BaseException | None) -> bool:
+    """Whether an error, or its cause, is a lack of memory; the loader reports it as text."""
+    while error is not None:
+        if isinstance(error, MemoryError) or "failed to map segment" in str(error):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
 def _check_words(words: list[str]) -> None:
     """Reject names that are not text: libraries below crash on them.
 
     Raises:
-        InputError: the bytes of a word are not UTF-8.
+        InputError: the bytes of a word are not UTF-8, or not of the locale's encoding.
 
     """
     for word in words:
         try:
             word.encode()
         except UnicodeEncodeError:
-            shown = word.encode(errors="surrogateescape").decode(errors="backslashreplace")
-            raise InputError(f"{shown}: this name is not UTF-8; rename the file") from None
+            data = word.encode(errors="surrogateescape")
+            shown = data.decode(errors="backslashreplace")
+            fault = "this name is not UTF-8; rename the file"
+            if sys.getfilesystemencoding() != "utf-8" and shown.encode() == data:
+                fault = "this locale cannot represent the name; set PYTHONUTF8=1"
+            raise InputError(f"{shown}: {fault}") from None
 
 
 @cache

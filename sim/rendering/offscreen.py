@@ -1,7 +1,9 @@
 """Pictures without a screen: OSMesa if installed, else EGL."""
 
+import atexit
 import ctypes
 import weakref
+from functools import cache
 from importlib import import_module
 from typing import Any, Self
 
@@ -11,6 +13,7 @@ import numpy as np
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 
+_UNCLOSED: "weakref.WeakSet[Offscreen]" = weakref.WeakSet()
 REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 with a driver"
 
 
@@ -39,6 +42,8 @@ class Offscreen:
         self.close = weakref.finalize(self, _free, self._gl, self._mjr)
         """Free the frame buffer; safe to call twice."""
         self.close.atexit = False  # EGL may be gone by then
+        _UNCLOSED.add(self)
+        _free_at_exit()
 
     def draw(
         self, scene: mujoco.MjvScene, caption: str = "", size_px: tuple[int, int] | None = None
@@ -80,6 +85,20 @@ def _free(gl: Any, mjr: mujoco.MjrContext) -> None:
     gl.make_current()
     mjr.free()
     gl.free()
+
+
+@cache
+def _free_at_exit() -> None:
+    """Have unclosed frame buffers freed at exit.
+
+    Registered after MuJoCo's end of EGL and the end of finalizers, it runs before both.
+    """
+    atexit.register(_free_unclosed)
+
+
+def _free_unclosed() -> None:
+    for each in list(_UNCLOSED):
+        each.close()
 
 
 def _context(width: int, height: int) -> Any:

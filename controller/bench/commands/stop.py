@@ -17,8 +17,9 @@ def stop(
     run: Annotated[
         str | None,
         typer.Argument(
-            help="name, folder or process of a run; default: all your runs on this machine that "
-            "hold a port, else the newest simulated run",
+            help="name, folder or process of a run; without it the command stops all your runs "
+            "that hold a port, else your newest simulated run, else the servos on the only serial "
+            "adapter",
             show_default=False,
         ),
     ] = None,

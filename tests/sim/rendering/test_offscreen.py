@@ -1,6 +1,8 @@
 """Several frame buffers at once: none draws into, or deletes from, another's."""
 
 import gc
+import subprocess
+import sys
 
 import cv2
 import numpy as np
@@ -13,6 +15,16 @@ from snakewalk.sim.rendering.top_view import TopView
 
 ROBOT, WORLD = load_robot("yaw16"), load_world("flat")
 AT_REST = np.concatenate([[0.0, 0.0, ROBOT.body_radius_m, 1.0, 0.0, 0.0, 0.0], np.zeros(16)])
+
+
+UNCLOSED = """
+import mujoco
+from snakewalk.sim.rendering.offscreen import Offscreen, OffscreenError
+try:
+    screen = Offscreen(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8)
+except OffscreenError as error:
+    print(error)
+"""
 
 
 def view() -> TopView:
@@ -65,3 +77,13 @@ def test_the_part_round_the_robot_is_drawn_as_in_the_whole_picture(
     assert cv2.absdiff(part, whole).max() <= 2
     assert (cv2.absdiff(whole, top.empty_floor()).max() > 100) == (start_m[0] < 9.0)
     top.close()
+
+
+@pytest.mark.costs("a program from nothing, which opens a renderer and ends")
+def test_an_unclosed_frame_buffer_prints_no_traceback_at_exit() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", UNCLOSED], check=False, capture_output=True, text=True
+    )
+    if ended.stdout:
+        pytest.skip(ended.stdout)
+    assert (ended.returncode, ended.stderr) == (0, "")
