@@ -78,7 +78,7 @@ def only_port() -> str:
     """Return the only serial adapter there is.
 
     Raises:
-        PortError: there are none or several.
+        PortError: no adapter is connected, or several are.
 
     """
     port: str = _scan_module().pick_port(None)

@@ -249,7 +249,7 @@ class CommandTopics:
 
 
 def _is_halt(command: Command) -> bool:
-    """Whether a command ends a motion, or is none; such a command is never too late."""
+    """Whether a command ends a motion or was rejected; such a command is never too late."""
     return isinstance(command, HoldStill | Refused) or command == Velocity(0.0, 0.0)
 
 

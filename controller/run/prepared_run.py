@@ -118,6 +118,10 @@ class PathlessRun(GroundedRun):
 class HasWaypoints(Protocol):
     """A prepared run along waypoints, which a person may change."""
 
+    def path_length_m(self) -> float:
+        """Return the length of the path through the waypoints."""
+        ...
+
     def check_waypoint(self, point_m: Floats) -> None:
         """Check that the motion may go to a point (2,).
 

@@ -71,7 +71,7 @@ class RunResult:
     source: MotionSource
     """The motion that ran, at its end."""
     ending: RunEnding
-    """State of torque and log, for what ends the program afterwards."""
+    """State of torque and log, for an ending of the program afterwards."""
     saved_log: Path | None
     """None if the folder was temporary."""
 

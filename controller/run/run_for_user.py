@@ -9,9 +9,8 @@ import typer
 from snakewalk.controller.console.progress import PathBar, TimeBar, in_real_time
 from snakewalk.controller.console.result_files import run_folder
 from snakewalk.controller.console.run_options import RunOptions
-from snakewalk.controller.run.kinds.path_run import PathRun
 from snakewalk.controller.run.observers import Observers, open_observers
-from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
 
@@ -48,15 +47,15 @@ def run_for_user(
         observe: ``NAME[:ARGUMENT]`` of plug-ins.
         live: whether page and ROS node command the waypoints.
         shadow: whether a simulated chain follows the same goals.
-        stop_requested: asks an operator, who also has the terminal.
+        stop_requested: asks an operator, whom the terminal is left to.
 
     Raises:
         InputError: as ``run_robot``; or the folder cannot be made.
 
     """
     bar: PathBar | TimeBar
-    if isinstance(prepared, PathRun) and seconds is None:
-        bar = PathBar(prepared.path.length_m)
+    if isinstance(prepared, HasWaypoints) and seconds is None:
+        bar = PathBar(prepared.path_length_m())
     else:
         bar = TimeBar(prepared.run.name, seconds or prepared.run.time_limit_s, motion_at)
     opened = nullcontext(observers) if observers else observers_of(options, observe, live=live)

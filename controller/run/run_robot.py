@@ -121,8 +121,8 @@ def run_robot(request: RunRequest) -> RunResult:
     """Run on the request's port, or on the simulator; nothing else differs.
 
     Raises:
-        InputError: the plan breaks a limit, the port is not there, the servos are not the robot's,
-            the folder holds a run or is used by one, or a shadow is asked for on ground where it
+        InputError: the plan breaks a limit. The port is not there. The servos are not the robot's.
+            The folder holds a run or is used by one. A shadow is requested on ground where it
             means nothing.
         KeyboardInterrupt: of an operator; its notes report the state of torque, and the log's path.
 

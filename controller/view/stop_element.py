@@ -33,7 +33,7 @@ class StopElement:
         self._freshness = freshness
         freshness.on_late = self._note_late
         self.press: Callable[[str], str] = lambda who: "no run has begun yet"
-        """Presses the run's button in somebody's name; returns the line to show."""
+        """Presses the run's button for a person or device; returns the line to show."""
         self._is_armed = False
         self._state = ""
         self._late_s: deque[float] = deque(maxlen=_LATE_MAX)

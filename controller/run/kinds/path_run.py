@@ -27,6 +27,10 @@ class PathRun(GroundedRun):
         """Through the start and the waypoints."""
         return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
 
+    def path_length_m(self) -> float:
+        """Return the length of the path."""
+        return self.path.length_m
+
     def check_waypoint(self, point_m: Floats) -> None:
         """Reject a point (2,) off the ground or in an obstacle; paths are not checked.
 

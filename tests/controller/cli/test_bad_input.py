@@ -186,7 +186,7 @@ ROWS = [
     ("run -", "-: no such run; shipped are"),
     ("run flat-square --set world.name=../x", "world flat: name: holds '/'"),
     ("run flat-square --set run.cycle_hz=100000", "cycle_hz: must be at most 1000"),
-    ("plan same.toml", "a path needs two different points"),
+    ("plan same.toml", "waypoints_m: no waypoint leads farther than 1 cm from start (0.00, 0.00)"),
     ("plan nan.toml", "nan.toml:2: waypoints_m.0.0: must be a finite number (got nan)"),
     ("plan flat-square --robot many.toml", "servo IDs would run to 600; the bus has 0 to 252"),
     ("gait run rolling --then x", "--then x: expected NAME@SECONDS"),

@@ -3,6 +3,8 @@
 import io
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import redirect_stdout
 
 import pytest
 
@@ -13,22 +15,18 @@ from tests.helpers.command import snakewalk
 LISTED = "from snakewalk.controller.cli.main import main; main()"
 
 
-def test_a_character_that_the_encoding_lacks_is_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
-    data = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(data, "ascii", "surrogateescape"))
-    make_streams_safe()
-    print("müne", flush=True)
-    assert data.getvalue() == rb"m\xfcne" + b"\n"
-
-
-def test_the_choice_of_the_user_for_such_characters_is_kept(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("errors", "written"),
+    [("surrogateescape", rb"m\xfcne" + b"\n"), ("replace", b"m?ne\n")],
+)
+def test_a_character_that_the_encoding_lacks_is_escaped_unless_the_user_chose(
+    errors: str, written: bytes
 ) -> None:
     data = io.BytesIO()
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(data, "ascii", "replace"))
-    make_streams_safe()
-    print("müne", flush=True)
-    assert data.getvalue() == b"m?ne\n"
+    with redirect_stdout(io.TextIOWrapper(data, "ascii", errors)):
+        make_streams_safe()
+        print("müne", flush=True)
+    assert data.getvalue() == written
 
 
 @pytest.mark.costs("a program from nothing: a closed descriptor needs a process")
@@ -54,6 +52,19 @@ def test_a_name_that_the_locale_lacks_is_not_called_a_wrong_name(
     )
 
 
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Exception], None]:
+    """Let every command end in an exception."""
+
+    def fail_with(error: Exception) -> None:
+        def fail(words: list[str]) -> None:
+            raise error
+
+        monkeypatch.setattr(entry, "_check_words", fail)
+
+    return fail_with
+
+
 @pytest.mark.parametrize(
     "error",
     [
@@ -61,11 +72,10 @@ def test_a_name_that_the_locale_lacks_is_not_called_a_wrong_name(
         ImportError("libx.so: failed to map segment from shared object"),
     ],
 )
-def test_a_lack_of_memory_is_one_line(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(words: list[str]) -> None:
-        raise error
-
-    monkeypatch.setattr(entry, "_check_words", fail)
+def test_a_lack_of_memory_is_one_line(
+    error: Exception, failing: Callable[[Exception], None]
+) -> None:
+    failing(error)
     ended = snakewalk("list")
     assert ended.returncode == 2
     assert ended.stderr == (
@@ -74,11 +84,8 @@ def test_a_lack_of_memory_is_one_line(error: Exception, monkeypatch: pytest.Monk
 
 
 def test_another_fault_of_an_import_is_not_called_a_lack_of_memory(
-    monkeypatch: pytest.MonkeyPatch,
+    failing: Callable[[Exception], None],
 ) -> None:
-    def fail(words: list[str]) -> None:
-        raise ImportError("cannot import name 'x'")
-
-    monkeypatch.setattr(entry, "_check_words", fail)
+    failing(ImportError("cannot import name 'x'"))
     with pytest.raises(ImportError, match="cannot import name"):
         snakewalk("list")

@@ -87,7 +87,13 @@ def test_an_uncertainty_that_the_source_measured_is_that_of_the_run(record: RunR
 
 def test_the_other_assumptions_are_listed_with_their_source(record: RunRecord) -> None:
     header, assumed = record.header, summary(record).assumptions
-    assert set(assumed) == {"friction_along", "friction_across", "mass_kg", "supply_v"}
+    assert set(assumed) == {
+        "friction_along",
+        "friction_across",
+        "friction_law",
+        "mass_kg",
+        "supply_v",
+    }
     assert {each["kind"] for each in assumed.values()} == {"assumed"}
     assert assumed["friction_along"]["value"] == header.world.friction.along
     assert assumed["supply_v"]["source"] == f"robot {header.robot.name}"

@@ -191,6 +191,7 @@ def worst(robot: RobotConfig, seen: list[np.ndarray]) -> tuple[float, float]:
     )
 
 
+@pytest.mark.costs("joins every pair of motion sources")
 @pytest.mark.parametrize("name", ROBOTS)
 def test_all_pairs_of_sources_join_within_the_limits(name: str) -> None:
     robot = ROBOTS[name]

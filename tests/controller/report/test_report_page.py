@@ -257,7 +257,15 @@ def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None
 
 
 def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
-    html = page(summary(record), [], film=None, events=[], config={}, made="Made by <me>")
+    html = page(
+        summary(record),
+        verdict(record, summary(record)),
+        [],
+        film=None,
+        events=[],
+        config={},
+        made="Made by <me>",
+    )
     assert "Made by &lt;me&gt;" in html
 
 
@@ -287,11 +295,12 @@ def test_a_page_contains_no_folder_of_the_user_unless_it_is_asked_for(record: Ru
         "config": {"run": {"track": secret, "list": [{secret: secret}]}},
         "made": "Made by snakewalk run /home/ann/secret/x.toml",
     }
-    html = page(numbers, [], film="", **words)  # type: ignore[arg-type]
+    judged = verdict(record, numbers)
+    html = page(numbers, judged, [], film="", **words)  # type: ignore[arg-type]
     assert "x.toml" in html
     assert "secret" not in html
     assert "/home" not in html
-    assert secret in page(numbers, [], film="", **words, folders=True)  # type: ignore[arg-type]
+    assert secret in page(numbers, judged, [], film="", **words, folders=True)  # type: ignore[arg-type]
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.page import page
 from snakewalk.controller.report.trip import trip_of
@@ -69,11 +70,12 @@ def test_a_trip_of_no_joint_has_time_and_reason_alone(record: RunRecord) -> None
 def test_the_page_states_the_trip_above_its_numbers(tripped: RunRecord) -> None:
     label = tripped.header.robot.joint_label(JOINT)
     numbers = summary(tripped)
-    html = page(numbers, [], film=None, events=[], config={}, trip=trip_of(tripped))
+    judged = verdict(tripped, numbers)
+    html = page(numbers, judged, [], film=None, events=[], config={}, trip=trip_of(tripped))
     head = html[html.index("<body>") : html.index("<section class='tiles'>")]
     assert f"Trip at <button data-time='29.500'>29.50 s</button>: {label}</h2>" in head
     assert "<tr class='error'><td>current</td><td>3 A, exceeded</td>" in head
-    assert "Trip at" not in page(numbers, [], film=None, events=[], config={})
+    assert "Trip at" not in page(numbers, judged, [], film=None, events=[], config={})
 
 
 @pytest.mark.parametrize("is_tripped", [True, False])

@@ -267,6 +267,7 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
     assert found.travel is None
 
 
+@pytest.mark.costs("starts a program and draws a picture")
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     save_track(tmp_path / "mine.npz", wave_track(0.8))
     words = [
@@ -308,6 +309,6 @@ def test_bad_input_ends_with_2(words: list[str], said: str) -> None:
 
 @pytest.mark.parametrize("command", ["analyse", "body"])
 def test_help_has_an_example(command: str) -> None:
-    done = snakewalk(command, "--help")
+    done = snakewalk("animal", command, "--help")
     assert done.returncode == 0
-    assert f"snakewalk {command} worm-like" in done.stdout
+    assert f"snakewalk animal {command} worm-like" in done.stdout

@@ -63,6 +63,7 @@ def test_legs_unfold_without_a_step_within_the_limits_of_the_servos() -> None:
     assert hardest <= 1.05 * ROBOT.joint_acceleration_limit_rad_s2
 
 
+@pytest.mark.costs("a whole run through water and over a beach")
 def test_a_run_swims_to_the_beach_and_walks_over_it(tmp_path: Path) -> None:
     job = prepare_job("water-to-land", keys={"run.waypoint_radius_m": 0.25})
     job = replace(

@@ -59,6 +59,7 @@ def servos(request: pytest.FixtureRequest) -> Iterator[Servos]:
             made.child.communicate()
 
 
+@pytest.mark.costs("starts a program and kills it")
 def test_a_killed_program_leaves_servos_that_stop_within_the_watchdogs_time(
     servos: Servos,
 ) -> None:

@@ -11,10 +11,9 @@ from snakewalk.controller.studies.identification.pendulum_log import PendulumLog
 from snakewalk.controller.studies.identification.pendulum_swing import _GEAR, _swing, swing_rad
 from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
-    HIGH,
-    LOW,
     NAMES,
     ServoConstants,
+    ranges,
 )
 from tests.controller.studies.identification.conftest import (
     DELAY_S,
@@ -94,7 +93,8 @@ def test_without_full_output_a_strong_motor_is_not_told_from_a_quick_one(
 
 def test_a_log_that_tells_little_has_wide_intervals(logs: list[PendulumLog]) -> None:
     found = fit_pendulum(logs[2:], starts=2, hops=0)  # one gain, never let go
-    width = (found.high - found.low) / (HIGH - LOW)
+    searched = ranges(logs[2].actuator)
+    width = (found.high - found.low) / (searched.high - searched.low)
     assert width[NAMES.index("stribeck_exponent")] == 1.0
     resistance = NAMES.index("resistance_ohm")
     assert found.high[resistance] - found.low[resistance] > 0.1 * PLANTED["resistance_ohm"]
