@@ -23,7 +23,8 @@ def test_a_character_that_the_encoding_lacks_is_escaped_unless_the_user_chose(
     errors: str, written: bytes
 ) -> None:
     data = io.BytesIO()
-    with redirect_stdout(io.TextIOWrapper(data, "ascii", errors)):
+    stream = io.TextIOWrapper(data, "ascii", errors)
+    with redirect_stdout(stream):
         make_streams_safe()
         print("müne", flush=True)
     assert data.getvalue() == written
