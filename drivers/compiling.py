@@ -121,8 +121,25 @@ def callable_in_loops(function: F) -> F:
     return function
 
 
+def _check_memory() -> None:
+    """Reject a limit of memory at which loading numba never ends.
+
+    Raises:
+        MemoryError: OpenBLAS, which SciPy loads, then asks again for ever.
+
+    """
+    if sys.platform == "win32" or "numba" in sys.modules:
+        return
+    import resource  # noqa: PLC0415  Unix has it
+
+    limit_bytes, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit_bytes != resource.RLIM_INFINITY and limit_bytes < _LEAST_MEMORY_BYTES:
+        raise MemoryError
+
+
 def _numba() -> Any:
     """Return the package numba; None in a light install."""
+    _check_memory()
     try:
         import numba  # noqa: PLC0415  slow to import, and missing in a light install
     except ModuleNotFoundError as error:
@@ -132,6 +149,8 @@ def _numba() -> Any:
     return numba
 
 
+_LEAST_MEMORY_BYTES = 700 * 2**20
+"""Least limit of memory: `plan` works at 780 MiB and fails at 586 (ours)."""
 _UNCOUNTED = {"_nrt": False}
 """Numba's option that leaves out the counting of references. It is private to numba."""
 

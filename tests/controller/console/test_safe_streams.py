@@ -90,3 +90,15 @@ def test_another_fault_of_an_import_is_not_called_a_lack_of_memory(
     failing(ImportError("cannot import name 'x'"))
     with pytest.raises(ImportError, match="cannot import name"):
         snakewalk("list")
+
+
+@pytest.mark.costs("a program from nothing: a limit of memory needs a process")
+def test_a_limit_of_memory_at_which_loading_never_ends_is_named() -> None:
+    limited = (
+        f"import resource; resource.setrlimit(resource.RLIMIT_AS, 2 * (400 * 2**20,)); {LISTED}"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", limited, "plan"], check=False, capture_output=True, text=True
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.startswith("snakewalk: not enough memory; ")
