@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+from contextlib import suppress
 from typing import IO, Any, Final
 
 _FAILING: Final = {"strict", "surrogateescape"}
@@ -20,7 +21,8 @@ def make_streams_safe() -> None:
         if stream is None:
             setattr(sys, name, _null(mode))
         elif mode == "w" and isinstance(stream, io.TextIOWrapper) and stream.errors in _FAILING:
-            stream.reconfigure(errors="backslashreplace")
+            with suppress(OSError):  # a stream over a pipe may want to seek
+                stream.reconfigure(errors="backslashreplace")
 
 
 def _null(mode: str) -> IO[Any]:
