@@ -5,6 +5,7 @@ viser folds and moves its panels, and on a narrow screen leaves them out of sigh
 
 import asyncio
 import json
+import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -35,6 +36,8 @@ class StopElement:
         self.press: Callable[[str], str] = lambda who: "no run has begun yet"
         """Presses the run's button for a person or device; returns the line to show."""
         self._is_armed = False
+        self._is_over = False
+        self._lock = threading.Lock()
         self._state = ""
         self._late_s: deque[float] = deque(maxlen=_LATE_MAX)
         self.show("waiting for the run")
@@ -45,14 +48,19 @@ class StopElement:
         self.show("torque off at once, latched")
 
     def show(self, text: str, color: str = "") -> None:
-        """Show a line below the button."""
+        """Show a line below the button; any thread may call it, and nothing hides the run's end."""
         row = {"text": text, "color": color, "armed": self._is_armed}
-        self._state = json.dumps(row)
+        with self._lock:
+            if not self._is_over:
+                self._state = json.dumps(row)
 
     def ended(self, text: str) -> None:
         """The run is over."""
         self._is_armed = False
-        self.show(f"the run has ended: {text}", colours.FAULT)
+        row = {"text": f"the run has ended: {text}", "color": colours.FAULT, "armed": False}
+        with self._lock:
+            self._is_over = True
+            self._state = json.dumps(row)
 
     def pressed(self) -> None:
         """Press the run's button, and show the result."""

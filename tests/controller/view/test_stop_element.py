@@ -77,6 +77,23 @@ def test_its_socket_shows_the_state_and_presses_the_button_once_for_each_message
         assert list(line) == []
 
 
+def test_a_run_that_ends_while_its_button_is_pressed_is_shown_as_ended(page: Page) -> None:
+    def press(who: str) -> str:
+        page.stop.ended(f"stop requested by {who}")  # another thread, before the press returns
+        return "stop requested"
+
+    page.stop.arm()
+    page.stop.press = press
+    port, token = page.server.get_port(), page.url.rpartition("=")[2]
+    headers = {"Cookie": f"snakewalk-{port}={token}", "Origin": f"http://127.0.0.1:{port}"}
+    with connect(f"ws://127.0.0.1:{port}/stop", additional_headers=headers) as line:
+        assert json.loads(line.recv(PATIENCE_S))["armed"]
+        line.send("stop")
+        shown = json.loads(line.recv(PATIENCE_S))
+    assert shown["text"] == "the run has ended: stop requested by E-STOP of the page"
+    assert not shown["armed"]
+
+
 @pytest.fixture(scope="module")
 def chromium() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api")
