@@ -186,7 +186,7 @@ def _balance(r, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _step(  # type: ignore[no-untyped-def]  # noqa: PLR0915
+def _step(  # type: ignore[no-untyped-def]
     turn, move, shape, first, last, bridge, rotation, origin, scale, visible, requested,
     cycles, playing, following, ended, bridge_from, bridge_frames_of, bridge_remaining, points,
     balance,
