@@ -68,18 +68,22 @@ class CameraConfig(Strict):
         0.5, ge=0.0, le=0.9, description="largest share of the floor's light that a shadow removes"
     )
     learn_s: float = Field(
-        60.0, ge=0.0, le=86_400.0,
+        60.0,
+        ge=0.0,
+        le=86_400.0,
         description="time constant for learning the floor around the body, so that objects "
-                    "that stay there become floor; 0: the floor stays as in its picture",
-    )  # fmt: skip
+        "that stay there become floor; 0: the floor stays as in its picture",
+    )
     device: str | None = Field(
         None, description="of a real camera: a number, a device or an address that OpenCV opens"
     )
     latency_s: float = Field(
-        0.0, ge=0.0, le=1.0,
+        0.0,
+        ge=0.0,
+        le=1.0,
         description="how long after it was taken a real camera's frame is handed over, as "
         "`snakewalk pose camera` measures it",
-    )  # fmt: skip
+    )
     background: str | None = Field(
         None, description="image of the empty floor, needed with a real camera"
     )
@@ -143,9 +147,11 @@ class StereoHeadConfig(Strict):
         0.055, ge=0.0, le=2.0, description="of cameras and mast; it is added to the link's"
     )
     position_error_m: float = Field(
-        0.002, ge=0.0, le=0.1, description="standard deviation, along each axis, of a picture's "
-        "measured place"
-    )  # fmt: skip
+        0.002,
+        ge=0.0,
+        le=0.1,
+        description="standard deviation, along each axis, of a picture's measured place",
+    )
     angle_error_rad: float = Field(
         0.005, ge=0.0, le=0.2, description="the same about each axis of its measured attitude"
     )

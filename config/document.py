@@ -102,7 +102,9 @@ This page is written from the schema by `python -m snakewalk.config.document`; a
 
 
 _FILES: Final = (
-    *(("Run", RunConfig), ("Robot", RobotConfig), ("World", WorldConfig)),
+    ("Run", RunConfig),
+    ("Robot", RobotConfig),
+    ("World", WorldConfig),
     ("Servo model", ServoModel),
 )
 

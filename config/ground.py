@@ -43,15 +43,20 @@ def build_ground(world: WorldConfig) -> HeightField | None:
         case ShoreGround() as ground:
             return _shore(ground)
         case ElevationGround() as ground:
-            z, spacing_m = _cropped(world.name, ground), ground.spacing_m / ground.refine
+            z = _cropped(world.name, ground)
+            spacing_m = ground.spacing_m / ground.refine
         case RampGround() as ground:
-            z, spacing_m = _ramp(ground), ground.spacing_m
+            z = _ramp(ground)
+            spacing_m = ground.spacing_m
         case RandomGround() as ground:
-            z, spacing_m = _random(ground), ground.spacing_m
+            z = _random(ground)
+            spacing_m = ground.spacing_m
         case StepsGround() as ground:
-            z, spacing_m = _steps(ground), ground.spacing_m
+            z = _steps(ground)
+            spacing_m = ground.spacing_m
         case GapsGround() as ground:
-            z, spacing_m = _gaps(ground), ground.spacing_m
+            z = _gaps(ground)
+            spacing_m = ground.spacing_m
     half_w, half_h = (z.shape[1] - 1) * spacing_m / 2, (z.shape[0] - 1) * spacing_m / 2
     return HeightField(z - z.min(), spacing_m, -half_w, -half_h)
 

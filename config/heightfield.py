@@ -101,7 +101,8 @@ class HeightField:
         z00, z11 = self.z_m.take(corner), self.z_m.take(corner + (columns + 1))
         lower = fu >= fv  # the triangle with the (high x, low y) corner
         third = self.z_m.take(corner + np.where(lower, 1, columns))
-        first, second = third - z00, z11 - third
+        first = third - z00
+        second = z11 - third
         gx, gy = np.where(lower, first, second), np.where(lower, second, first)
         return z00 + gx * fu + gy * fv, gx / self.spacing_m, gy / self.spacing_m
 
@@ -145,7 +146,8 @@ def read_map(file: Path) -> HeightField:
     """
     try:
         held, _ = read_arrays(file, {"z_m", "known", "colour", *_NUMBERS})
-        z_m, known = held["z_m"].astype(float), held["known"]
+        z_m = held["z_m"].astype(float)
+        known = held["known"]
         spacing_m, x0_m, y0_m = (float(held[name]) for name in _NUMBERS)
         if not (0.0 < spacing_m < np.inf and np.isfinite([x0_m, y0_m]).all()):
             raise ValueError("spacing_m must be above 0, x0_m and y0_m must be finite")

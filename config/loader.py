@@ -132,7 +132,8 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         found[record.model] = record
         return {**table, "model": record.model}
 
-    servo, joints = named(data.get("servo")), data.get("joints")
+    servo = named(data.get("servo"))
+    joints = data.get("joints")
     joints = [named(each) for each in joints] if isinstance(joints, list | tuple) else joints
     if not found:
         return data

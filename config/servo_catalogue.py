@@ -130,7 +130,8 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
 
     """
     own = dict(data)
-    like, without = own.pop("like", None), own.pop("without", [])
+    like = own.pop("like", None)
+    without = own.pop("without", [])
     if like is None and not without:
         return own
     if not isinstance(like, str):

@@ -114,7 +114,9 @@ def line_number(text: str, loc: Sequence[str | int]) -> int | None:
     places = [part for part in loc if isinstance(part, int)]
     table: list[str] = []
     seen: Counter[str] = Counter()
-    found, depth, here = None, 0, True
+    found = None
+    depth = 0
+    here = True
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _TABLE.match(line):
             keys = table = _parts(header[2])
@@ -126,7 +128,8 @@ def line_number(text: str, loc: Sequence[str | int]) -> int | None:
             continue
         rest = iter(wanted)
         if here and len(keys) > depth and all(part in rest for part in keys):
-            found, depth = number, len(keys)
+            found = number
+            depth = len(keys)
     return found
 
 

@@ -44,7 +44,8 @@ def _table(
     inner: list[str] = []
     for key, field in model.model_fields.items():
         where = f"{place}.{key}".removeprefix(".")
-        row, choices = row_model(field.annotation), table_models(field.annotation)
+        row = row_model(field.annotation)
+        choices = table_models(field.annotation)
         if key in without or (key in WRITTEN_BY_PROGRAM and not values.get(key)):
             continue
         if row is not None:

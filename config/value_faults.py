@@ -28,7 +28,8 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
     if "than" in str(fault["type"]) and not _is_finite(fault.get("input")):
         return "must be a finite number"
     bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
-    tag, known = context.get("tag"), context.get("expected_tags")
+    tag = context.get("tag")
+    known = context.get("expected_tags")
     said = {
         "missing": "is required",
         "tuple_type": "must be a list: [ ... ]",

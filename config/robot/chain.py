@@ -227,7 +227,8 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _registers_hold_the_values(self) -> Self:
-        by_joint, gains = initial_joint_gains(self), initial_gains(self)
+        by_joint = initial_joint_gains(self)
+        gains = initial_gains(self)
         if by_joint:
             self.__dict__["joints"] = tuple(
                 each.model_copy(update=by_joint.get(joint, {}))

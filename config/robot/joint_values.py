@@ -69,7 +69,8 @@ class JointValues(LinkValues):
     @property
     def motors(self) -> tuple[MotorConfig | None, ...]:
         """Motor constants of each servo; None: those of its model."""
-        own, of = self.servo.motor, self.servo.model
+        own = self.servo.motor
+        of = self.servo.model
         return tuple(own if model == of else None for model in self.servo_models)
 
     @property
@@ -95,7 +96,8 @@ class JointValues(LinkValues):
     @property
     def position_p_gains(self) -> tuple[int, ...]:
         """Position P Gain of each servo."""
-        stiff, soft = self.servo.position_p_gain, self.servo.pitch_p_gain
+        stiff = self.servo.position_p_gain
+        soft = self.servo.pitch_p_gain
         usual = tuple(soft if axis == "p" else stiff for axis in self.all_axes)
         return self._own("position_p_gain", usual)
 

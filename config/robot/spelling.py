@@ -30,13 +30,12 @@ def canonical_links(robot: JointValues) -> dict[str, Any]:
     """Canonical keys of the links."""
     if not robot.links:
         return {}
-    lengths_m, masses_kg, radii_m = (
-        robot.link_lengths_m,
-        robot.bare_link_masses_kg,
-        robot.link_radii_m,
-    )
+    lengths_m = robot.link_lengths_m
+    masses_kg = robot.bare_link_masses_kg
+    radii_m = robot.link_radii_m
     length_m = _commonest(length for length in lengths_m if length > 0.0)
-    mass_kg, radius_m = _commonest(masses_kg), max(radii_m)
+    mass_kg = _commonest(masses_kg)
+    radius_m = max(radii_m)
     belly = _belly(robot)
     links = []
     for length, mass, radius, shape in zip(
@@ -64,7 +63,8 @@ def canonical_joints(robot: JointValues) -> dict[str, Any]:
     """Canonical keys of the joints."""
     if not robot.joints:
         return {}
-    axes, spine = robot.all_axes, len(robot.joint_axes)
+    axes = robot.all_axes
+    spine = len(robot.joint_axes)
     usual = default_joint_names(axes, [each.side for each in robot.limb_joints])
     rows: list[dict[str, Any]] = [
         {"sign": sign, "zero_rad": zero_rad, "name": None if name == default else name}
@@ -77,7 +77,8 @@ def canonical_joints(robot: JointValues) -> dict[str, Any]:
     servo: dict[str, Any] = _servo(robot, rows)
     for key, name in _OF_EVERY_JOINT.items():
         servo |= _fold(rows, range(len(rows)), key, getattr(robot, name), key)
-    gains, currents_a = robot.position_p_gains, robot.current_limits_a
+    gains = robot.position_p_gains
+    currents_a = robot.current_limits_a
     servo |= _fold(rows, others, "position_p_gain", gains, "position_p_gain")
     servo |= _fold(rows, pitch, "position_p_gain", gains, "pitch_p_gain")
     servo |= _fold(rows, pitch, "current_limit_a", currents_a, "pitch_current_limit_a")
@@ -104,11 +105,14 @@ def _belly(robot: JointValues) -> BellyConfig:
 
 def _servo(robot: JointValues, rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Fold IDs and models; motor constants are those of the model of `[servo]` only."""
-    ids, models = robot.servo_ids, robot.servo_models
+    ids = robot.servo_ids
+    models = robot.servo_models
     first = _commonest(i - k for k, i in enumerate(ids) if 0 <= i - k <= LAST_ID)
-    model, motor = robot.servo.model, robot.servo.motor
+    model = robot.servo.model
+    motor = robot.servo.motor
     if motor is None or model not in models:
-        model, motor = _commonest(models), None
+        model = _commonest(models)
+        motor = None
     for k, row in enumerate(rows):
         row["id"] = None if ids[k] == first + k else ids[k]
         row["model"] = None if models[k] == model else models[k]
@@ -117,7 +121,8 @@ def _servo(robot: JointValues, rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _limbs(robot: JointValues, rows: list[dict[str, Any]]) -> tuple[LimbsConfig, ...]:
     """Fold the limits of the legs' joints into their pairs."""
-    pairs, spine = [], len(robot.joint_axes)
+    pairs = []
+    spine = len(robot.joint_axes)
     for index, pair in enumerate(robot.limbs):
         changes: dict[str, Any] = {}
         for axis, name in (("y", "yaw_limit_rad"), ("r", "roll_limit_rad")):
