@@ -34,13 +34,16 @@ def solve_positive_definite(a: Floats, b: Floats, x: Floats) -> None:
         x[i] /= a[i, i]
 
 
-_MATRIX, _VECTOR = readonly_array(dimensions=2, layout="C"), readonly_array(layout="C")
+_MATRIX = readonly_array(dimensions=2, layout="C")
+_VECTOR = readonly_array(layout="C")
 
 
 @compiled(f"float64[::1]({_MATRIX}, {_VECTOR}, {_VECTOR})")
 def _least_squares(rows: Floats, target: Floats, damping: Floats) -> Floats:
     count = rows.shape[1]
-    normal, right, x = np.zeros((count, count)), np.zeros(count), np.empty(count)
+    normal = np.zeros((count, count))
+    right = np.zeros(count)
+    x = np.empty(count)
     for i in range(count):
         normal[i, i] = damping[i] * damping[i]
     for k in range(len(rows)):

@@ -108,7 +108,8 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
 
     def _load_stored(self, sig: Any, target_context: Any) -> Any:
         """Load a loop that another account has stored next to its module."""
-        usual, self._cache_file = self._cache_file, self._stored
+        usual = self._cache_file
+        self._cache_file = self._stored
         try:
             return super().load_overload(sig, target_context)
         except OSError:

@@ -184,7 +184,8 @@ def _feetech_budget(facts: ServoModel, servos: int, baud: int) -> WireBudget:
     request = reply = 0
     for length in (block, max(_FEETECH_SUPPLY_BYTES, CHECK_BYTES)):
         requests, replies = feetech.wire_bytes(facts, servos, length)
-        request, reply = request + requests, reply + replies
+        request = request + requests
+        reply = reply + replies
     return WireBudget(servos, baud, False, goal, request, reply, 0.0, may_be_fast=False)
 
 

@@ -112,7 +112,8 @@ class ControlCycle:
         self._default_request = self._read_request(ids, read_bytes, fast=fast)
         self._fast_path = self._native_path(spin_s)
         self._awaited: tuple[GroupReadRequest, tuple[int, ...], FastPath | float] = (
-            *(self._default_request, self._default_order),
+            self._default_request,
+            self._default_order,
             port.clock.now_s(),
         )
         """Request whose reply is awaited, its order, and what receives it, else until when."""
@@ -128,7 +129,8 @@ class ControlCycle:
 
     def _native_path(self, spin_s: float | None) -> FastPath | None:
         """Fast path of the port; None if it must use the port's own calls."""
-        port, latency_s = self._port, self._latency_s
+        port = self._port
+        latency_s = self._latency_s
         packets = self._goals, self._default_request, self._line
         if isinstance(port, FastPathPort):
             return port.fast_path(*packets, latency_s=latency_s)
@@ -200,7 +202,8 @@ class ControlCycle:
 
         """
         self.counters.reads += 1
-        fast_path, request = self._fast_path, self._next_request()
+        fast_path = self._fast_path
+        request = self._next_request()
         if fast_path is not None and request is self._default_request and fast_path.begin(goals):
             self._awaited = request, self._order, fast_path
         else:
@@ -256,15 +259,18 @@ class ControlCycle:
 
     def _next_request(self) -> GroupReadRequest:
         """The default request, unless order, kind or length must differ."""
-        length, default = self.read_bytes, self._default_request
+        length = self.read_bytes
+        default = self._default_request
         none_pending = self._pending.empty
         if self._order is self._default_order and self.fast is default.fast and none_pending:
             return default
         if not none_pending:
             # on a silent bus keep some lengths for the reads after its first reply
-            responding, spares = self._responding(), SPARE_LENGTHS
+            responding = self._responding()
+            spares = SPARE_LENGTHS
             if not responding:
-                responding, spares = [*self._ids], SPARE_LENGTHS // 2
+                responding = [*self._ids]
+                spares = SPARE_LENGTHS // 2
             length = self._pending.free_length(responding, length, fast=self.fast, spares=spares)
         key = (self.fast, length, self._order)
         request = self._requests.get(key)
@@ -302,7 +308,8 @@ class ControlCycle:
     def _receive(
         self, request: GroupReadRequest, raw: bytes, deadline_s: float
     ) -> tuple[bytes, GroupReadReply]:
-        port, expected = self._port, request.reply_bytes
+        port = self._port
+        expected = request.reply_bytes
         if len(raw) < expected:
             raw += port.read_until(expected - len(raw), deadline_s)
         if len(raw) == expected and self._came_twice(request, deadline_s):
@@ -323,7 +330,8 @@ class ControlCycle:
         return raw, reply
 
     def _with_surplus(self, request: GroupReadRequest, raw: bytes, deadline_s: float) -> bytes:
-        port, expected = self._port, request.reply_bytes
+        port = self._port
+        expected = request.reply_bytes
         if not request.parse(raw[:expected]).whole:
             return raw
         more_s = port.clock.now_s() + 2 * HEAD * self._byte_s

@@ -187,7 +187,8 @@ class DynamixelBus:
             ServoError: the servo refused.
 
         """
-        table, may_lack = self.table_of(servo_id), set(optional)
+        table = self.table_of(servo_id)
+        may_lack = set(optional)
         values: dict[str, int] = {}
         for block in _blocks(map(table.register, names)):
             first, last = block[0], block[-1]
@@ -214,7 +215,7 @@ class DynamixelBus:
     def _read(self, servo_id: int, register: Register) -> bytes:
         return self._retry(
             lambda: read_register(
-                *(self.port, servo_id, register, self.latency_s, self._pending, self._line)
+                self.port, servo_id, register, self.latency_s, self._pending, self._line
             )
         )
 
@@ -231,7 +232,7 @@ class DynamixelBus:
         data = register.encode(value)
         self._retry(
             lambda: write_register(
-                *(self.port, servo_id, register, data, self.latency_s, self._pending, self._line)
+                self.port, servo_id, register, data, self.latency_s, self._pending, self._line
             ),
             tries,
         )

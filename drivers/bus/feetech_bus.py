@@ -110,12 +110,16 @@ class FeetechBus(DynamixelBus):
             PortError: the port is gone.
 
         """
-        code, params, length = FeetechInstruction.PING, b"", 0
+        code = FeetechInstruction.PING
+        params = b""
+        length = 0
         if block is not None:
             first, last = (self.table_of(servo_id)[name] for name in block)
-            code, length = FeetechInstruction.READ, last.address + last.size - first.address
+            code = FeetechInstruction.READ
+            length = last.address + last.size - first.address
             params = bytes((first.address, length))
-        packet, wait_s = frame(servo_id, code, params), _REPLY_S + self.latency_s
+        packet = frame(servo_id, code, params)
+        wait_s = _REPLY_S + self.latency_s
         reply_bytes = STATUS_BYTES + length
         return probe_with(self.port, servo_id, PROBES, packet, reply_bytes, wait_s, FeetechParser)
 
@@ -247,11 +251,14 @@ class FeetechBus(DynamixelBus):
             BusError: a reply has another length.
 
         """
-        port, packet = self.port, frame(servo_id, code, params)
+        port = self.port
+        packet = frame(servo_id, code, params)
         wire_s = (STATUS_BYTES + length) * BITS_PER_BYTE / port.getBaudRate()
         port.clearPort()
         deadline_s = self._send(packet) + wire_s + _REPLY_S + self.latency_s
-        reader, missing, other = FeetechParser(), STATUS_BYTES + length, None
+        reader = FeetechParser()
+        missing = STATUS_BYTES + length
+        other = None
         while data := port.read_until(missing, deadline_s):
             for status in reader.feed(data):
                 if status.servo_id != servo_id:

@@ -71,18 +71,22 @@ class FeetechWrite(GroupWrite):
     """Sync write of one register to ``ids``."""
 
     def __init__(self, ids: Sequence[int], name: str, facts: ServoModel) -> None:
-        self._ids, self._name, self._facts = tuple(ids), name, facts
+        self._ids = tuple(ids)
+        self._name = name
+        self._facts = facts
         self._row: RegisterRow = facts.registers[name]
         self.size = len(self.encode(np.zeros(len(ids), np.int32)))
 
     def encode(self, values: NDArray[np.int32]) -> bytes:
         """Packets that write ``values`` (N,)."""
-        row, each = self._row, 1 + self._row.size
+        row = self._row
+        each = 1 + self._row.size
         entries = b"".join(
             bytes((servo_id,)) + encode_word(int(value), row, self._facts, self._name)
             for servo_id, value in zip(self._ids, values, strict=True)
         )
-        head, step = bytes((row.address, row.size)), MOST_ENTRIES // each * each
+        head = bytes((row.address, row.size))
+        step = MOST_ENTRIES // each * each
         return b"".join(
             frame(BROADCAST_ID, FeetechInstruction.SYNC_WRITE, head + entries[at : at + step])
             for at in range(0, len(entries), step)
@@ -109,7 +113,9 @@ class FeetechCycle(ControlCycle):
         ``span`` is address and length of the block on the wire. ``convert`` maps it (N, length) to
         the returned block (N, n).
         """
-        self._facts, self._convert, self._clock = facts, convert, port.clock
+        self._facts = facts
+        self._convert = convert
+        self._clock = port.clock
         super().__init__(
             port,
             ids,

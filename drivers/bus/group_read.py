@@ -90,7 +90,7 @@ class GroupReadRequest:
         self._all = _constant(np.ones(count, np.bool_))
         no_error = _constant(np.zeros(count, np.uint8))
         self._flawless = GroupReadReply(
-            *(no_error, self._all, no_error, self._all), clean=True, whole=True, flawless=True
+            no_error, self._all, no_error, self._all, clean=True, whole=True, flawless=True
         )[1:]
         """Result of a regular reply without errors, besides its data."""
         self.reply_bytes = (len(self._fast_head) if fast else 0) + count * self.frame_bytes
@@ -193,7 +193,8 @@ class GroupReadRequest:
     def _partial(self, by_id: dict[int, StatusPacket], *, clean: bool) -> GroupReadReply:
         count = len(self.ids)
         data = np.zeros((count, self.length), np.uint8)
-        valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        valid = np.zeros(count, np.bool_)
+        answered = np.zeros(count, np.bool_)
         error = np.zeros(count, np.uint8)
         for servo_id, packet in by_id.items():
             k = self._index[servo_id]

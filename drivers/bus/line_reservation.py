@@ -19,7 +19,9 @@ class LineReservation:
     """Reservation of one port, shared by all senders; ``paced`` as in ``BytePort``."""
 
     def __init__(self, clock: Clock, *, paced: bool = False) -> None:
-        self._clock, self._paced, self._in_vain = clock, paced, 0
+        self._clock = clock
+        self._paced = paced
+        self._in_vain = 0
         self.free_s = np.array([clock.now_s()])
         """(1,) when all that was sent will have left, on the clock, s; compiled code writes it."""
         # the same memory: numpy needs three times as long for a scalar

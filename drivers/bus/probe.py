@@ -63,13 +63,17 @@ def probe(
         PortError: the port is gone.
 
     """
-    kind, span, data_bytes = Instruction.PING, b"", _PING_BYTES
+    kind = Instruction.PING
+    span = b""
+    data_bytes = _PING_BYTES
     if block is not None:
-        kind, address = Instruction.READ, block[0].address
+        kind = Instruction.READ
+        address = block[0].address
         data_bytes = block[1].address + block[1].size - address
         span = address.to_bytes(2, "little") + data_bytes.to_bytes(2, "little")
     packet = encode_instruction(InstructionPacket(servo_id, kind, span))
-    reply_bytes, wait_s = STATUS_BYTES + data_bytes, _SETTLE_S + latency_s
+    reply_bytes = STATUS_BYTES + data_bytes
+    wait_s = _SETTLE_S + latency_s
     return probe_with(port, servo_id, requests, packet, reply_bytes, wait_s, PacketParser)
 
 

@@ -47,7 +47,8 @@ class Protocol1Block:
         """Prepare; nothing is sent."""
         self.counters = CycleCounters()
         self._port, self._ids, self._register = port, tuple(servo_ids), register
-        address, size = register.address, register.size
+        address = register.address
+        size = register.size
         self._requests = [
             frame(each, Instruction1.READ, bytes((address, size))) for each in self._ids
         ]
@@ -78,10 +79,12 @@ class Protocol1Block:
 
         """
         self._sent_at_s = self._port.clock.now_s()
-        count, size = len(self._ids), self._register.size
+        count = len(self._ids)
+        size = self._register.size
         data = np.zeros((count, size), np.uint8)
         error = np.zeros(count, np.uint8)
-        valid, answered = np.zeros(count, np.bool_), np.zeros(count, np.bool_)
+        valid = np.zeros(count, np.bool_)
+        answered = np.zeros(count, np.bool_)
         for k in range(count):
             packet = self._ask(k)
             if packet is None:

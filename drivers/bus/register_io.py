@@ -94,8 +94,10 @@ def _exchange(
     pending: PendingReplies,
     line: LineReservation,
 ) -> StatusPacket:
-    reader, copies = PacketParser(), False
-    raw, expected = encode_instruction(packet), STATUS_BYTES + data_bytes
+    reader = PacketParser()
+    copies = False
+    raw = encode_instruction(packet)
+    expected = STATUS_BYTES + data_bytes
     byte_s = BITS_PER_BYTE / port.getBaudRate()
     port.clearPort()
     free_s = line.reserve(len(raw) * byte_s)

@@ -211,7 +211,9 @@ class SegmentedCycle:
             each: ``SegmentedBus._each``.
 
         """
-        self._cycles, self._places, self._each = cycles, places, each
+        self._cycles = cycles
+        self._places = places
+        self._each = each
         self._count = sum(map(len, places.values()))
 
     @property
@@ -271,7 +273,8 @@ class SegmentedCycle:
         """One reply with the results of all ports; zeros fill the rows of shorter registers."""
         width = max(reply.data.shape[1] for reply in replies.values())
         data = np.zeros((self._count, width), np.uint8)
-        valid, answered = np.zeros(self._count, np.bool_), np.zeros(self._count, np.bool_)
+        valid = np.zeros(self._count, np.bool_)
+        answered = np.zeros(self._count, np.bool_)
         error = np.zeros(self._count, np.uint8)
         for bus, reply in replies.items():
             at = self._places[bus]
@@ -279,7 +282,10 @@ class SegmentedCycle:
             valid[at], answered[at], error[at] = reply.valid, reply.answered, reply.error
         each = replies.values()
         return GroupReadReply(
-            *(data, valid, error, answered),
+            data,
+            valid,
+            error,
+            answered,
             clean=all(r.clean for r in each),
             whole=all(r.whole for r in each),
             flawless=all(r.flawless for r in each),

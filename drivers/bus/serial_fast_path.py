@@ -23,7 +23,11 @@ LATENCY_ESTIMATE = 0
 ZERO_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
 """Zero of the port's clock; time of the request; longest remaining time of the reply of an
 irregular cycle."""
-WRITE_BYTES, REQUEST_BYTES, HEADS_END, IDS_END, ERROR_END = 5, 6, 7, 8, 9
+WRITE_BYTES = 5
+REQUEST_BYTES = 6
+HEADS_END = 7
+IDS_END = 8
+ERROR_END = 9
 """Length of the sync write and of the request behind it; where in ``work`` the expected heads of
 the replies end, the IDs, and the error bytes. The reply stands behind them."""
 FAST = 10
@@ -34,7 +38,8 @@ SPIN_NS = 15
 """Argument of ``receive``."""
 PLAN_SIZE = 16
 _write = types.ExternalFunction("write", intp(int32, intp, uintp))
-_ROW, _ROWS = uint8[::1], uint8[:, ::1]
+_ROW = uint8[::1]
+_ROWS = uint8[:, ::1]
 
 
 @compiled(int64(float64[::1], int64, int64))
@@ -109,14 +114,16 @@ def _receive(
     wait_ns = least_ns + int(plan[LATENCY_NS])
     request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
     heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
-    room, error = work[error_end:], work[ids_end:error_end]
+    room = work[error_end:]
+    error = work[ids_end:error_end]
     reply = room[:-1]
     latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
     got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
     if got != len(reply):
         found = -1 - int(got)
     elif plan[FAST]:
-        head, ids = work[request_end:heads_end], work[heads_end:ids_end]
+        head = work[request_end:heads_end]
+        ids = work[heads_end:ids_end]
         found = int(read_fast(reply, head, ids, data, error))
     else:
         heads = work[request_end:heads_end].reshape(len(data), HEAD)
@@ -143,7 +150,9 @@ class SerialFastPath:
 
         ``latency_s`` is the largest delay of adapter and driver. ``spin_s`` as in ``ControlCycle``.
         """
-        self._port, self._request, self._free_s = port, request, line.free_s
+        self._port = port
+        self._request = request
+        self._free_s = line.free_s
         count = len(request.ids)
         self._values = np.zeros(count, np.int32)
         self._shape = (count, request.length)
@@ -154,7 +163,8 @@ class SerialFastPath:
         self._work = np.zeros(reply_at + request.reply_bytes + 1, np.uint8)
         self._work[: ends[3]] = np.concatenate(parts)
         self._write_bytes, self._request_end = int(ends[0]), int(ends[1])
-        self._error, self._room = self._work[ends[3] : reply_at], self._work[reply_at:]
+        self._error = self._work[ends[3] : reply_at]
+        self._room = self._work[reply_at:]
         self._plan = np.zeros(PLAN_SIZE, np.int64)
         self._plan[WRITE_BYTES], self._plan[REQUEST_BYTES] = ends[0], ends[1] - ends[0]
         self._plan[HEADS_END : ERROR_END + 1] = ends[2], ends[3], reply_at

@@ -17,7 +17,9 @@ class AlarmReader:
     """Reads the alarm after an alert; reads again if the register shows no alarm."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, readings: Readings) -> None:
-        self._bus, self._robot, self._readings = bus, robot, readings
+        self._bus = bus
+        self._robot = robot
+        self._readings = readings
         self._counts: dict[int, int] = {}
         """Reads in a row in which a joint had an alert, but no alarm."""
         self._alerts: dict[int, int] = {}

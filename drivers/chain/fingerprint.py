@@ -6,15 +6,27 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.protocol.registers import REVERSE
 
 PROTECTION = (
-    *("PWM Limit", "Current Limit", "Velocity Limit"),
-    *("Temperature Limit", "Min Voltage Limit", "Max Voltage Limit"),
-    *("Protection Current", "Over-current Time"),
-    *("Overload Torque", "Protection Time", "Protective Torque"),
+    "PWM Limit",
+    "Current Limit",
+    "Velocity Limit",
+    "Temperature Limit",
+    "Min Voltage Limit",
+    "Max Voltage Limit",
+    "Protection Current",
+    "Over-current Time",
+    "Overload Torque",
+    "Protection Time",
+    "Protective Torque",
 )
 """Registers that decide when a servo protects itself; the last five are those of Feetech servos."""
 FINGERPRINT = (
-    *("Homing Offset", "Drive Mode", "Operating Mode", "Shutdown"),
-    *("Min Position Limit", "Max Position Limit", *PROTECTION),
+    "Homing Offset",
+    "Drive Mode",
+    "Operating Mode",
+    "Shutdown",
+    "Min Position Limit",
+    "Max Position Limit",
+    *PROTECTION,
 )
 """Registers of it; a model may lack some."""
 Fingerprint = Mapping[str, int]

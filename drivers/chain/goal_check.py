@@ -49,13 +49,16 @@ class GoalCheck:
 
     def __init__(self, labels: Sequence[str], cycle: GroupCycle, rows: RegisterRows) -> None:
         """Prepare the read; ``rows`` are those of Goal Position."""
-        self._labels, self._rows = labels, rows
+        self._labels = labels
+        self._rows = rows
         self.cycle = cycle
         self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
         self._is_incomplete = False
-        self._seen, self._seen_at, self._watched = 0, 0, 0
+        self._seen = 0
+        self._seen_at = 0
+        self._watched = 0
 
     def note_write(self, goals: Int32s) -> None:
         """Store raw goals (J,) that were just sent."""
@@ -84,7 +87,8 @@ class GoalCheck:
         if not self._sent:
             return
         self._watched = max(self._watched - 1, 0)
-        reply, sent = self.cycle.read(), self._sent[-1]
+        reply = self.cycle.read()
+        sent = self._sent[-1]
         is_usual = reply.flawless and not self._differences
         if is_usual and reply.data.tobytes() == self._rows.encode(sent):
             self._is_incomplete = False
@@ -109,7 +113,8 @@ class GoalCheck:
         """
         if not self._sent:
             return None
-        reply, sent = self.cycle.read(), self._sent[-1]
+        reply = self.cycle.read()
+        sent = self._sent[-1]
         values = self._rows.decode(reply.data)
         value = int(values[joint])
         if not reply.valid[joint] or value == sent[joint]:
@@ -127,14 +132,16 @@ class GoalCheck:
         if known is None:
             self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
         elif known.write < self._writes:
-            known.count, known.write = known.count + 1, self._writes
+            known.count = known.count + 1
+            known.write = self._writes
             known.is_constant &= value == known.value
             known.is_foreign |= is_foreign
             known.lag = lag if lag == known.lag else 0
             known.value = value
         if is_foreign and (self._seen_at < self._writes or not self._watched):
             self._seen = self._seen + 1 if self._watched else 1
-            self._seen_at, self._watched = self._writes, WATCHED_READS
+            self._seen_at = self._writes
+            self._watched = WATCHED_READS
 
     def _is_over(self, difference: _Difference) -> bool:
         if difference.is_foreign:

@@ -16,7 +16,8 @@ from snakewalk.drivers.chain.start_up import IDENTITY, identity
 from snakewalk.drivers.errors import ChainError
 from snakewalk.drivers.protocol.control_table import Register
 
-_GOAL, _POSITION = "Goal Position", "Present Position"
+_GOAL = "Goal Position"
+_POSITION = "Present Position"
 
 
 class IdentifiedRead:
@@ -26,7 +27,9 @@ class IdentifiedRead:
     """
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, units: JointUnits) -> None:
-        self._bus, self._robot, self._units = bus, robot, units
+        self._bus = bus
+        self._robot = robot
+        self._units = units
         joints_of: dict[tuple[Register, ...], list[int]] = {}
         for joint, servo_id in enumerate(robot.servo_ids):
             table = bus.table_of(servo_id)
@@ -87,7 +90,8 @@ class _Block:
 
     def read(self, missing: Bools) -> dict[int, dict[str, int]]:
         """Values of the joints that replied and are ``missing`` (J,), by name."""
-        reply, start = self.cycle.read(), self.registers[0].address
+        reply = self.cycle.read()
+        start = self.registers[0].address
         found = {}
         for place in np.flatnonzero(reply.valid & missing[self.joints]).tolist():
             row = reply.data[place].tobytes()

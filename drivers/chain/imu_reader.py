@@ -40,7 +40,8 @@ class ImuReader:
             PortError: the port is gone.
 
         """
-        config, number = self._config, IMU_TABLES[self._config.model].model_number
+        config = self._config
+        number = IMU_TABLES[self._config.model].model_number
         try:
             reply = self._bus.ping(config.id)
         except NoAnswerError:

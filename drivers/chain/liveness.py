@@ -55,7 +55,9 @@ class LivenessCheck:
         ``configured`` has RAM registers, ``fingerprints`` EEPROM registers, by joint.
         ``watchdogs`` are the ticks of each joint's watchdog; those without one are left out.
         """
-        self._bus, self._robot, self._goals = bus, robot, goals
+        self._bus = bus
+        self._robot = robot
+        self._goals = goals
         self._rad_per_position = rad_per_position
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
@@ -146,7 +148,8 @@ class LivenessCheck:
         raise BusError(f"{names}: {self._difference(check, joint, value)}")
 
     def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
-        name, expected = check.name, check.expected[joint]
+        name = check.name
+        expected = check.expected[joint]
         if check is self._torque:
             return "torque is off: has it rebooted?"
         if name == WATCHDOG and value == WATCHDOG_TRIPPED:

@@ -2,7 +2,8 @@
 
 from collections import deque
 
-LOSS_READS, LOSSES = 100, 4
+LOSS_READS = 100
+LOSSES = 4
 """This many losses within this many reads show a bad line (ours). A servo that falls silent, or a
 computer that stalls for a while, is one loss."""
 
@@ -18,7 +19,9 @@ class LostReplies:
         self._began: deque[int] = deque()
         """Numbers of the reads at which a loss began."""
         self._reads = 0
-        self._complete, self._any, self._reported = True, True, False
+        self._complete = True
+        self._any = True
+        self._reported = False
         self._late: deque[int] = deque()
         """Numbers of the reads before which bytes arrived late."""
         self._late_bytes = 0
@@ -36,7 +39,8 @@ class LostReplies:
         if self._complete and not is_complete:
             self._began.append(self._reads)
         is_silent = not (is_any or self._any)
-        self._complete, self._any = is_complete, is_any
+        self._complete = is_complete
+        self._any = is_any
         for reads in (self._began, self._late):
             while reads and reads[0] <= self._reads - LOSS_READS:
                 reads.popleft()

@@ -12,12 +12,17 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-CURRENT_READS, CURRENT_TRAVEL_RAD, BACK_RAD = 25, 0.5, 0.2
+CURRENT_READS = 25
+CURRENT_TRAVEL_RAD = 0.5
+BACK_RAD = 0.2
 """A sensor is dead if a current stays the same for that many reads and that much travel, part of it
 back again (ours). Friction alone changes its sign when a joint turns back."""
-SATURATED, OVER_LIMIT = 0.9, 1.5
+SATURATED = 0.9
+OVER_LIMIT = 1.5
 """Shares of a current limit between which the limit may keep a current constant (ours)."""
-SPEED_READS, MISMATCH_RAD, MISMATCH_RAD_S = 25, 0.15, 0.1
+SPEED_READS = 25
+MISMATCH_RAD = 0.15
+MISMATCH_RAD_S = 0.1
 """Position and velocity contradict each other if one of them stays the same for that many reads.
 The position must also differ from the integral of the velocity by this, and by this for each second
 (ours). The coarsest velocity unit is 0.08 rad/s."""
@@ -51,8 +56,13 @@ class MotionSensors:
         if not 0.0 < step_s <= LONGEST_STEP_S:
             self._last.fill(np.nan)
         if not _compare(
-            *(motion, valid, step_s, self._limits_a),
-            *(self._last, self._since, self._is_dead),
+            motion,
+            valid,
+            step_s,
+            self._limits_a,
+            self._last,
+            self._since,
+            self._is_dead,
         ):
             return []
         new = self._is_dead & ~self._reported
@@ -121,7 +131,9 @@ def _compare(
                 since[n, 1, k] += step_s
                 since[n, 2, k] += abs(moved) if n == 0 else moved
                 since[n, 3, k] += moved if n == 0 else turned
-                reads, first, second = since[n, 0, k], since[n, 2, k], since[n, 3, k]
+                reads = since[n, 0, k]
+                first = since[n, 2, k]
+                second = since[n, 3, k]
                 if n == 0:
                     is_dead[n, k] = (
                         reads >= CURRENT_READS

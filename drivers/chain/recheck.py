@@ -99,7 +99,8 @@ def recheck(
         elif not abs(moved[joint]) <= MOVED_RAD:
             text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
             faults.append(ChainFault(FaultCause.MOVED, text))
-        unit_rad, before_it = float(units.rad_per_position[joint]), fingerprints.get(joint, {})
+        unit_rad = float(units.rad_per_position[joint])
+        before_it = fingerprints.get(joint, {})
         faults += [
             ChainFault(FaultCause.OTHER_SETTINGS, line)
             for line in fingerprint_faults(robot, joint, before_it, servo.registers, unit_rad)

@@ -40,7 +40,8 @@ class RegisterRows:
         """Rows of ``values`` (N,), as in a group read."""
         if self._kind is not None:
             return np.asarray(values).astype(self._kind, copy=False).tobytes()
-        given, rows = np.asarray(values), np.zeros((len(self._kinds), self._width), np.uint8)
+        given = np.asarray(values)
+        rows = np.zeros((len(self._kinds), self._width), np.uint8)
         for kind, places in self._places.items():
             part = np.ascontiguousarray(given[places].astype(kind))
             rows[places, : kind.itemsize] = part.view(np.uint8).reshape(len(places), -1)

@@ -110,7 +110,8 @@ class ServoChain:
         self._configured: dict[int, Mapping[str, int]] = {}
         self._fingerprints: dict[int, Fingerprint] = {}
         self._liveness: LivenessCheck | None = None
-        self._rate_hz, self._file = rate_hz, fingerprint_file
+        self._rate_hz = rate_hz
+        self._file = fingerprint_file
         self._goals = GoalEncoder(self._units)
         self._readings = Readings(tables, self._units)
         self._prepare_reads(fast=True)
@@ -125,7 +126,8 @@ class ServoChain:
         self._sensors = TemperatureSensors.of(robot)
         self._motion_sensors = MotionSensors(robot)
         self._torque_off = TorqueOff(bus, robot, self._clock, self._watchdog_s)
-        self._armed, self._sent_at_s = False, -math.inf
+        self._armed = False
+        self._sent_at_s = -math.inf
         self._goal_rad = np.full(robot.joint_count, np.nan)
 
     @property
@@ -189,8 +191,13 @@ class ServoChain:
 
         """
         return recheck(
-            *(self._bus, self.robot, self._units, self.inspection),
-            *(self._configured, self._fingerprints, believed_rad),
+            self._bus,
+            self.robot,
+            self._units,
+            self.inspection,
+            self._configured,
+            self._fingerprints,
+            believed_rad,
         )
 
     def resume(self, found: Recheck) -> JointState:
@@ -217,7 +224,8 @@ class ServoChain:
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
-        self._reads, self._due = 0, None
+        self._reads = 0
+        self._due = None
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -262,7 +270,8 @@ class ServoChain:
 
     def _hold_and_arm(self, here_rad: Floats) -> JointState:
         """Goal = present, torque on, watchdog armed, each read back; return the state."""
-        bus, ids = self._bus, self.robot.servo_ids
+        bus = self._bus
+        ids = self.robot.servo_ids
         watched = [ids[joint] for joint in self._watchdogs]
         if watched:
             bus.sync_write(watched, WATCHDOG, 0)  # goals follow at once, else an old goal counts
@@ -288,8 +297,12 @@ class ServoChain:
 
     def _new_liveness(self) -> LivenessCheck:
         return LivenessCheck(
-            *(self._bus, self.robot, self._configured, self._fingerprints),
-            *(self._watchdogs, self._goal_check),
+            self._bus,
+            self.robot,
+            self._configured,
+            self._fingerprints,
+            self._watchdogs,
+            self._goal_check,
             fast=self._fast_reads,
             rad_per_position=lambda joint: float(self._units.rad_per_position[joint]),
         )
@@ -395,7 +408,8 @@ class ServoChain:
         self._make_due_check()
 
     def _make_due_check(self) -> None:
-        has_time, self._due = self._due, None
+        has_time = self._due
+        self._due = None
         if has_time is not None and self._liveness is not None:
             self._check(self._liveness.check, has_time)
 
@@ -443,7 +457,8 @@ class ServoChain:
             return None
 
     def _prepare_reads(self, *, fast: bool) -> None:
-        bus, ids = self._bus, self.robot.servo_ids
+        bus = self._bus
+        ids = self.robot.servo_ids
         self._cycle: GroupCycle = bus.cycle(ids, fast=fast)
         self._slow: GroupCycle = bus.slow_cycle(ids, fast=fast)
         labels = [*map(self.robot.joint_label, range(self.robot.joint_count))]

@@ -40,23 +40,45 @@ from snakewalk.drivers.types import LIMIT_SLACK_RAD
 RAM_SETTINGS = ("Position P Gain", "Goal PWM", "Goal Current")
 """Settings that a reboot or another program would undo, and that are compared while it runs."""
 SHAPING_SETTINGS = (
-    *("Position I Gain", "Position D Gain", "Feedforward 1st Gain", "Feedforward 2nd Gain"),
-    *("Profile Acceleration", "Profile Velocity"),
+    "Position I Gain",
+    "Position D Gain",
+    "Feedforward 1st Gain",
+    "Feedforward 2nd Gain",
+    "Profile Acceleration",
+    "Profile Velocity",
 )
 """Those that another program would change, and a reboot would not."""
 IDENTITY = "Velocity I Gain"
 """Stores the joint number: in RAM, unused by position control, reset by a change of mode."""
 _REPORTED = (
-    *("Firmware Version", "Hardware Error Status", "Return Delay Time", "Operating Mode"),
-    *("Torque Enable", "Present Temperature", "Present Input Voltage"),
+    "Firmware Version",
+    "Hardware Error Status",
+    "Return Delay Time",
+    "Operating Mode",
+    "Torque Enable",
+    "Present Temperature",
+    "Present Input Voltage",
 )
 _COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FINGERPRINT)
 """Registers read as well, for comparisons of a servo with its earlier state."""
 _SETTINGS = (
-    *("Torque Enable", "Bus Watchdog", "Secondary(Shadow) ID", "Return Delay Time"),
-    *("Operating Mode", "Drive Mode", STARTUP, "Shutdown", "Homing Offset", *PROTECTION),
-    *("Min Position Limit", "Max Position Limit", "Goal Current"),
-    *("Goal PWM", "Position P Gain", *SHAPING_SETTINGS, IDENTITY),
+    "Torque Enable",
+    "Bus Watchdog",
+    "Secondary(Shadow) ID",
+    "Return Delay Time",
+    "Operating Mode",
+    "Drive Mode",
+    STARTUP,
+    "Shutdown",
+    "Homing Offset",
+    *PROTECTION,
+    "Min Position Limit",
+    "Max Position Limit",
+    "Goal Current",
+    "Goal PWM",
+    "Position P Gain",
+    *SHAPING_SETTINGS,
+    IDENTITY,
 )
 """Registers that ``configure`` checks."""
 _FEW = 3
@@ -119,7 +141,8 @@ def inspect(
         on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
         missing = [str(i) for i in on_it if i in asked and i not in found]
         if missing:
-            port, baud = part.port.name, part.port.getBaudRate()
+            port = part.port.name
+            baud = part.port.getBaudRate()
             whole = _ids_in_words(on_it)
             text = f"{port}: no answer from servo {', '.join(missing)} of {whole} at {baud} baud: "
             text += "power, cable, id or baud rate"
@@ -130,7 +153,8 @@ def inspect(
                     "servos that reply"
                 )
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))
-    servos, others = [], defaultdict[tuple[str, str], list[int]](list)
+    servos = []
+    others = defaultdict[tuple[str, str], list[int]](list)
     for servo_id, servo in found.items():
         joint = robot.joint_label(robot.servo_ids.index(servo_id))
         table = bus.table_of(servo_id)
@@ -249,7 +273,8 @@ def _configure_joint(
     found: dict[str, int],
     on_event: Callable[[str], None],
 ) -> ServoSettings:
-    name, pwm_limit = robot.joint_label(joint), found["PWM Limit"]
+    name = robot.joint_label(joint)
+    pwm_limit = found["PWM Limit"]
     full = int(units.full_pwm[joint])
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
@@ -319,7 +344,8 @@ def _apply(
         BusError: a register differs; or the servo does not reply, or refuses.
 
     """
-    servo_id, name = robot.servo_ids[joint], robot.joint_label(joint)
+    servo_id = robot.servo_ids[joint]
+    name = robot.joint_label(joint)
     own = [setting for setting in settings if setting.register in found]
     now = found
     for setting in own:
@@ -334,7 +360,8 @@ def _apply(
         return found
     now = _read_settings(bus, servo_id)
     for setting in own:
-        register, got = setting.register, now[setting.register]
+        register = setting.register
+        got = now[setting.register]
         value = setting.value_in(now)
         if got != value:
             raise BusError(f"{name}: {register}: wrote {value}, reads back {got}")

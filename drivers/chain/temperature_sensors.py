@@ -24,7 +24,8 @@ EXPECTED_ALONE_K = 12.0
 as it is for a while."""
 CHANGED_K = 3.0
 """Change that shows a sensor that works (ours)."""
-JUMP_K, JUMP_K_S = 8.0, 1.0
+JUMP_K = 8.0
+JUMP_K_S = 1.0
 """A reading that changes by more than this, and by this for each second, is not a temperature
 (ours): twice the heat of the stall current."""
 _LONGEST_STEP_S = 5.0
@@ -36,7 +37,8 @@ class TemperatureSensors:
 
     def __init__(self, joint_names: Sequence[str], stall_current_a: Floats) -> None:
         """``stall_current_a`` (J,) is the current at full output and rest; infinite if unknown."""
-        self._names, self._stall_a = joint_names, stall_current_a
+        self._names = joint_names
+        self._stall_a = stall_current_a
         joints = len(joint_names)
         self._first_c = np.full(joints, np.nan)
         self._is_constant = np.ones(joints, np.bool_)

@@ -13,7 +13,8 @@ _GROUP_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _ASK_S = 1.0
 """How long servos that do not confirm are asked one by one, s (ours)."""
-_PORT_PATIENCE_S, _REOPEN_S = 2.0, 0.1
+_PORT_PATIENCE_S = 2.0
+_REOPEN_S = 0.1
 """How long torque off waits for a port that is gone, and the time between tries, s (ours)."""
 
 
@@ -21,7 +22,9 @@ class TorqueOff:
     """Switches torque off, then the watchdogs."""
 
     def __init__(self, bus: ChainBus, robot: RobotConfig, clock: Clock, watchdog_s: float) -> None:
-        self._bus, self._robot, self._clock = bus, robot, clock
+        self._bus = bus
+        self._robot = robot
+        self._clock = clock
         self._watchdog_s = watchdog_s
 
     def send(self) -> None:
@@ -97,7 +100,8 @@ class TorqueOff:
                 return
 
     def _unconfirmed(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
-        ids, joints = self._robot.servo_ids, list(on_it)
+        ids = self._robot.servo_ids
+        joints = list(on_it)
         for _ in range(_GROUP_ROUNDS):
             asked = self._ids_of(joints)
             reply = bus.block(asked, "Torque Enable", "Torque Enable", fast=False).read()

@@ -33,7 +33,8 @@ class LinePort(ABC):
 
     def __init__(self, name: str, baud: int, clock: Clock | None) -> None:
         self.is_using = False
-        self._name, self._baud = name, baud
+        self._name = name
+        self._baud = baud
         self._clock: Clock = clock if clock is not None else WallClock()
         self._timeout_at_s = 0.0
         self._serial: serial.Serial | None = None
@@ -99,7 +100,8 @@ class LinePort(ABC):
 
     def closePort(self) -> None:
         if self._serial is not None:
-            line, self._serial = self._serial, None
+            line = self._serial
+            self._serial = None
             with suppress(*self.line_errors):  # a lost line is closed as far as possible
                 line.close()
         self.is_using = False

@@ -75,7 +75,8 @@ class NetworkPort(LinePort):
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
-        got, line = b"", self._line
+        got = b""
+        line = self._line
         try:
             while len(got) < count and (line.in_waiting or self._clock.now_s() < deadline_s):
                 got += line.read(count - len(got))

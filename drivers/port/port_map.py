@@ -23,7 +23,8 @@ def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
         InputError: unreadable text, an ID outside 0 to 252, or a reversed range.
 
     """
-    found, at = [], 0
+    found = []
+    at = 0
     while at < len(text):
         segment = _SEGMENT.match(text, at)
         if segment is None:

@@ -31,7 +31,8 @@ _GAIN = 8
 """A reply moves the latency estimate by one part in this number (ours)."""
 _LONGEST_STREAK = 16
 _RAW = types.Array(uint8, 1, "C", readonly=True)
-LATE, STREAK = 0, 1
+LATE = 0
+STREAK = 1
 """Indices of a latency estimate: how much later than computed replies are complete, ns; number of
 early replies in a row."""
 
@@ -105,7 +106,8 @@ def receive(
     """
     time = np.empty(2, np.int64)  # struct timespec
     awaited = np.empty(1, np.int64)  # struct pollfd: descriptor, events, returned events
-    here, count = reply.ctypes.data, len(reply) - 1
+    here = reply.ctypes.data
+    count = len(reply) - 1
     got = 0
     if spin_ns > 0:
         expected_ns = begun_ns + least_ns + int(latency_estimate[LATE])

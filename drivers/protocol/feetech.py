@@ -27,7 +27,9 @@ GROUP_BYTES: Final = 8
 """Sync instruction without entries: header 2, ID, length, instruction, address, data length,
 checksum. A read of one servo is as long."""
 POSITION_MODE: Final = 0
-TORQUE_ON, TORQUE_DAMPING, CALIBRATE_MIDDLE = 1, 2, 128
+TORQUE_ON = 1
+TORQUE_DAMPING = 2
+CALIBRATE_MIDDLE = 128
 """Torque Enable(40)."""
 
 

@@ -11,7 +11,9 @@ from snakewalk.config.arrays import Bytes
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.crc import TABLE
 
-IRREGULAR, FLAWLESS, WITH_ERRORS = 0, 1, 2
+IRREGULAR = 0
+FLAWLESS = 1
+WITH_ERRORS = 2
 """Results: not the expected bytes; no servo reports an error; some servos do."""
 HEAD = 8
 """Bytes of a status packet before its error byte, and of a fast reply before its parts."""
@@ -22,7 +24,8 @@ ENTRY_BYTES = 5
 
 
 _RAW = readonly_array("uint8", layout="C")
-_ROW, _ROWS = "uint8[::1]", "uint8[:, ::1]"
+_ROW = "uint8[::1]"
+_ROWS = "uint8[:, ::1]"
 
 
 @compiled(f"int64({_RAW}, int64, int64, int64)", makes_arrays=False)

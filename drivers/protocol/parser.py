@@ -56,7 +56,8 @@ class PacketParser:
             at = found
             if len(buffer) - at < _FIXED + 3:
                 break
-            servo_id, length = buffer[at + 4], buffer[at + 5] | buffer[at + 6] << 8
+            servo_id = buffer[at + 4]
+            length = buffer[at + 5] | buffer[at + 6] << 8
             shortest = 4 if buffer[at + 7] == STATUS else 3
             possible = servo_id <= MAX_ID or servo_id == BROADCAST_ID
             if not possible or not shortest <= length <= self.max_length:

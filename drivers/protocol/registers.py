@@ -30,12 +30,15 @@ WATCHDOG_TRIPPED = 0xFF
 RETURN_DELAY_UNIT_S = 2e-6
 """Return Delay Time(9)."""
 CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
-CURRENT_POSITION_MODE, PWM_MODE = 5, 16
+CURRENT_POSITION_MODE = 5
+PWM_MODE = 16
 
 NO_SECONDARY_ID = 255
 """Secondary(Shadow) ID(12): values from 253 mean that it is not used."""
 SECONDARY_ID_LIMIT = 252
-REVERSE, TIME_PROFILE, TORQUE_ON_BY_GOAL = 0x01, 0x04, 0x08
+REVERSE = 0x01
+TIME_PROFILE = 0x04
+TORQUE_ON_BY_GOAL = 0x08
 """Drive Mode(10), bits 0, 2 and 3."""
 SHUTDOWN_ALARMS = 0x34
 """Shutdown(63): the alarms that switch a servo off by its factory setting: overload, electrical
@@ -89,7 +92,8 @@ class ServoUnits:
 
         """
         missing = facts.missing_for_a_run()
-        measures, stall_a = facts.measures_current, facts.stall_current_a
+        measures = facts.measures_current
+        stall_a = facts.stall_current_a
         current_a = facts.units.current_a if measures else None
         if not measures and stall_a is not None:
             current_a = stall_a * LOAD_UNIT

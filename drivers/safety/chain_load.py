@@ -52,8 +52,14 @@ class ChainLoad:
         self._time_s = state.time_s
         share = -math.expm1(-step_s / WINDING_TIME_S)
         self.current_a, self.hottest_c = _draw(
-            *(state.current_a, state.velocity_rad_s, state.voltage_v, state.temperature_c),
-            *(self._motor, WINDING_SHARE, share, self.winding_k),
+            state.current_a,
+            state.velocity_rad_s,
+            state.voltage_v,
+            state.temperature_c,
+            self._motor,
+            WINDING_SHARE,
+            share,
+            self.winding_k,
         )
         self.charge_ah += self.current_a * step_s / 3600.0
 
@@ -103,9 +109,12 @@ def _draw(
     ``winding_k`` (J,) moves towards its equilibrium. An unread current or speed (NaN) counts as
     zero, a voltage as nominal; a winding without a temperature is ignored.
     """
-    total_a, hottest_c = 0.0, -np.inf
+    total_a = 0.0
+    hottest_c = -np.inf
     for k in range(len(current_a)):
-        resistance_ohm, emf_v_s, standby_a = motor[0, k], motor[1, k], motor[2, k]
+        resistance_ohm = motor[0, k]
+        emf_v_s = motor[1, k]
+        standby_a = motor[2, k]
         amps = current_a[k] if np.isfinite(current_a[k]) else 0.0
         speed = velocity_rad_s[k] if np.isfinite(velocity_rad_s[k]) else 0.0
         volts = voltage_v[k] if voltage_v[k] > 0.0 else motor[4, k]

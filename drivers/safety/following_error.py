@@ -76,19 +76,33 @@ class FollowingError:
         """Evaluate a state and the goals (J,) sent before it; return a reason to stop, or None."""
         last_s, self._time_s = self._time_s, state.time_s
         joint = _judge(
-            *(goal_rad, state.position_rad, state.velocity_rad_s, state.current_a, state.valid),
-            *(state.time_s, last_s, self._rules, self._memory),
+            goal_rad,
+            state.position_rad,
+            state.velocity_rad_s,
+            state.current_a,
+            state.valid,
+            state.time_s,
+            last_s,
+            self._rules,
+            self._memory,
         )
         steady = _steady_joint(
-            *(goal_rad, state.position_rad, state.current_a, state.valid),
-            *(state.time_s, last_s, self._rules, self._steady),
+            goal_rad,
+            state.position_rad,
+            state.current_a,
+            state.valid,
+            state.time_s,
+            last_s,
+            self._rules,
+            self._steady,
         )
         self.is_idle = joint >= 0 and bool(self._idle_s[joint] >= IDLE_TIME_S)
         if self.is_idle:
             self.joint = joint
             return self._idle_fault(state, goal_rad, joint)
         if steady >= 0:
-            self.joint, self.is_idle = steady, True
+            self.joint = steady
+            self.is_idle = True
             return self._steady_fault(state, goal_rad, steady)
         if joint < 0:
             return None
@@ -165,12 +179,14 @@ def _judge(
     """
     since_s = time_s - last_s
     step_s = min(max(since_s, 0.0), LONGEST_STEP_S)
-    longest, idle = -1, -1
+    longest = -1
+    idle = -1
     for k in range(len(goal_rad)):
         if valid[k]:
             error = goal_rad[k] - position_rad[k]
             sign = 1.0 if error > 0.0 else -1.0
-            towards_a, size = sign * current_a[k], abs(error)
+            towards_a = sign * current_a[k]
+            size = abs(error)
             if size > rules[0, k] and towards_a < rules[1, k]:
                 if np.isnan(memory[0, k]):
                     memory[0, k] = time_s

@@ -11,7 +11,8 @@ from snakewalk.config.run import SafetyConfig
 from snakewalk.drivers.safety.chain_load import motor_columns
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
-STEP_SLACK_RAD, STEP_RATE = 0.2, 2.0
+STEP_SLACK_RAD = 0.2
+STEP_RATE = 2.0
 """Slack of a measured step, and its speed as a share of the goals' rate (ours): 0.36 rad in 20 ms;
 a link that falls off an edge was measured at 0.12."""
 _LEAST_LIMIT_A = 0.05

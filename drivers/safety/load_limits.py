@@ -20,7 +20,8 @@ class LoadLimits:
 
     def update(self, state: JointState) -> str | None:
         """Evaluate a state; return a reason to stop, or None."""
-        load, limits = self.load, self._limits
+        load = self.load
+        limits = self._limits
         if load is None:
             return None
         load.update(state)

@@ -39,11 +39,18 @@ class MeasuredSteps:
             the doubted values, or None.
 
         """
-        limits, doubted_rad = self._limits, self._doubted_rad
+        limits = self._limits
+        doubted_rad = self._doubted_rad
         if doubted_rad is None and _is_all_believable(
-            *(state.position_rad, state.age_s, state.valid, state.time_s),
-            *(believed.position_rad, believed.age_s, believed.time_s),
-            *(limits.step_slack_rad, limits.step_rate_rad_s),
+            state.position_rad,
+            state.age_s,
+            state.valid,
+            state.time_s,
+            believed.position_rad,
+            believed.age_s,
+            believed.time_s,
+            limits.step_slack_rad,
+            limits.step_rate_rad_s,
         ):
             return state, None
         position_rad, slack_rad = state.position_rad, limits.step_slack_rad

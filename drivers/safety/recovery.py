@@ -93,9 +93,13 @@ class Recovery(Generic[C]):
             on_event: gets every step as one line, for the log.
 
         """
-        self._chain, self._clock = chain, chain.clock
-        self._policy, self._patience_s, self._remaining = policy, patience_s, limit
-        self._confirm, self._on_event = confirm, on_event
+        self._chain = chain
+        self._clock = chain.clock
+        self._policy = policy
+        self._patience_s = patience_s
+        self._remaining = limit
+        self._confirm = confirm
+        self._on_event = on_event
         self.overload_reboots = overload_reboots
         """How many are left."""
         self.refusal: str | None = None
@@ -182,7 +186,8 @@ class Recovery(Generic[C]):
         The servo of ``joint`` is rebooted; a later alarm ends the wait.
         """
         give_up_s = self._clock.now_s() + self._patience_s
-        held, to_reboot = False, joint
+        held = False
+        to_reboot = joint
         while True:
             try:
                 if not held:

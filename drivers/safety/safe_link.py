@@ -98,8 +98,10 @@ class SafeLink:
         self._memory: SafetyMemory | None = None
         self._stop_requested: str | None = None
         self._stop_may_hold = False
-        self._hold, self._hold_until_s = hold, -math.inf
-        self._stop_output, self._output_is_active = stop_output, False
+        self._hold = hold
+        self._hold_until_s = -math.inf
+        self._stop_output = stop_output
+        self._output_is_active = False
         self._asked_to_stop = stop_requested
         self._touched = False
         self.is_off = False
@@ -172,7 +174,8 @@ class SafeLink:
 
         """
         self._refuse_to_start()
-        self._touched, self.is_off = True, False
+        self._touched = True
+        self.is_off = False
         state = self._link.enable()
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
@@ -190,7 +193,8 @@ class SafeLink:
             DriverError: torque off is not confirmed.
 
         """
-        self._memory, self._hold_until_s = None, -math.inf
+        self._memory = None
+        self._hold_until_s = -math.inf
         try:
             self._link.disable()
         except DriverError as fault:
@@ -266,7 +270,8 @@ class SafeLink:
                 return
         now_s = self._clock.now_s()
         verdict = vet(command, self._state, self._memory, self._limits_at(now_s), now_s)
-        self.last_verdict, self._memory = verdict, verdict.memory
+        self.last_verdict = verdict
+        self._memory = verdict.memory
         if verdict.veto is not None:
             self._trip(verdict.veto)
             self._refuse_if_tripped()
@@ -368,7 +373,8 @@ class SafeLink:
         now_s = self._clock.now_s()
         fault, self._memory = check_state(state, memory, limits or self._limits, now_s)
         fault = fault or self._loads.update(state)
-        stop, is_sound = self._stop(), fault is None
+        stop = self._stop()
+        is_sound = fault is None
         fault = stop or fault or self._following_fault(state, memory)
         if fault is not None:
             softly = self._stops_softly() if stop is not None else self._is_held_off
@@ -410,7 +416,10 @@ class SafeLink:
 
     def _begin_hold(self) -> bool:
         """Hold with low currents, if possible and the newest state is sound."""
-        hold, state, memory, now_s = self._hold, self._state, self._memory, self._clock.now_s()
+        hold = self._hold
+        state = self._state
+        memory = self._memory
+        now_s = self._clock.now_s()
         if hold is None or state is None or memory is None or not isinstance(self._link, SoftLink):
             return False
         if self._doubt is not None:
@@ -422,7 +431,8 @@ class SafeLink:
         except DriverError as fault:
             self._on_event(f"cannot hold: {fault}")
             return False
-        self._stop_requested, self._stop_may_hold = None, False  # another stop ends the hold
+        self._stop_requested = None
+        self._stop_may_hold = False  # another stop ends the hold
         self._memory = SafetyMemory.at_rest(state)
         self._hold_until_s = self._clock.now_s() + hold.seconds
         self._on_event(f"holds with low currents for {hold.seconds:g} s, then torque goes off")
@@ -436,7 +446,8 @@ class SafeLink:
         except DriverError as fault:
             self._end_hold(str(fault))
             raise SafetyTrippedError(str(self.tripped)) from fault
-        doubt, now_s = None, self._clock.now_s()
+        doubt = None
+        now_s = self._clock.now_s()
         if self._state is not None:
             state, doubt = self._steps.update(state, self._state)
         self._state = state

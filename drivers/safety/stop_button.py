@@ -31,7 +31,8 @@ except ImportError:  # Windows: a killed program leaves its button until the fil
 
 _HAS_LOCKS: bool = fcntl is not None
 _BYTES: Final = 4096
-_PRESSED, _ENDED = 0, 1
+_PRESSED = 0
+_ENDED = 1
 _WHO: Final = slice(16, 528)
 _END: Final = slice(528, 1552)
 _RUN: Final = slice(1552, _BYTES)

@@ -137,7 +137,9 @@ class StopLine:
 
     def __init__(self, device: str, line: str, *, is_inverted: bool) -> None:
         self.name = f"{'-' if is_inverted else ''}{line}:{device}"
-        self._device, self._line, self._is_inverted = device, line, is_inverted
+        self._device = device
+        self._line = line
+        self._is_inverted = is_inverted
         self._port: serial.Serial | None = None
 
     def __enter__(self) -> Self:
@@ -148,7 +150,9 @@ class StopLine:
 
         """
         port = serial.Serial()
-        port.port, port.rts, port.dtr = self._device, self._is_inverted, self._is_inverted
+        port.port = self._device
+        port.rts = self._is_inverted
+        port.dtr = self._is_inverted
         try:
             port.open()
             self._port = port

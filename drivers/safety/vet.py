@@ -20,7 +20,8 @@ from snakewalk.drivers.protocol.registers import Alarm, alarm_names
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointCommand, JointState
 
-_FLOATS, _BYTES = readonly_array(), readonly_array("uint8")
+_FLOATS = readonly_array()
+_BYTES = readonly_array("uint8")
 
 
 class CheckedState(NamedTuple):
@@ -81,13 +82,16 @@ def vet(
     veto, checked = check_state(state, last, limits, now_s)
     if veto is not None:
         return _refused(veto, checked)
-    requested, joints = np.asarray(command.goal_rad, float), len(limits.limit_rad)
+    requested = np.asarray(command.goal_rad, float)
+    joints = len(limits.limit_rad)
     if requested.shape != limits.limit_rad.shape:
         return _refused(f"command of shape {requested.shape} for {joints} joints", checked)
     # after a pause the allowance is at most that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
-    step, lead = limits.goal_rate_rad_s * dt_s, limits.goal_lead_rad
-    goal, clamped = np.empty(joints), np.empty(joints, np.bool_)
+    step = limits.goal_rate_rad_s * dt_s
+    lead = limits.goal_lead_rad
+    goal = np.empty(joints)
+    clamped = np.empty(joints, np.bool_)
     measured = np.asarray(state.position_rad, float)
     bad = _clamp(requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
     if bad >= 0:
@@ -110,7 +114,8 @@ def check_state(
 
     A repeated check of a state gives the same result, except for its age.
     """
-    checked, aged_s = last.checked_state, now_s - state.time_s
+    checked = last.checked_state
+    aged_s = now_s - state.time_s
     if checked is not None and checked.state is state and checked.limits is limits:
         if checked.age_max_s + aged_s <= limits.stale_limit_s:
             return None, last
@@ -232,7 +237,8 @@ def overloaded_joint(state: JointState) -> int | None:
 
 def without_alarm(state: JointState, joint: int) -> JointState:
     """The state without this joint's alarm, so that other faults show."""
-    hardware_error, error = state.hardware_error.copy(), state.error.copy()
+    hardware_error = state.hardware_error.copy()
+    error = state.error.copy()
     hardware_error[joint] = 0
     error[joint] &= 0xFF ^ ALERT
     return state._replace(hardware_error=hardware_error, error=error)
@@ -248,12 +254,22 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
         return math.nan
     try:
         return _quick_check(
-            *(state.position_rad, state.velocity_rad_s, state.current_a),
-            *(state.temperature_c, state.voltage_v, state.age_s, state.slow_age_s),
-            *(state.error, state.hardware_error),
+            state.position_rad,
+            state.velocity_rad_s,
+            state.current_a,
+            state.temperature_c,
+            state.voltage_v,
+            state.age_s,
+            state.slow_age_s,
+            state.error,
+            state.hardware_error,
             limits.limit_rad,
-            *(limits.limit_slack_rad, limits.current_limit_a, limits.temperature_limit_c),
-            *(limits.voltage_min_v, limits.voltage_max_v, limits.slow_stale_limit_s),
+            limits.limit_slack_rad,
+            limits.current_limit_a,
+            limits.temperature_limit_c,
+            limits.voltage_min_v,
+            limits.voltage_max_v,
+            limits.slow_stale_limit_s,
         )
     except TypeError:  # a link with other number types: state_fault accepts any
         return math.nan
