@@ -32,7 +32,8 @@ class Imu:
         baud: int = 1_000_000,
         seed: int = 0,
     ) -> None:
-        self.config, self.baud = config, baud
+        self.config = config
+        self.baud = baud
         self._motion, self._turn = motion, rotations()
         self._in_link = self._turn.from_euler("xyz", config.mounting_deg, degrees=True).as_matrix()
         self._random = np.random.default_rng(seed)
@@ -66,14 +67,16 @@ class Imu:
         if last is not None and step_s < _SHORTEST_S:
             return
         rotation = now.rotation @ self._in_link
-        rate, velocity = np.zeros(3), self._velocity_m_s
+        rate = np.zeros(3)
+        velocity = self._velocity_m_s
         acceleration = np.zeros(3)
         if last is not None:
             before = last.rotation @ self._in_link
             rate = self._turn.from_matrix(before.T @ rotation).as_rotvec() / step_s
             velocity = (now.centre_m - last.centre_m) / step_s
             acceleration = (velocity - self._velocity_m_s) / step_s
-        self._last, self._velocity_m_s = now, velocity
+        self._last = now
+        self._velocity_m_s = velocity
         noise = self._random.standard_normal((2, 3))
         rate = rate + self._bias_rad_s + np.deg2rad(self.config.gyro_noise_dps) * noise[0]
         force = rotation.T @ (acceleration + _UP) + self.config.acceleration_noise_m_s2 * noise[1]

@@ -65,10 +65,22 @@ class ServoDrive:
     def columns(self) -> tuple[Floats, ...]:
         """All arrays, in field order."""
         return (
-            *(self.torque_on, self.goal_rad, self.p_gain_per_rad, self.pwm_limit, self.supply_v),
-            *(self.resistance_ohm, self.torque_constant_n_m_a, self.back_emf_v_s),
-            *(self.current_limit_a, self.current_a, self.torque_n_m, self.pwm),
-            *(self.drawn_j, self.returned_j, self.heat_j, self.work_j),
+            self.torque_on,
+            self.goal_rad,
+            self.p_gain_per_rad,
+            self.pwm_limit,
+            self.supply_v,
+            self.resistance_ohm,
+            self.torque_constant_n_m_a,
+            self.back_emf_v_s,
+            self.current_limit_a,
+            self.current_a,
+            self.torque_n_m,
+            self.pwm,
+            self.drawn_j,
+            self.returned_j,
+            self.heat_j,
+            self.work_j,
         )
 
 

@@ -44,12 +44,10 @@ class Ax12Alarms:
         supply_v: float,
     ) -> None:
         servos = len(drive.torque_on)
-        self._register, self._drive, self._motor, self._blocked_shaft = (
-            register,
-            drive,
-            motor,
-            blocked_shaft,
-        )
+        self._register = register
+        self._drive = drive
+        self._motor = motor
+        self._blocked_shaft = blocked_shaft
         self._supply = Supply(servos, supply_v)
         self._blocked_s = np.zeros(servos)
         self._slow_rad_s = np.full(servos, SLOW * motor.no_load_rad_s)
@@ -85,14 +83,17 @@ class Ax12Alarms:
 
     def check(self, seconds: float, velocity_rad_s: Floats) -> None:
         """Update heat and alarms after ``seconds``."""
-        drive, motor = self._drive, self._motor
+        drive = self._drive
+        motor = self._motor
         self._supply.feed(drive.supply_v)
-        amps, pwm = self._blocked_shaft.current_a(), self._blocked_shaft.pwm()
+        amps = self._blocked_shaft.current_a()
+        pwm = self._blocked_shaft.pwm()
         target_c = AMBIENT_C + motor.winding_k_per_w * motor.resistance_ohm * amps**2
         share = 1.0 - np.exp(-seconds / motor.thermal_time_s)
         self.temperature_c += (target_c - self.temperature_c) * share
         full = self._full_output()
-        on, slow_rad_s = drive.torque_on, self._slow_rad_s
+        on = drive.torque_on
+        slow_rad_s = self._slow_rad_s
         count_blocked(self._blocked_s, seconds, pwm, full, on, velocity_rad_s, slow_rad_s)
         tenths = np.rint(drive.supply_v * 10.0)
         low, high = self._register("Min Voltage Limit"), self._register("Max Voltage Limit")

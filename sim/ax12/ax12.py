@@ -44,7 +44,8 @@ class Ax12Servos(SimulatedServos):
         check_ids(ids, facts.model, MAX_ID)
         servos = len(ids)
         super().__init__(plant, make_drive([motor] * servos, supply_v))
-        self._per_rad, self._centre = facts.positions_per_rad, facts.units.zero_position
+        self._per_rad = facts.positions_per_rad
+        self._centre = facts.units.zero_position
         self._starts = {row.address: name for name, row in facts.registers.items()}
         self.table = np.zeros((servos, end_of(facts.registers)), np.uint8)
         self._views = {name: self._view(cell) for name, cell in facts.registers.items()}
@@ -92,7 +93,8 @@ class Ax12Servos(SimulatedServos):
         if error:
             return error
         self.table[row, address : address + len(data)] = np.frombuffer(data, np.uint8)
-        rows, touched = self.facts.registers, range(address, address + len(data))
+        rows = self.facts.registers
+        touched = range(address, address + len(data))
         if rows["Torque Limit"].address in touched and self["Torque Limit"][row]:
             self.protection.reset(row)
         if rows["Goal Position"].address in touched:  # a goal switches the torque on
@@ -161,8 +163,10 @@ class Ax12Servos(SimulatedServos):
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)
 
     def _update_drive(self, seconds: float) -> None:
-        drive, wheel = self.drive, self._wheel()
-        on, speed = self._on(), self["Moving Speed"].astype(int)
+        drive = self.drive
+        wheel = self._wheel()
+        on = self._on()
+        speed = self["Moving Speed"].astype(int)
         shaft = self.plant.position_rad
         self._trajectory.restart(~on | wheel, shaft)
         self._update_turns()

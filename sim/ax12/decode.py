@@ -68,8 +68,10 @@ class Decoder1:
         return not packet.params or (read and len(packet.params) == asked.params[1])
 
     def _question(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
-        self._asked, self._asked_s = packet, time_s
-        code, params = packet.instruction, packet.params
+        self._asked = packet
+        self._asked_s = time_s
+        code = packet.instruction
+        params = packet.params
         known = code in self.instructions.__members__.values()
         name = self.instructions(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
         values: dict[str, object] = {}
@@ -78,14 +80,16 @@ class Decoder1:
         elif code in (Instruction1.WRITE, Instruction1.REG_WRITE) and len(params) > 1:
             values = self._values(params[0], params[1:])
         elif code == Instruction1.SYNC_WRITE and len(params) > 1:
-            address, size = params[0], params[1]
+            address = params[0]
+            size = params[1]
             for at in range(2, len(params) - size, size + 1):
                 part = self._values(address, params[at + 1 : at + 1 + size])
                 values |= {f"{params[at]}: {key}": value for key, value in part.items()}
         return DecodedPacket(time_s, "question", packet.servo_id, name, values, raw)
 
     def _answer(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
-        asked, values = self._asked, {}
+        asked = self._asked
+        values = {}
         if asked is not None and asked.servo_id != BROADCAST_ID:
             self._asked = None
             if packet.params:

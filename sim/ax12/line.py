@@ -108,7 +108,8 @@ class Ax12Line(Wire):
         del baud  # every packet looks it up
 
     def _split(self, data: bytes) -> Sequence[bytes]:
-        frames, at = [], 0
+        frames = []
+        at = 0
         while data.startswith(HEADER, at) and at + 4 <= len(data):
             end = at + 4 + data[at + 3]
             if end >= len(data):
@@ -126,7 +127,8 @@ class Ax12Line(Wire):
         ]
 
     def _addressed(self, servo_id: int) -> list[int]:
-        servos, rate = self.servos, self.getBaudRate()
+        servos = self.servos
+        rate = self.getBaudRate()
         return [
             row
             for row in range(len(servos))
@@ -136,14 +138,17 @@ class Ax12Line(Wire):
         ]
 
     def _execute_packet(self, packet: Packet1) -> list[Reply]:
-        code, params = packet.instruction, packet.params
+        code = packet.instruction
+        params = packet.params
         if code == Instruction1.SYNC_WRITE:
             return self._sync_write(packet)
         replies = []
         for row in self._addressed(packet.servo_id):
             own = int(self.servos["ID"][row])
-            delay_s, replies_to = self._delay_s(row), self._replies_to(row, code)
-            error, data = Error1.CHECKSUM.value, b""
+            delay_s = self._delay_s(row)
+            replies_to = self._replies_to(row, code)
+            error = Error1.CHECKSUM.value
+            data = b""
             if packet.intact:
                 error, data = self._execute_one(row, code, params)
             if packet.servo_id == BROADCAST_ID and code != Instruction1.PING:
@@ -197,7 +202,8 @@ class Ax12Line(Wire):
     def _sync_write(self, packet: Packet1) -> list[Reply]:
         params = packet.params
         if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
-            address, size = params[0], params[1]
+            address = params[0]
+            size = params[1]
             for at in range(2, len(params) - size, size + 1):
                 for row in self._obeying(params[at]):
                     if self._deaf[row]:

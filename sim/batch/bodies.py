@@ -52,7 +52,8 @@ class BatchBodies(ABC):
         self.template = MujocoPlant(robot, world, None, step_s)
         """One such body: it is placed here, and then copied to a world."""
         joints = robot.joint_count
-        self.count, self.step_s = count, self.template.step_s
+        self.count = count
+        self.step_s = self.template.step_s
         # the drive as in ``sim.plant.ServoDrive``, (W, J)
         self.torque_on, self.goal_rad, self.p_gain_per_rad = np.zeros((3, count, joints))
         self.pwm_limit, self.supply_v = np.ones((2, count, joints))

@@ -24,7 +24,11 @@ three for these contacts (ours)."""
 _NO_LIMIT_A: Final = 1e9
 """Current limit of a motor without one."""
 _INPUTS: Final = (
-    *("torque_on", "goal_rad", "p_gain_per_rad", "pwm_limit", "supply_v"),
+    "torque_on",
+    "goal_rad",
+    "p_gain_per_rad",
+    "pwm_limit",
+    "supply_v",
     "current_limit_a",
 )
 """Arrays of the drive, in the order of the kernel's arguments."""
@@ -101,8 +105,11 @@ class _DeviceState:
 
     def __init__(self, bodies: WarpBodies) -> None:
         self.device = bodies.device
-        mechanics, robot = bodies.template.mechanics, bodies.template.robot
-        model, worlds, joints = mechanics.model, bodies.count, robot.joint_count
+        mechanics = bodies.template.mechanics
+        robot = bodies.template.robot
+        model = mechanics.model
+        worlds = bodies.count
+        joints = robot.joint_count
         links = joints + 1
         most = CONTACTS * links
         with warp.ScopedDevice(self.device):
@@ -124,7 +131,8 @@ class _DeviceState:
             self.mu = warp.zeros((worlds, 4), dtype=float)
             self.energies = warp.zeros((4, worlds, joints), dtype=warp.float64)
             self.totals = warp.zeros((worlds, 2), dtype=warp.float64)
-        self.spine, self.radius_m = mechanics.spine_links, mechanics.radius_m
+        self.spine = mechanics.spine_links
+        self.radius_m = mechanics.radius_m
         self.step_s = bodies.step_s
         self._graph: Any = None
 
@@ -135,8 +143,10 @@ class _DeviceState:
         self.roles = warp.array(mechanics.contact_role, dtype=int)
         self.mass_kg = warp.array(mechanics.link_mass_kg, dtype=float)
         motor = (
-            *(bodies.motors.resistance_ohm, bodies.motors.torque_constant_n_m_a),
-            *(bodies.motors.back_emf_v_s, mechanics.gears[2]),
+            bodies.motors.resistance_ohm,
+            bodies.motors.torque_constant_n_m_a,
+            bodies.motors.back_emf_v_s,
+            mechanics.gears[2],
         )
         self.motor = warp.array(np.stack(motor), dtype=float)
 
@@ -187,15 +197,27 @@ class _DeviceState:
             kernels.move_links,
             worlds,
             inputs=[
-                *(d.xipos, d.xmat, d.xaxis, d.qvel, self.parents),
-                *(self.spine, self.radius_m, self.step_s),
+                d.xipos,
+                d.xmat,
+                d.xaxis,
+                d.qvel,
+                self.parents,
+                self.spine,
+                self.radius_m,
+                self.step_s,
             ],
             outputs=[
-                *(self.before, self.velocity, self.spin, self.depth),
-                *(self.push, self.twist, self.still),
+                self.before,
+                self.velocity,
+                self.spin,
+                self.depth,
+                self.push,
+                self.twist,
+                self.still,
             ],
         )
-        contacts, found = d.contact, d.contact.dist.shape[0]
+        contacts = d.contact
+        found = d.contact.dist.shape[0]
         which = [d.nacon, contacts.worldid, contacts.geom]
         about = [self.roles, self.bodies]
         launch(
@@ -205,9 +227,21 @@ class _DeviceState:
             kernels.rub,
             found,
             inputs=[
-                *(*which, contacts.dist, contacts.pos, contacts.frame, *about),
-                *(d.xipos, d.xmat, self.velocity, self.spin, self.depth, self.load),
-                *(self.mass_kg, self.still, self.mu, self.step_s),
+                *which,
+                contacts.dist,
+                contacts.pos,
+                contacts.frame,
+                *about,
+                d.xipos,
+                d.xmat,
+                self.velocity,
+                self.spin,
+                self.depth,
+                self.load,
+                self.mass_kg,
+                self.still,
+                self.mu,
+                self.step_s,
             ],
             outputs=[self.push, self.twist, self.totals],
         )

@@ -218,7 +218,8 @@ class FaultPlayer:
         """Messages about a register that a servo lacks, or a value that does not fit."""
         wrong = []
         for each in self._rows.keys() & set(fault.ids):
-            name, value = fault.register_name, fault.value
+            name = fault.register_name
+            value = fault.value
             kind = self._line.register_type(self._rows[each], name)
             if kind is None:
                 wrong.append(f"{where}: servo {each} has no register {name}")
@@ -259,7 +260,8 @@ class FaultPlayer:
         return act
 
     def _actions(self, fault: plan.ScheduledFault) -> _Actions:
-        line, protection = self._line, self._servos.protection
+        line = self._line
+        protection = self._servos.protection
         rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
         match fault:
             case plan.PortFault():
@@ -291,7 +293,8 @@ class FaultPlayer:
                 assert_never(unknown)
 
     def _servo_actions(self, fault: plan.ServoFault, rows: Indices) -> _Actions:
-        line, servos = self._line, self._servos
+        line = self._line
+        servos = self._servos
         match fault.kind:
             case "mute":
                 return partial(line.mute, rows, True), partial(line.mute, rows, False)

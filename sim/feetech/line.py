@@ -67,7 +67,8 @@ class FeetechLine(Ax12Line):
         return self._rows(servo_id, "ID")
 
     def _rows(self, servo_id: int, name: str) -> list[int]:
-        servos, rate = self.servos, self.getBaudRate()
+        servos = self.servos
+        rate = self.getBaudRate()
         if name not in servos.facts.registers:
             return []
         rates = [servos.facts.bauds[int(code)] for code in servos["Baud Rate"]]
@@ -135,11 +136,14 @@ class FeetechLine(Ax12Line):
         return 0, b""
 
     def _sync_read(self, packet: Packet1) -> list[Reply]:
-        servos, params = self.servos, packet.params
+        servos = self.servos
+        params = packet.params
         if not servos.facts.sync_read or len(params) <= _READ_BYTES:
             return []
         servos.refresh()
-        address, length, replies = params[0], params[1], []
+        address = params[0]
+        length = params[1]
+        replies = []
         for servo_id in params[2:]:
             rows = [row for row in self._addressed(servo_id) if not self._muted[row]]
             if not rows:

@@ -209,8 +209,12 @@ class FeetechServos(SimulatedServos):
         return np.asarray(np.floor((np.rint(self._ticks()) - self._offset()) / turn))
 
     def _update_drive(self, seconds: float) -> None:
-        drive, facts, mode, on = self.drive, self.facts, self._mode(), self._on()
-        registers, shaft = self.registers, self._servo_rad()
+        drive = self.drive
+        facts = self.facts
+        mode = self._mode()
+        on = self._on()
+        registers = self.registers
+        shaft = self._servo_rad()
         self._step_goal[(mode != STEP) | ~on] = np.nan
         positions = on & ((mode == POSITION) | (mode == STEP) & self._has_steps())
         self._move(seconds, positions, on & (mode == VELOCITY), shaft)
@@ -236,7 +240,9 @@ class FeetechServos(SimulatedServos):
 
     def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:
         """Advance the trajectories to the goals, or at the goal velocities."""
-        facts, registers, path = self.facts, self.registers, self._trajectory
+        facts = self.facts
+        registers = self.registers
+        path = self._trajectory
         path.restart(~(positions | wheels) | ((positions | wheels) & ~self._was_on), shaft)
         goal = registers["Goal Position"].astype(np.float64)
         low, high = registers["Min Position Limit"], registers["Max Position Limit"]
@@ -265,7 +271,8 @@ class FeetechServos(SimulatedServos):
 
     def _push(self, mode: NDArray[np.int64]) -> tuple[Floats, Floats]:
         """(S,) open-loop output, and (S,) current limits, A."""
-        registers, facts = self.registers, self.facts
+        registers = self.registers
+        facts = self.facts
         none = np.full(len(self), np.inf)
         if "Goal Current" in facts.registers:
             raw = registers["Goal Current"].astype(np.float64)

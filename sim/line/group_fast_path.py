@@ -38,7 +38,8 @@ class GroupRead(ABC):
         status: int,
         delays_s: tuple[float, ...],
     ) -> None:
-        self.address, self.length = address, length
+        self.address = address
+        self.length = length
         self.motion = address in MOTION and address + length <= MOTION.stop
         self.delay_s = delays_s[0]
         """Until the first servo replies."""
@@ -171,7 +172,8 @@ class GroupFastPath:
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
         self._forget_what_changed()
-        head, ids = raw[:12], raw[12:-2:5]
+        head = raw[:12]
+        ids = raw[12:-2:5]
         known = self._goals
         if known is None or known[0] != head or known[1] != ids:
             if len(raw) < _SHORTEST or raw[:5] != _PREFIX:
@@ -194,7 +196,8 @@ class GroupFastPath:
             return None
         if not is_intact(np.frombuffer(raw, np.uint8)):
             return None
-        address, length = int.from_bytes(raw[8:10], "little"), int.from_bytes(raw[10:12], "little")
+        address = int.from_bytes(raw[8:10], "little")
+        length = int.from_bytes(raw[10:12], "little")
         ids = np.frombuffer(raw, np.uint8, len(raw) - 14, 12)
         rows = self._handler.directory.rows[ids]
         if (rows < 0).any() or not self._bank.readable(rows, address, length):

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from snakewalk.sim.servo.bank import ServoBank
 
-NOBODY, SPECIAL = -1, -2
+NOBODY = -1
+SPECIAL = -2
 """Entries of ``IdDirectory.rows`` that are not rows."""
 _SECONDARY_OFF = 253
 """Secondary(Shadow) ID(12) from here on means none (e-manual)."""
@@ -36,11 +37,13 @@ class IdDirectory:
         if now == self._looked_up:
             return
         self._looked_up = now
-        first, second = defaultdict(list), defaultdict(list)
+        first = defaultdict(list)
+        second = defaultdict(list)
         for row in bank.tuned_to(baud):
             if not powered[row]:
                 continue
-            own, shared = int(bank["ID"][row]), int(bank["Secondary(Shadow) ID"][row])
+            own = int(bank["ID"][row])
+            shared = int(bank["Secondary(Shadow) ID"][row])
             first[own].append(int(row))
             if shared < _SECONDARY_OFF and shared != own:
                 second[shared].append(int(row))

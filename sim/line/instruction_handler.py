@@ -24,8 +24,12 @@ from snakewalk.sim.line.instructions import Instructions, word
 from snakewalk.sim.servo.firmware import Firmware
 
 _GROUP_INSTRUCTIONS = (
-    *(Instruction.SYNC_READ, Instruction.FAST_SYNC_READ, Instruction.SYNC_WRITE),
-    *(Instruction.BULK_READ, Instruction.FAST_BULK_READ, Instruction.BULK_WRITE),
+    Instruction.SYNC_READ,
+    Instruction.FAST_SYNC_READ,
+    Instruction.SYNC_WRITE,
+    Instruction.BULK_READ,
+    Instruction.FAST_BULK_READ,
+    Instruction.BULK_WRITE,
 )
 """Instructions with ID 254 (e-manual, Sync Read, Bulk Read and their like)."""
 MAX_LENGTH = 0xFFFF
@@ -70,7 +74,9 @@ class InstructionHandler:
         if not self.directory.present() and self._imu is None:
             return []
         self.firmware.on_instruction(now_s)
-        code, params, servo_id = packet.instruction, packet.params, packet.servo_id
+        code = packet.instruction
+        params = packet.params
+        servo_id = packet.servo_id
         if code == Instruction.PING:
             return self._ping(servo_id)
         if code in _GROUP_INSTRUCTIONS and servo_id == BROADCAST_ID:
@@ -84,7 +90,8 @@ class InstructionHandler:
             return self._read(servo_id, params)
         replies = []
         for row in self.directory.primary(servo_id):
-            level, delay_s = int(self.bank["Status Return Level"][row]), self.delay_s(row)
+            level = int(self.bank["Status Return Level"][row])
+            delay_s = self.delay_s(row)
             error = self._one(row, code, params)
             if level == 2 and not self.directory.mute[row]:
                 replies.append(Reply(delay_s, self._status(row, servo_id, error, b"")))
@@ -131,7 +138,8 @@ class InstructionHandler:
                 data = imu.model_number.to_bytes(2, "little") + b"\x01"
                 replies.append(Reply(0.0, encode_status(StatusPacket(each, 0, data))))
             for row in self.directory.replying(each):
-                model, firmware = self.bank["Model Number"][row], self.bank["Firmware Version"][row]
+                model = self.bank["Model Number"][row]
+                firmware = self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
                 replies.append(Reply(self.delay_s(row), self._status(row, each, 0, data)))
             sent += self._respond(replies)
@@ -161,9 +169,11 @@ class InstructionHandler:
         return blocks
 
     def _read(self, servo_id: int, params: bytes) -> list[Reply]:
-        address, length = 0, 0
+        address = 0
+        length = 0
         if len(params) == 4:
-            address, length = word(params, 0), word(params, 2)
+            address = word(params, 0)
+            length = word(params, 2)
             self.firmware.refresh(address, length)
         blocks = self._blocks(servo_id, address, length)
         if len(params) != 4:
@@ -193,7 +203,8 @@ class InstructionHandler:
             self.firmware.refresh()
         sent: list[Reply] = []
         parts: list[tuple[int, int, bytes]] = []
-        first_s, garbled = 0.0, False
+        first_s = 0.0
+        garbled = False
         for servo_id, address, length in asked:
             blocks = self._blocks(servo_id, address, length)
             if not blocks:
@@ -213,7 +224,8 @@ class InstructionHandler:
         return sent
 
     def _sync_write(self, params: bytes) -> list[Reply]:
-        address, length = word(params, 0), word(params, 2)
+        address = word(params, 0)
+        length = word(params, 2)
         for at in range(4, len(params) - length, length + 1):
             self._write(params[at], address, params[at + 1 : at + 1 + length], by_sync=True)
         self._written()

@@ -51,7 +51,10 @@ class LineFastPath:
         *,
         latency_s: float,
     ) -> None:
-        self._wire, self._goals, self._request, self._line = wire, goals, request, line
+        self._wire = wire
+        self._goals = goals
+        self._request = request
+        self._line = line
         self._latency_s = latency_s
         self._shape = len(request.ids), request.length
         self._error = np.zeros(len(request.ids), np.uint8)
@@ -72,7 +75,8 @@ class LineFastPath:
 
     def begin(self, goals: NDArray[np.int32] | None) -> bool:
         """Send the request; False without sending after ``goals`` or on a busy line."""
-        request, wire = self._request, self._wire
+        request = self._request
+        wire = self._wire
         if goals is not None or not wire.begin(request.packet):
             return False
         byte_s = BITS_PER_BYTE / wire.getBaudRate()

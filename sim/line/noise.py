@@ -69,7 +69,8 @@ class Noise:
             case "drop":
                 return []
             case "corrupt":
-                at, bit = self._random.randrange(len(data)), self._random.randrange(8)
+                at = self._random.randrange(len(data))
+                bit = self._random.randrange(8)
                 return [(slow_s, data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :])]
             case "truncate":
                 return [(slow_s, data[: self._random.randrange(1, max(2, len(data)))])]

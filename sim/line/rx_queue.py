@@ -42,7 +42,8 @@ class RxQueue:
 
     def take(self, count: int, now_s: float) -> bytes:
         """Up to ``count`` arrived bytes."""
-        packets, taken = self.packets, bytearray()
+        packets = self.packets
+        taken = bytearray()
         if packets and len(packets[0][1]) == count == self._arrived(packets[0], now_s):
             return packets.popleft()[1]  # the usual case: one packet, complete
         while packets and len(taken) < count:

@@ -154,7 +154,8 @@ class SimLine(Wire):
             bytes.
 
         """
-        sent, read = self._sent, self._group.read_of(request.packet)
+        sent = self._sent
+        read = self._group.read_of(request.packet)
         if len(sent) != 1 or sent[0][1] is not request.packet or read is None or not self.is_plain:
             return IRREGULAR
         end_s = sent[0][0]
@@ -216,7 +217,8 @@ class SimLine(Wire):
     def _split(self, data: bytes) -> Sequence[bytes]:
         if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:
             return (data,)
-        frames, at = [], 0
+        frames = []
+        at = 0
         while data.startswith(HEADER, at) and at + 7 <= len(data):
             end = at + 7 + int.from_bytes(data[at + 5 : at + 7], "little")
             if end >= len(data):

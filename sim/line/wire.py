@@ -207,7 +207,9 @@ class Wire(ABC):
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Up to ``count`` bytes; the clock moves to the last of them, or to ``deadline_s``."""
-        clock, rx_queue, sent = self.clock, self._rx_queue, self._sent
+        clock = self.clock
+        rx_queue = self._rx_queue
+        sent = self._sent
         if self._script is not None or not self.is_open:
             self._resume_host()
         limit_s = max(deadline_s, clock.now_s())
@@ -226,7 +228,8 @@ class Wire(ABC):
 
     def drain_until_quiet(self, quiet_s: float) -> int:
         """Discard bytes until none has come for ``quiet_s``, for a limited time; count them."""
-        discarded, seen_s = 0, self.clock.now_s()
+        discarded = 0
+        seen_s = self.clock.now_s()
         limit_s = seen_s + quiet_s + DRAIN_LIMIT_S
         while True:
             byte = self.read_until(1, min(seen_s + quiet_s, limit_s))
@@ -239,7 +242,8 @@ class Wire(ABC):
 
     def disconnect(self) -> None:
         """Disconnect the port: reading and writing fail until it is back and reopened."""
-        self._disconnected, self.is_open = True, False
+        self._disconnected = True
+        self.is_open = False
         self._rx_queue.clear()
 
     def reconnect(self) -> None:

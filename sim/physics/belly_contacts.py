@@ -45,7 +45,8 @@ class BellyContacts:
     @classmethod
     def of(cls, mechanics: Mechanics, layout: StepLayout) -> "BellyContacts | None":
         """Read the constants from MuJoCo; None for models with other contacts."""
-        model, planes = mechanics.model, mechanics.planes
+        model = mechanics.model
+        planes = mechanics.planes
         bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
         known = bellies | (mechanics.contact_role == GROUND)
         others = ~known & ((model.geom_contype | model.geom_conaffinity) != 0)
@@ -53,7 +54,8 @@ class BellyContacts:
         if not bellies.any() or others.any() or any(more) or model.body_rootid[1:].max() > 1:
             return None
         data = _sunk(model, planes, bellies)
-        count, capsule = data.ncon, model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
+        count = data.ncon
+        capsule = model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
         each = PLANES if len(planes.planes) else 1
         whole = (bellies.sum() + (bellies & capsule).sum()) * each
         if count != whole or (data.contact.dim != 1).any():
@@ -126,7 +128,8 @@ def links_near(centre_m: Floats, reach_m2: Floats, work: Floats) -> bool:
         work: (3, bodies) overwritten.
 
     """
-    count, near = len(centre_m), 0
+    count = len(centre_m)
+    near = 0
     x, y, z = work[0], work[1], work[2]
     for a in range(count):
         x[a], y[a], z[a] = centre_m[a, 0], centre_m[a, 1], centre_m[a, 2]
@@ -171,12 +174,17 @@ def write_contacts(
         held: (C,) contacts whose constants are already at each place of the list; -1 for none.
 
     """
-    size, found = words.shape[1], 0
-    room, constants = reals.ctypes.data, words.ctypes.data
+    size = words.shape[1]
+    found = 0
+    room = reals.ctypes.data
+    constants = words.ctypes.data
     at_dist, at_place, at_normal, first, last = at
     for c in range(len(words)):
-        plane, belly = geoms[c, 0], geoms[c, 1]
-        along, radius, margin = shapes_m[c, 0], shapes_m[c, 1], shapes_m[c, 2]
+        plane = geoms[c, 0]
+        belly = geoms[c, 1]
+        along = shapes_m[c, 0]
+        radius = shapes_m[c, 1]
+        margin = shapes_m[c, 2]
         n0, n1, n2 = axes[plane, 2], axes[plane, 5], axes[plane, 8]
         if turn:
             if plane_m[plane, 2] <= AWAY_M:
@@ -196,7 +204,8 @@ def write_contacts(
         base = size * found
         if held[found] != c:
             held[found] = c
-            to, source = room + base * _WORD, constants + c * size * _WORD
+            to = room + base * _WORD
+            source = constants + c * size * _WORD
             copy_words(to, source, first)
             copy_words(to + last * _WORD, source + last * _WORD, size - last)
         back = -dist / 2.0 - radius

@@ -86,7 +86,8 @@ def belly_points_m(robot: RobotConfig, link: int) -> Floats:
     P exceeds 2 only if the notches would be deeper than 0.3 of the radius. C is 0 for a link
     without a belly.
     """
-    shape, radius_m = robot.link_shapes[link], robot.link_radii_m[link]
+    shape = robot.link_shapes[link]
+    radius_m = robot.link_radii_m[link]
     if shape in ("ball", "none"):
         return np.zeros((int(shape == "ball"), 1, 3))
     straight_m = straight_part_m(robot.link_lengths_m[link], radius_m)
@@ -104,8 +105,11 @@ def overlapping_links(robot: RobotConfig) -> list[tuple[int, int]]:
 
     Links separated only by links of length zero count as neighbours, at two axes.
     """
-    ends, mean_m = robot.link_ends, robot.mean_link_length_m
-    lengths_m, radii_m, shapes = robot.link_lengths_m, robot.link_radii_m, robot.link_shapes
+    ends = robot.link_ends
+    mean_m = robot.mean_link_length_m
+    lengths_m = robot.link_lengths_m
+    radii_m = robot.link_radii_m
+    shapes = robot.link_shapes
     reach_m = [
         radius + (0.0 if shape in ("ball", "none") else 0.5 * straight_part_m(length, radius))
         for length, radius, shape in zip(lengths_m, radii_m, shapes, strict=True)
@@ -267,7 +271,8 @@ def _links_behind(robot: RobotConfig, *, balls: bool) -> str:
 
 def _limbs(robot: RobotConfig, link: int) -> str:
     """Legs at a link of the spine, after the rest of the spine in MuJoCo's order, depth first."""
-    text, start = "", robot.link_count
+    text = ""
+    start = robot.link_count
     for pair in robot.limbs:
         count = len(pair.joint_axes)
         if pair.link == link:
@@ -281,14 +286,17 @@ def _limbs(robot: RobotConfig, link: int) -> str:
 
 def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str:
     """One leg, ``side`` 1 to the left; segments are thin rods, the foot a ball at the end."""
-    text, limits = "", robot.limit_rad
+    text = ""
+    limits = robot.limit_rad
     for k in reversed(range(len(pair.joint_axes))):
         name = robot.joint_names[first + k - 1]
         axis = f"0 0 {-side!r}" if pair.joint_axes[k] == "y" else f"{side!r} 0 0"
         stop = limits[first + k - 1] + STOP_MARGIN_RAD
         along = -0.5 * robot.link_lengths_m[pair.link] if pair.link > 0 else 0.0
         at = (along, side * pair.hip_m) if k == 0 else (0.0, side * pair.segments_m[k - 1])
-        length, mass, r = pair.segments_m[k], pair.segment_mass_kg, pair.foot_radius_m
+        length = pair.segments_m[k]
+        mass = pair.segment_mass_kg
+        r = pair.foot_radius_m
         across = mass * (3.0 * r**2 + length**2) / 12.0
         foot = (
             f'<geom name="foot{first + k}" type="sphere" size="{r!r}" pos="0 {side * length!r} 0" '

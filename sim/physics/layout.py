@@ -94,7 +94,8 @@ def step_layout() -> StepLayout | str:
 
 def _described() -> tuple[StepLayout, dict[str, int]]:
     """Return the layout that MuJoCo describes, and ``mjData`` offsets of two arrays."""
-    data, contact = _structure("mjData"), _structure("mjContact")
+    data = _structure("mjData")
+    contact = _structure("mjContact")
     hessian = contact.H.offset // _WORD
     fields = {
         "size": ctypes.sizeof(contact),
@@ -163,7 +164,9 @@ def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
         value: float = kind.from_address(data._address + offset).value
         return value
 
-    contacts, fields, offset = data.contact, layout.contact, layout.data
+    contacts = data.contact
+    fields = layout.contact
+    offset = layout.data
     first = contacts.dist.ctypes.data
     return bool(
         data.ncon > 0
@@ -187,7 +190,8 @@ def _steps_by_parts(layout: StepLayout) -> bool:
     """Whether steps by parts, with a contact written in place, equal ``mj_step`` to the bit."""
     model, whole = _ball()
     _, parts = _ball()
-    part, add = ctypes.CFUNCTYPE(None, *_POINTERS[:2]), ctypes.CFUNCTYPE(ctypes.c_int, *_POINTERS)
+    part = ctypes.CFUNCTYPE(None, *_POINTERS[:2])
+    add = ctypes.CFUNCTYPE(ctypes.c_int, *_POINTERS)
     calls = {name: part(address) for name, address in layout.functions.items()}
     add_contact = add(layout.functions["mj_addContact"])
     for _ in range(3):
@@ -196,7 +200,8 @@ def _steps_by_parts(layout: StepLayout) -> bool:
             if name == "mj_comPos":
                 calls["mj_kinematics"](model._address, parts._address)
             calls[name](model._address, parts._address)
-        words, fields = layout.contact_words(parts), layout.fields(model, parts)
+        words = layout.contact_words(parts)
+        fields = layout.fields(model, parts)
         count = len(words)
         if count != 1:
             return False

@@ -19,7 +19,8 @@ LEAST_DEPTH_M = 1e-9
 """Contacts of one link share its load by depth; this is the depth of one that just touches."""
 
 
-GROUND, FOOT = 1, 2
+GROUND = 1
+FOOT = 2
 """Roles in contacts: the floor or a plane on it; a foot, whose friction is MuJoCo's own cone, since
 it knows no direction. Everything else is 0: bellies, obstacles."""
 
@@ -72,7 +73,8 @@ class Mechanics:
         ground: HeightField | None,
     ) -> "Mechanics":
         """Collect the data of the steps."""
-        load, before = np.zeros(robot.joint_count + 1), np.zeros((robot.joint_count + 1, 3))
+        load = np.zeros(robot.joint_count + 1)
+        before = np.zeros((robot.joint_count + 1, 3))
         data = mujoco.MjData(model)
         legs_kg = (robot.limbs[joint.pair].segment_mass_kg for joint in robot.limb_joints)
         mass = np.array([*robot.link_masses_kg, *legs_kg])
@@ -127,8 +129,10 @@ def foot_geoms(model: mujoco.MjModel, robot: RobotConfig) -> list[int]:
 
 def velocities(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Floats, Floats]:
     """Velocities of the links' centres and their spins, world frame, (L, 3) each."""
-    centre, anchor = data.xipos[1:], data.xanchor
-    velocity, spin = np.empty_like(centre), np.empty_like(centre)
+    centre = data.xipos[1:]
+    anchor = data.xanchor
+    velocity = np.empty_like(centre)
+    spin = np.empty_like(centre)
     velocity[0], spin[0] = data.qvel[:3], data.xmat[1].reshape(3, 3) @ data.qvel[3:6]
     for i in range(1, len(centre)):
         on = int(model.body_parentid[i + 1]) - 1

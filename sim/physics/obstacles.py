@@ -84,7 +84,8 @@ def place_at_obstacle(
         ValueError: ``joint_rad`` is not (J,).
 
     """
-    thing, q = world.obstacle, np.asarray(joint_rad, dtype=float)
+    thing = world.obstacle
+    q = np.asarray(joint_rad, dtype=float)
     if not isinstance(thing, PoleObstacle | PipeObstacle):
         return False
     if q.shape != (m.joint_count,):
@@ -142,7 +143,8 @@ def _touching(
 
 def _rotation(line: Floats, up: Floats, about_rad: float) -> Floats:
     """(3, 3) rotation of unit ``line`` to ``up``, then about it."""
-    cross, dot = np.cross(line, up), float(line @ up)
+    cross = np.cross(line, up)
+    dot = float(line @ up)
     if dot < -1.0 + 1e-9:
         side = np.linalg.svd(up[None])[2][1]
         first = 2.0 * np.outer(side, side) - np.eye(3)

@@ -64,7 +64,8 @@ def place(
         ValueError: ``joint_rad`` is not (J,).
 
     """
-    model, data = m.model, m.data
+    model = m.model
+    data = m.data
     _pose(m, start_m, heading_rad, joint_rad)
     balls = _Balls.of(robot)
     if ground is not None:
@@ -92,7 +93,8 @@ def lay_down(
         ValueError: ``joint_rad`` is not (J,).
 
     """
-    model, data = m.model, m.data
+    model = m.model
+    data = m.data
     time_s = data.time
     _pose(m, start_m, heading_rad, joint_rad)
     data.qpos[2] -= float(_clearance_m(m, robot, None, _Balls.of(robot)).min())
@@ -148,7 +150,8 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls)
 
     Clearances are those of the bellies, which bridge a trench and rest on an edge.
     """
-    model, data = m.model, m.data
+    model = m.model
+    data = m.data
     free = np.array([2, 3, 4, *(6 + j for j in robot.pitch_joints)])
     limit = np.array([robot.limit_rad[j] for j in robot.pitch_joints])
     pitch = 7 + np.array(robot.pitch_joints, dtype=int)
@@ -160,7 +163,8 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls)
         return clear[np.isfinite(clear)]
 
     for _ in range(DRAPE_ROUNDS):
-        here, qpos = above_m(), data.qpos.copy()
+        here = above_m()
+        qpos = data.qpos.copy()
         slopes = np.empty((len(here), len(free)))
         for column, dof in enumerate(free):
             step = np.zeros(model.nv)
@@ -176,8 +180,10 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls)
 
 
 def _settle(m: Mechanics) -> None:
-    model, data = m.model, m.data
-    held, start = data.qpos[7:].copy(), data.qpos[:2].copy()
+    model = m.model
+    data = m.data
+    held = data.qpos[7:].copy()
+    start = data.qpos[:2].copy()
     for _ in range(int(SETTLE_MAX_S / m.step_s)):
         m.planes.lay(data)
         mujoco.mj_step(model, data)
@@ -186,7 +192,8 @@ def _settle(m: Mechanics) -> None:
         data.qvel[5:] = 0.0
         data.qpos[7:] = held
         data.qpos[:2] = start
-        fall, turn = np.abs(data.qvel[2]), np.abs(data.qvel[3:]).max()
+        fall = np.abs(data.qvel[2])
+        turn = np.abs(data.qvel[3:]).max()
         if data.time > SETTLE_MIN_S and fall < STILL_M_S and turn < STILL_RAD_S:
             break
 
@@ -199,7 +206,8 @@ def _clearance_m(
     Infinite for links without support: leg segments without a foot, links of length zero.
     """
     mujoco.mj_kinematics(m.model, m.data)
-    spine, link = robot.link_count, balls.link
+    spine = robot.link_count
+    link = balls.link
     axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
     # products by hand: BLAS sums in a processor-dependent order
     centres = m.data.xipos[1 : 1 + spine][link]

@@ -40,17 +40,29 @@ class PublicSteps:
 
     def __init__(self, mechanics: Mechanics) -> None:
         self._mechanics = mechanics
-        model, data, links = mechanics.model, mechanics.data, mechanics.joint_count + 1
+        model = mechanics.model
+        data = mechanics.data
+        links = mechanics.joint_count + 1
         self._state = State(data.qpos, data.qvel, data.qfrc_applied)
         self._chain = Chain(data.xipos, data.xmat, data.xanchor, data.xaxis, model.body_parentid)
         self._links = Links(
-            *(np.zeros((links, 3)), np.zeros((links, 3)), np.zeros((links, 6)), np.zeros(links)),
-            *(mechanics.before_m, mechanics.load_n, mechanics.link_mass_kg, mechanics.water),
+            np.zeros((links, 3)),
+            np.zeros((links, 3)),
+            np.zeros((links, 6)),
+            np.zeros(links),
+            mechanics.before_m,
+            mechanics.load_n,
+            mechanics.link_mass_kg,
+            mechanics.water,
         )
         self._geoms = Geoms(model.geom_bodyid, mechanics.contact_role)
         self._gears = Gears(
-            *(mechanics.gears, model.dof_frictionloss, data.qfrc_bias, data.qfrc_constraint),
-            *(mechanics.rotor, model.dof_armature),
+            mechanics.gears,
+            model.dof_frictionloss,
+            data.qfrc_bias,
+            data.qfrc_constraint,
+            mechanics.rotor,
+            model.dof_armature,
         )
         self._rubs = has_friction(mechanics.gears)
         self._work = np.zeros((2, links - 1))
@@ -58,8 +70,10 @@ class PublicSteps:
 
     def run(self, steps: int, drive: ServoDrive) -> float:
         """Advance ``steps`` steps; return MuJoCo's time."""
-        mechanics, data = self._mechanics, self._mechanics.data
-        body, shafts = self._body(), Shafts(Motors(*drive.columns()), self._gears, self._work)
+        mechanics = self._mechanics
+        data = self._mechanics.data
+        body = self._body()
+        shafts = Shafts(Motors(*drive.columns()), self._gears, self._work)
         for _ in range(steps):
             mechanics.planes.lay(data)
             mujoco.mj_step1(mechanics.model, data)

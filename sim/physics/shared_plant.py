@@ -41,7 +41,8 @@ class PlantShare:
     """The shafts of one group; implements ``sim.plant.Plant``."""
 
     def __init__(self, shared: SharedPlant, rows: Indices) -> None:
-        self._shared, self._rows = shared, rows
+        self._shared = shared
+        self._rows = rows
         self._drive: ServoDrive | None = None
         self.reached_s = shared.plant.time_s
         """Time to which the group has advanced."""
@@ -63,7 +64,8 @@ class PlantShare:
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
         """Set the inputs of these shafts; the body steps when the other groups are as far."""
-        self._drive, self.reached_s = drive, until_s
+        self._drive = drive
+        self.reached_s = until_s
         for whole, own in zip(
             self._shared.drive.columns()[:_INPUTS], drive.columns(), strict=False
         ):

@@ -20,7 +20,8 @@ STAVE_COUNT = 24
 STAVE_M = 0.02
 CLEAR_M = 0.2
 """Between the floor and what lies level, on the outside."""
-WOOD, GLASS = (0.55, 0.42, 0.30, 1.0), (0.55, 0.68, 0.78, 0.22)
+WOOD = (0.55, 0.42, 0.30, 1.0)
+GLASS = (0.55, 0.68, 0.78, 0.22)
 """Red, green, blue, opacity (ours)."""
 
 Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle

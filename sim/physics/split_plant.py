@@ -66,7 +66,8 @@ class SplitPlant:
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
         """Step the body under ``drive`` (S,), with its other shafts following."""
-        whole, rows = self._drive, self._simulated
+        whole = self._drive
+        rows = self._simulated
         for mine, given in zip(whole.columns()[:_INPUTS], drive.columns(), strict=False):
             mine[rows] = given
         ahead_s = np.clip(until_s - self._measured_at_s, 0.0, AHEAD_S)

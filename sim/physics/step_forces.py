@@ -73,7 +73,8 @@ def _move(body: Body) -> None:
 
 def _collect(body: Body) -> None:
     """Add the links' wrenches to the generalised forces, ends of the chain first."""
-    wrench, qfrc = body.links.wrench, body.state.force
+    wrench = body.links.wrench
+    qfrc = body.state.force
     centre, rotation, anchor, axis, parents = body.chain
     for i in range(len(wrench) - 1, 0, -1):
         f, t, a, e = wrench[i, :3], wrench[i, 3:], anchor[i], axis[i]
@@ -137,7 +138,8 @@ def _line_up(body: Body, contacts: Contacts, still_n_s: float, lanes: Lanes) -> 
 
 
 def _add_friction(body: Body, contacts: Contacts, lanes: Lanes) -> None:
-    law, totals = body.law, body.totals
+    law = body.law
+    totals = body.totals
     v, w, wrench, _, _, _, _, water = body.links
     (table, of_link), step_s = lanes, law.step_s
     centre, rotation, _, _, _ = body.chain
@@ -148,7 +150,8 @@ def _add_friction(body: Body, contacts: Contacts, lanes: Lanes) -> None:
     rub(table, count, law.mu)
     wrench[:] = 0.0
     for k in range(count):
-        i, row = of_link[k], k // LANES * ROWS + k % LANES
+        i = of_link[k]
+        row = k // LANES * ROWS + k % LANES
         f0, f1, f2 = table[row + FORCE], table[row + FORCE + LANES], table[row + FORCE + 2 * LANES]
         p0, p1, p2 = table[row + PLACE], table[row + PLACE + LANES], table[row + PLACE + 2 * LANES]
         totals[0] -= table[row + LOSS] * step_s
@@ -169,7 +172,9 @@ def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -
     qpos, qvel, qfrc = body.state
     on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = shafts.motors[:9]
     current, torque, pwm = shafts.motors[9:12]
-    gear, speed, ground_n_m = shafts.gears.terms, shafts.work[0], shafts.work[1]
+    gear = shafts.gears.terms
+    speed = shafts.work[0]
+    ground_n_m = shafts.work[1]
     rotor = shafts.gears.rotor
     qfrc[:] = 0.0
     for j in range(len(speed)):
@@ -203,7 +208,8 @@ def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) ->
     The rotor in the gap is stepped here. Its momentum reaches the joint in the step after the gap
     has closed, when MuJoCo already counts its inertia.
     """
-    gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
+    gear = shafts.gears.terms[:, j]
+    rotor = shafts.gears.rotor[:, j]
     inertia = (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
     if rotor[SIDE] != 0.0:
         kick_n_m = float(inertia * rotor[KICK] / step_s)
@@ -221,8 +227,10 @@ def _settle_teeth(shafts: Shafts, j: int, rate: float, step_s: float, friction_n
 
     ``friction_n_m`` is the gears' friction torque on the joint in the step.
     """
-    gear, rotor = shafts.gears.terms[:, j], shafts.gears.rotor[:, j]
-    half, inertia = 0.5 * gear[BACKLASH], (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
+    gear = shafts.gears.terms[:, j]
+    rotor = shafts.gears.rotor[:, j]
+    half = 0.5 * gear[BACKLASH]
+    inertia = (1.0 - WHEEL_SHARE) * gear[0] + LEAST_ROTOR_KG_M2
     before = shafts.work[0, j]
     if rotor[SIDE] != 0.0:
         tooth_n_m = shafts.motors.torque[j] - gear[2] * before + friction_n_m
@@ -261,10 +269,14 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
         rubs: ``has_friction`` of the gears.
 
     """
-    totals, step_s = body.totals, body.law.step_s
-    ohm, k_e = shafts.motors.ohm, shafts.motors.k_e
+    totals = body.totals
+    step_s = body.law.step_s
+    ohm = shafts.motors.ohm
+    k_e = shafts.motors.k_e
     current, torque, _, drawn_j, returned_j, heat_j, work_j = shafts.motors[9:]
-    qvel, speed, ground_n_m = body.state.qvel, shafts.work[0], shafts.work[1]
+    qvel = body.state.qvel
+    speed = shafts.work[0]
+    ground_n_m = shafts.work[1]
     gear, friction, bias, constraint, rotor, _ = shafts.gears
     for j in range(len(speed)):
         has_play = gear[BACKLASH, j] > 0.0

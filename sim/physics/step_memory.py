@@ -28,9 +28,20 @@ from snakewalk.sim.physics.step_state import (
 from snakewalk.sim.physics.tangent_planes import PLANES
 
 FUNCTIONS = (
-    *("mj_kinematics", "mj_step1", "mj_step2", "mju_quat2Mat"),
-    *("mj_checkPos", "mj_checkVel", "mj_comPos", "mj_makeM", "mj_factorM", "mj_collision"),
-    *("mj_makeConstraint", "mj_projectConstraint", "mj_fwdVelocity", "mj_addContact"),
+    "mj_kinematics",
+    "mj_step1",
+    "mj_step2",
+    "mju_quat2Mat",
+    "mj_checkPos",
+    "mj_checkVel",
+    "mj_comPos",
+    "mj_makeM",
+    "mj_factorM",
+    "mj_collision",
+    "mj_makeConstraint",
+    "mj_projectConstraint",
+    "mj_fwdVelocity",
+    "mj_addContact",
 )
 """C functions that the steps call. A chain is one island, so the search for islands is left out.
 Then the functions after ``WHOLE`` are the parts of ``mj_step1`` for a chain without actuators,
@@ -42,16 +53,27 @@ POINTERS = ("model", "data", "time", "ncon", "contact", "efc_force", "parena")
 CONTACT = ("size", "dist", "place", "normal", "geom", "row", "hessian_begin", "hessian_end")
 """Size of an ``mjContact`` and offsets of its fields, in bytes; the last two in words of eight."""
 SIZES = (
-    *("joints", "bodies", "geoms", "spine", "balls", "rows", "columns"),
-    *("contacts", "words"),
+    "joints",
+    "bodies",
+    "geoms",
+    "spine",
+    "balls",
+    "rows",
+    "columns",
+    "contacts",
+    "words",
 )
 STATE = ("qpos", "qvel", "qfrc_applied", "xipos", "xmat", "xanchor", "xaxis")
 LINKS = ("velocity", "spin", "wrench", "depth", "before", "load", "mass_kg", "water")
 MODEL = ("body_parentid", "geom_bodyid", "contact_role", "geom_pos", "geom_quat")
 GROUND = ("geom_xpos", "geom_xmat", "ball_geoms", "ball_m", "z_m", "planes")
 GEARS = (
-    *("gears", "dof_frictionloss", "qfrc_bias", "qfrc_constraint"),
-    *("rotor", "dof_armature"),
+    "gears",
+    "dof_frictionloss",
+    "qfrc_bias",
+    "qfrc_constraint",
+    "rotor",
+    "dof_armature",
 )
 BELLIES = (
     "belly_words",
@@ -62,7 +84,17 @@ BELLIES = (
     "held",
     "plane_axes",
 )
-ARRAYS = (*(*STATE, *LINKS, *MODEL, *GROUND, *GEARS, *BELLIES, *Motors._fields, "totals", "work"),)
+ARRAYS = (
+    *STATE,
+    *LINKS,
+    *MODEL,
+    *GROUND,
+    *GEARS,
+    *BELLIES,
+    *Motors._fields,
+    "totals",
+    "work",
+)
 GRIP = ("along", "across", "back", "law")
 """``FrictionConfig.grip``."""
 CONSTANTS = (*GRIP, "radius_m", "step_s", "x0_m", "y0_m", "spacing_m")
@@ -101,7 +133,8 @@ def integers_at(address: int, shape: Any) -> NDArray[np.int32]:
 
 
 def _chain(m: Any) -> Chain:
-    bodies, links = m.count_bodies, m.count_joints + 1
+    bodies = m.count_bodies
+    links = m.count_joints + 1
     return Chain(
         reals_at(m.xipos_at, (bodies, 3)),
         reals_at(m.xmat_at, (bodies, 9)),
@@ -149,7 +182,8 @@ def _motors(m: Any) -> Motors:
 
 def body_at(m: Any) -> Body:
     """Return the arrays of a body (compiled code only)."""
-    freedoms, geoms = m.count_joints + 6, m.count_geoms
+    freedoms = m.count_joints + 6
+    geoms = m.count_geoms
     return Body(
         State(
             reals_at(m.qpos_at, (freedoms + 1,)),
@@ -166,7 +200,8 @@ def body_at(m: Any) -> Body:
 
 def shafts_at(m: Any) -> Shafts:
     """Return the arrays of motors and gears (compiled code only)."""
-    joints, freedoms = m.count_joints, m.count_joints + 6
+    joints = m.count_joints
+    freedoms = m.count_joints + 6
     gears = Gears(
         reals_at(m.gears_at, (13, joints)),
         reals_at(m.dof_frictionloss_at, (freedoms,)),
@@ -180,7 +215,8 @@ def shafts_at(m: Any) -> Shafts:
 
 def ground_at(m: Any) -> tuple[Any, ...]:
     """Return the arguments of ``tangent_planes.lay_planes`` (compiled code only)."""
-    geoms, balls = m.count_geoms, m.count_balls
+    geoms = m.count_geoms
+    balls = m.count_balls
     return (
         reals_at(m.geom_xpos_at, (geoms, 3)),
         integers_at(m.ball_geoms_at, (balls,)),

@@ -74,7 +74,8 @@ def make_steps(mechanics: Mechanics) -> Steps:
 
 def _bellies_at(m: Any) -> tuple[Any, ...]:
     """Return arrays for ``write_contacts`` and ``links_near``."""
-    contacts, bodies = m.count_contacts, m.count_bodies
+    contacts = m.count_contacts
+    bodies = m.count_bodies
     return (
         carray(pointer(m.belly_words_at), (contacts, m.count_words), np.int64),
         integers_at(m.belly_geoms_at, (contacts, 2)),
@@ -113,8 +114,11 @@ def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tupl
 
 def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, ...]) -> None:
     """Lay the planes and call ``mj_step1``; by parts if all contacts are of bellies."""
-    model, data, held = m.model_at, m.data_at, bellies[6]
-    by_parts, tangent = len(held) > 0, len(ground[1]) > 0
+    model = m.model_at
+    data = m.data_at
+    held = bellies[6]
+    by_parts = len(held) > 0
+    tangent = len(ground[1]) > 0
     if by_parts:
         call(m.mj_checkPos_at, model, data)
         call(m.mj_checkVel_at, model, data)
@@ -141,16 +145,21 @@ def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, .
 def _run(steps: int, memory: NDArray[np.void]) -> float:
     """Advance ``steps`` steps with ``memory`` (1,) of ``STEP_MEMORY``; return MuJoCo's time."""
     m = memory[0]
-    body, shafts, ground, bellies = body_at(m), shafts_at(m), ground_at(m), _bellies_at(m)
+    body = body_at(m)
+    shafts = shafts_at(m)
+    ground = ground_at(m)
+    bellies = _bellies_at(m)
     bellies[6][:] = -1  # other data may have used the memory since the last run
     rubs = has_friction(shafts.gears.terms)
-    lanes, at = make_lanes(2 * m.count_joints), contact_fields_at(m)
+    lanes = make_lanes(2 * m.count_joints)
+    at = contact_fields_at(m)
     ncon = integers_at(m.ncon_at, (1,))
     contact_list = carray(pointer(m.contact_at), (1,), np.int64)
     force_list = carray(pointer(m.efc_force_at), (1,), np.int64)
     for _ in range(steps):
         _step1(m, body.chain.centre, ground, bellies)
-        count, first = ncon[0], contact_list[0]
+        count = ncon[0]
+        first = contact_list[0]
         contacts = Contacts(
             reals_at(first, (count * at.size,)),
             integers_at(first, (count * at.size * 2,)),
@@ -181,7 +190,9 @@ class CompiledSteps:
         self._mechanics = mechanics
         found = BellyContacts.of(mechanics, layout) if layout.has_parts else None
         bellies = found or NO_CONTACTS
-        m, d, planes = mechanics.model, mechanics.data, mechanics.planes
+        m = mechanics.model
+        d = mechanics.data
+        planes = mechanics.planes
         links = mechanics.joint_count + 1
         self._arrays: dict[str, NDArray[Any]] = {
             **{name: getattr(d, name) for name in ("qpos", "qvel", "qfrc_applied")},
@@ -224,7 +235,8 @@ class CompiledSteps:
 
 def _sizes(mechanics: Mechanics, bellies: BellyContacts) -> dict[str, float]:
     """Return the counts and constants of a ``STEP_MEMORY``."""
-    planes, model = mechanics.planes, mechanics.model
+    planes = mechanics.planes
+    model = mechanics.model
     x0_m, y0_m, spacing_m = planes.corner_m
     return {
         "count_joints": mechanics.joint_count,

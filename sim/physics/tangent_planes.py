@@ -104,7 +104,9 @@ def _nearest_point(x: float, y: float, z: float, corners: Floats, nearest: Float
             )
             square = q0 * q0 + q1 * q1 + q2 * q2
             if square < least:
-                least, s, t = square, es, et
+                least = square
+                s = es
+                t = et
     nearest[0], nearest[1], nearest[2] = (
         a0 + s * b0 + t * c0,
         a1 + s * b1 + t * c1,
@@ -239,7 +241,8 @@ def lay_planes(
     """
     found = np.empty((PLANES, 4))
     for b in range(len(balls)):
-        centre, radius_m = places_m[balls[b]], ball_m[b]
+        centre = places_m[balls[b]]
+        radius_m = ball_m[b]
         touch(centre[0], centre[1], centre[2], radius_m, z_m, corner_m, found)
         for k in range(PLANES):
             plane = planes[b, k]
@@ -284,7 +287,8 @@ class TangentPlanes:
         """Find the planes made by ``sim.physics.body``."""
         if ground is None:
             none = np.zeros(0, dtype=np.int32)
-            flat, corner = np.zeros((2, 2)), (0.0, 0.0, 1.0)
+            flat = np.zeros((2, 2))
+            corner = (0.0, 0.0, 1.0)
             return cls(model, none, none.reshape(0, PLANES), np.zeros(0), flat, corner)
         first = model.pair_geom1.reshape(-1, PLANES).astype(np.int32)
         balls = model.pair_geom2.reshape(-1, PLANES)[:, 0].astype(np.int32)
@@ -297,6 +301,12 @@ class TangentPlanes:
         if len(self.balls):
             mujoco.mj_kinematics(self.model, data)
             lay_planes(
-                *(data.geom_xpos, self.balls, self.radius_m, self.z_m, self.corner_m),
-                *(self.planes, self.model.geom_pos, self.model.geom_quat),
+                data.geom_xpos,
+                self.balls,
+                self.radius_m,
+                self.z_m,
+                self.corner_m,
+                self.planes,
+                self.model.geom_pos,
+                self.model.geom_quat,
             )

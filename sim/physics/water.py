@@ -31,7 +31,8 @@ def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
     m; lift of the link under water, N; axis of the link's frame along it. The axis is 0, or 1 for a
     leg's segment, a rod as thick as its foot.
     """
-    water, links = world.ground, robot.joint_count + 1
+    water = world.ground
+    links = robot.joint_count + 1
     rows = np.zeros((links, 7))
     if not isinstance(water, Water):
         return rows
@@ -101,8 +102,12 @@ def add_water(
     """
     lost = 0.0
     for i in range(len(wrench)):
-        across, along, arm = water[i, 0], water[i, 1], water[i, 2]
-        radius, surface, lift = water[i, 3], water[i, 4], water[i, 5]
+        across = water[i, 0]
+        along = water[i, 1]
+        arm = water[i, 2]
+        radius = water[i, 3]
+        surface = water[i, 4]
+        lift = water[i, 5]
         wet = immersed(centre[i, 2], radius, surface)
         wrench[i, 2] += wet * lift
         wrench[i, 3] += centre[i, 1] * wet * lift

@@ -60,10 +60,11 @@ class ChaseView:
         camera = self._camera
         camera.lookat[:] = self._pose.move(qpos)
         camera.distance = self._pose.distance_m
-        camera.elevation, camera.azimuth = ELEVATION_DEG, AZIMUTH_DEG
+        camera.elevation = ELEVATION_DEG
+        camera.azimuth = AZIMUTH_DEG
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(
-            *(self._pose.model, self._pose.data, self._option, None, camera, every, self._scene)
+            self._pose.model, self._pose.data, self._option, None, camera, every, self._scene
         )
         return self._screen.draw(self._scene).copy()
 
@@ -98,7 +99,8 @@ class ChaseWindow:
             camera = self._window.cam
             camera.lookat[:] = self._pose.move(qpos)
             camera.distance = self._pose.distance_m
-            camera.elevation, camera.azimuth = ELEVATION_DEG, AZIMUTH_DEG
+            camera.elevation = ELEVATION_DEG
+            camera.azimuth = AZIMUTH_DEG
         self._window.sync()
 
     def close(self) -> None:

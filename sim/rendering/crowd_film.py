@@ -70,7 +70,9 @@ class CrowdView:
 
         ``tiled``: the ground has detail by distance; else it is drawn in full.
         """
-        self._meshes, self._ground, self._size_px = CrowdMeshes(bodies), ground, size_px
+        self._meshes = CrowdMeshes(bodies)
+        self._ground = ground
+        self._size_px = size_px
         self._tiles = GroundTiles(ground) if tiled else None
         more = () if self._tiles is None else (self._tiles.add_to,)
         self._model = model = dressed_model(
@@ -89,20 +91,30 @@ class CrowdView:
 
     def draw(self, shot: CrowdShot) -> Image:
         """Draw a frame (height, width, 3), valid until the next one."""
-        camera, scene = self._camera, self._scene
+        camera = self._camera
+        scene = self._scene
         camera.lookat[:], camera.distance = shot.lookat_m, shot.distance_m
-        camera.azimuth, camera.elevation = shot.azimuth_deg, shot.elevation_deg
+        camera.azimuth = shot.azimuth_deg
+        camera.elevation = shot.elevation_deg
         if self._tiles is not None:
             view = ViewFrustum.orbit(
-                *(shot.lookat_m, shot.distance_m, shot.azimuth_deg, shot.elevation_deg),
+                shot.lookat_m,
+                shot.distance_m,
+                shot.azimuth_deg,
+                shot.elevation_deg,
                 fovy_deg=FOVY_DEG,
                 size_px=self._size_px,
             )
             self._tiles.choose(self._model, view)
         mujoco.mjv_updateScene(
-            self._model, self._data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_STATIC,
+            self._model,
+            self._data,
+            self._option,
+            None,
+            camera,
+            mujoco.mjtCatBit.mjCAT_STATIC,
             scene,
-        )  # fmt: skip
+        )
         bodies = [(one.kind, one.level, one.points_m, one.radius_m) for one in shot.bodies]
         self._meshes.lay(self._model, scene, bodies, self._ground)
         return self._screen.draw(scene, shot.caption)

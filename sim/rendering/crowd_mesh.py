@@ -34,7 +34,8 @@ _HEAD: Final = 0.05
 """Share of the body in which the head is round."""
 _EYE: Final = (0.035, 0.27)
 """Place of an eye: along the body, and from back to belly."""
-_NOSE, _TAIL = 0.4, 3.0
+_NOSE = 0.4
+_TAIL = 3.0
 """Length of the tips beyond the centre line's ends, radii there (ours)."""
 _SHADOW_RINGS: Final = 13
 _SHADOW_LIFT_M: Final = 0.006
@@ -74,7 +75,8 @@ class TubeGrid:
     def tubes(self, points_m: Floats, radius_m: Floats) -> tuple[Floats, Floats]:
         """(B, V, 3) corners and normals of bodies with centre lines (B, n, 3) and radii (B, n)."""
         place, slope = _spline(points_m.shape[1], self.rings)
-        centre, ahead = place @ points_m, -_unit(slope @ points_m)
+        centre = place @ points_m
+        ahead = -_unit(slope @ points_m)
         radius = radius_m @ place.T
         along = _along(self.rings)
         bulge = np.minimum(along / _HEAD, 1.0) ** 0.5 * np.minimum((1.0 - along) / 0.2, 1.0) ** 0.7
@@ -250,7 +252,8 @@ def _draw(
 ) -> None:
     """Fill the first places of a skin with meshes (B, V, 3), and add it to the scene."""
     skin = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SKIN, name)
-    start, used = int(model.skin_vertadr[skin]), corner.shape[0] * corner.shape[1]
+    start = int(model.skin_vertadr[skin])
+    used = corner.shape[0] * corner.shape[1]
     capacity = int(model.skin_vertnum[skin]) // corner.shape[1]
     scene.skinvert.reshape(-1, 3)[start : start + used] = corner.reshape(-1, 3)
     scene.skinnormal.reshape(-1, 3)[start : start + used] = normal.reshape(-1, 3)
@@ -258,12 +261,19 @@ def _draw(
     geom = scene.geoms[scene.ngeom]
     material = int(model.skin_matid[skin])
     mujoco.mjv_initGeom(
-        geom, mujoco.mjtGeom.mjGEOM_SKIN, np.zeros(3), corner.reshape(-1, 3).mean(axis=0),
-        np.eye(3).ravel(), model.mat_rgba[material],
-    )  # fmt: skip
-    geom.objtype, geom.objid = mujoco.mjtObj.mjOBJ_SKIN, skin
-    geom.matid, geom.texcoord = material, 1
-    geom.specular, geom.shininess = model.mat_specular[material], model.mat_shininess[material]
+        geom,
+        mujoco.mjtGeom.mjGEOM_SKIN,
+        np.zeros(3),
+        corner.reshape(-1, 3).mean(axis=0),
+        np.eye(3).ravel(),
+        model.mat_rgba[material],
+    )
+    geom.objtype = mujoco.mjtObj.mjOBJ_SKIN
+    geom.objid = skin
+    geom.matid = material
+    geom.texcoord = 1
+    geom.specular = model.mat_specular[material]
+    geom.shininess = model.mat_shininess[material]
     geom.emission = model.mat_emission[material]
     geom.transparent = int(model.mat_rgba[material, 3] < 1.0)
     scene.ngeom += 1

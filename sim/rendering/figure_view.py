@@ -56,9 +56,12 @@ class FigureView:
 
     def draw(self, corners_m: Floats, camera: OrbitCamera, caption: str = "") -> Image:
         """Draw the mesh with corners (V, 3), (height, width, 3); a new array each time."""
-        model, view, scene = self._model, self._camera, self._scene
+        model = self._model
+        view = self._camera
+        scene = self._scene
         view.lookat[:], view.distance = camera.lookat_m, camera.distance_m
-        view.azimuth, view.elevation = camera.azimuth_deg, camera.elevation_deg
+        view.azimuth = camera.azimuth_deg
+        view.elevation = camera.elevation_deg
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, self._data, self._option, None, view, every, scene)
         count = len(corners_m)  # the mesh is the first skin

@@ -79,11 +79,12 @@ def render_film(
         OffscreenError: no off-screen OpenGL.
 
     """
-    times, poses = np.asarray(time_s, float), np.asarray(qpos, float)
+    times = np.asarray(time_s, float)
+    poses = np.asarray(qpos, float)
     _check(times, poses, style.size)
     stage = _Stage(robot, world, ground, style, marks)
     shots = poses_at(
-        *(times, poses, np.arange(times[0], times[-1], style.speed_up / style.fps), stage.bodies)
+        times, poses, np.arange(times[0], times[-1], style.speed_up / style.fps), stage.bodies
     )
     shot_s = times[0] + np.arange(len(shots)) * style.speed_up / style.fps
     camera, centre = stage.camera(shots, style)
@@ -129,7 +130,8 @@ class _Stage:
         marks: Marks,
     ) -> None:
         look = style.look
-        self._robot, self._reached_s = robot, marks.reached_s
+        self._robot = robot
+        self._reached_s = marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
         bones = self.bodies if self.bodies > 1 else robot.link_count + len(robot.limb_joints)
         spine = self.bodies if self.bodies > 1 else robot.link_count
@@ -138,14 +140,20 @@ class _Stage:
         self.length_m = robot.length_m + legs_m
         """Length to show: the spine, and a leg to its side."""
         self.model = dressed_model(
-            *(robot, world, ground, marks.waypoints_m, marks.waypoint_radius_m),
+            robot,
+            world,
+            ground,
+            marks.waypoints_m,
+            marks.waypoint_radius_m,
             look=look,
             fine=style.fine,
             hollow=marks.hollow,
             additions=(add_sheet,),
         )
         parts = np.array([self.model.body(f"link{k}").id for k in range(bones)])
-        self._parts, self._spine, self._ground = parts, parts[:spine], ground
+        self._parts = parts
+        self._spine = parts[:spine]
+        self._ground = ground
         self.shade = SoftShade(self.model, ground)
         self._faces = None if look is None else look.faces
         self.data = mujoco.MjData(self.model)
@@ -180,7 +188,9 @@ class _Stage:
 
     def pose(self, scene: mujoco.MjvScene, shot: Floats, camera: Floats, now_s: float) -> None:
         """Draw a pose into a scene from a camera; waypoints reached by ``now_s`` are green."""
-        model, data, view = self.model, self.data, self._view
+        model = self.model
+        data = self.data
+        view = self._view
         while self._reached < len(self._reached_s) and self._reached_s[self._reached] <= now_s:
             mark_reached(model, self._reached)
             self._reached += 1
@@ -189,7 +199,8 @@ class _Stage:
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
         view.lookat[:], view.azimuth = camera[:3], camera[3]
-        view.elevation, view.distance = -camera[4], camera[5]
+        view.elevation = -camera[4]
+        view.distance = camera[5]
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(model, data, self._option, None, view, every, scene)
         self.shade.lay(scene, self._surface_m(scene))
@@ -197,7 +208,8 @@ class _Stage:
     def _surface_m(self, scene: mujoco.MjvScene) -> Floats:
         """Points (P, 3) of the body's surface in its last pose."""
         if self._faces is None:
-            spine, data = self._spine, self.data
+            spine = self._spine
+            data = self.data
             links = np.array(data.xipos[spine]), np.array(data.xmat[spine, ::3])
             return link_surface_m(*links, self._robot)
         corners = np.array(scene.skinvert, float).reshape(-1, 3)[: int(self._faces.max()) + 1]

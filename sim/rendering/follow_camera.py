@@ -63,7 +63,8 @@ class BodyTrack:
         """Whether it stands on legs that are longer than they reach to the sides."""
         if self.parts_m.shape[1] - self.spine < 2:  # a tongue is one bone
             return False
-        legs, middle = self.parts_m[:, self.spine :], self.parts_m[:, : self.spine].mean(axis=1)
+        legs = self.parts_m[:, self.spine :]
+        middle = self.parts_m[:, : self.spine].mean(axis=1)
         off = legs - middle[:, None]
         left = np.stack([-self.heading[:, 1], self.heading[:, 0]], axis=-1)
         left /= np.maximum(np.hypot(*left.T), 1e-9)[:, None]
@@ -76,7 +77,8 @@ def follow(track: BodyTrack, ground: HeightField | None) -> Floats:
 
     A camera is its look-at point, azimuth and elevation in degrees, and distance.
     """
-    parts, is_upright = track.parts_m, track.is_upright
+    parts = track.parts_m
+    is_upright = track.is_upright
     lookat = _smooth(0.5 * (parts.min(axis=1) + parts.max(axis=1)), SMOOTHING_S * track.fps)
     turn = _smooth(track.heading, (STRIDING_TURN_S if is_upright else TURN_SMOOTHING_S) * track.fps)
     heading_deg = np.degrees(np.unwrap(np.arctan2(turn[:, 1], turn[:, 0])))
@@ -84,13 +86,15 @@ def follow(track: BodyTrack, ground: HeightField | None) -> Floats:
     distance = np.full(len(parts), lengths * track.length_m)
     level = ELEVATIONS_DEG[0] if is_upright else LEVEL
     offsets = BESIDE_DEG if is_upright else BEHIND_DEG
-    best, cost = None, np.inf
+    best = None
+    cost = np.inf
     for place, offset in enumerate(offsets):
         plain = np.column_stack([lookat, heading_deg + offset, heading_deg, distance])
         camera = _raised(track, plain, level, ground)
         rise = float((camera[:, 4] - level).mean()) + _RELUCTANCE_DEG * place
         if rise < cost:
-            best, cost = camera, rise
+            best = camera
+            cost = rise
         if cost <= _RELUCTANCE_DEG * (place + 1):
             break  # no other direction can cost less
     assert best is not None, "there are directions"

@@ -242,7 +242,9 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
         repeat = [1.0, 1.0]
     material = spec.add_material(name="ground", texrepeat=repeat, texuniform=ground is None)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
-    material.specular, material.shininess, material.reflectance = 0.05, 0.1, 0.0
+    material.specular = 0.05
+    material.shininess = 0.1
+    material.reflectance = 0.0
     floor = spec.geom("ground")
     floor.material = "ground"
     if ground is None:
@@ -260,7 +262,9 @@ def _print(spec: mujoco.MjSpec, name: str, sheet: FloorPrint) -> None:
     size = 0.5 * sheet.side_m, 0.5 * sheet.side_m, 0.001
     place = *sheet.place_m, 0.001
     geom = _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_PLANE, size, place, (1, 1, 1, 1))
-    geom.name, geom.material, geom.group = name, name, 0
+    geom.name = name
+    geom.material = name
+    geom.group = 0
 
 
 def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) -> None:
@@ -306,7 +310,9 @@ def _contours(level: Floats) -> Floats:
 
 def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     """A capsule per link; a broad head with eyes and a forked tongue."""
-    links, lengths_m, radii_m = robot.link_count, robot.link_lengths_m, robot.link_radii_m
+    links = robot.link_count
+    lengths_m = robot.link_lengths_m
+    radii_m = robot.link_radii_m
     thickness = _thickness_m(robot)
     for i in range(1, links):
         if lengths_m[i] == 0.0:
@@ -319,7 +325,8 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     _legs(spec, robot)
     _mast(spec, robot)
     head = spec.body("link0")
-    r, half = radii_m[0], lengths_m[0] / 2
+    r = radii_m[0]
+    half = lengths_m[0] / 2
     _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
     neck = (-0.6 * half, 0, -0.2 * r, -half, 0, -0.2 * r)
     _add(head, _CAPSULE, (r * 0.8, 0, 0), (), HEAD, neck)
@@ -347,7 +354,9 @@ def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         return
     body = spec.body(f"link{config.link}")
     middle = 0.0 if config.link == 0 else -0.5 * robot.link_lengths_m[config.link]
-    back, top, half = middle - 0.012, config.height_m, 0.5 * config.baseline_m + 0.008
+    back = middle - 0.012
+    top = config.height_m
+    half = 0.5 * config.baseline_m + 0.008
     _add(body, _CAPSULE, (0.004, 0, 0), (), PUPIL, (back, 0, 0, back, 0, top))
     _add(body, _CAPSULE, (0.010, 0, 0), (), PUPIL, (back, -half, top, back, half, top))
 
@@ -382,8 +391,10 @@ def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
         texture.data = look.texture.tobytes()
         material = spec.add_material(name="animal")
         material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "animal"
-        material.specular, material.shininess = 0.2, 0.3
-        skin.material, skin.rgba = "animal", [1.0, 1.0, 1.0, 1.0]
+        material.specular = 0.2
+        material.shininess = 0.3
+        skin.material = "animal"
+        skin.rgba = [1.0, 1.0, 1.0, 1.0]
     skin.vert = look.vertices_m.ravel()
     skin.texcoord = (look.uv * [1.0, -1.0] + [0.0, 1.0]).ravel()  # the first row is at 0
     skin.face = look.faces.ravel().tolist()

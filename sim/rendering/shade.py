@@ -39,7 +39,8 @@ class SoftShade:
 
     def __init__(self, model: mujoco.MjModel, ground: HeightField | None) -> None:
         """Use the sheet of ``add_sheet``."""
-        self._model, self._ground = model, ground
+        self._model = model
+        self._ground = ground
         self.texture = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXTURE, SHADE)
         skin = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SKIN, SHADE)
         start = int(model.skin_vertadr[skin])
@@ -54,7 +55,8 @@ class SoftShade:
         low, high = place.min(axis=0), place.max(axis=0)
         side_m = 1.25 * float((high - low).max()) + 1e-6
         corner = 0.5 * (low + high - side_m)
-        address, size = int(self._model.tex_adr[self.texture]), _TEXELS * _TEXELS * 4
+        address = int(self._model.tex_adr[self.texture])
+        size = _TEXELS * _TEXELS * 4
         picture = shade_picture((place - corner) / side_m)
         self._model.tex_data[address : address + size] = picture.ravel()
         steps = np.linspace(0.0, side_m, _GRID + 1)

@@ -68,8 +68,10 @@ class StereoView:
     ) -> None:
         self._model = model = dressed_model(robot, world, ground)
         self._data = mujoco.MjData(model)
-        self._ground, self._size = ground, size_px
-        self._focal_px, self._baseline_m = focal_px, baseline_m
+        self._ground = ground
+        self._size = size_px
+        self._focal_px = focal_px
+        self._baseline_m = baseline_m
         self._random = np.random.default_rng(seed)
         self._paint()
         self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1)
@@ -127,7 +129,9 @@ class StereoView:
         wide, tall = self._size
         scale = _NEAR_M / self._focal_px
         for camera in self._scene.camera:
-            camera.pos, camera.forward, camera.up = at_m, axes[:, 2], -axes[:, 1]
+            camera.pos = at_m
+            camera.forward = axes[:, 2]
+            camera.up = -axes[:, 1]
             camera.frustum_center, camera.frustum_width = 0.0, 0.5 * wide * scale
             camera.frustum_bottom, camera.frustum_top = -0.5 * tall * scale, 0.5 * tall * scale
             camera.frustum_near, camera.frustum_far = _NEAR_M, _FAR_M

@@ -17,7 +17,8 @@ from snakewalk.sim.rendering.shade import add_shade
 
 NOISE = 3.0
 """Standard deviation of the sensor's noise, of 255."""
-_FIELDS, _SLACK = 8, 128  # number of noise fields, and their excess size in pixels
+_FIELDS = 8
+_SLACK = 128  # number of noise fields, and their excess size in pixels
 
 
 class TopView:
@@ -40,7 +41,8 @@ class TopView:
         prints: Sequence[FloorPrint] = (),
         ground: HeightField | None = None,
     ) -> None:
-        self._robot, self._ground = robot, ground
+        self._robot = robot
+        self._ground = ground
         self._model = model = dressed_model(robot, world, ground, prints=prints)
         self._data = mujoco.MjData(model)
         size = camera.width_px, camera.height_px
@@ -94,7 +96,8 @@ class TopView:
         self._screen.close()
 
     def _update(self, option: mujoco.MjvOption) -> None:
-        data, model = self._data, self._model
+        data = self._data
+        model = self._model
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
@@ -103,7 +106,8 @@ class TopView:
 
     def _window(self, links_m: Floats) -> tuple[int, int, int, int]:
         """First and end columns and rows that contain the robot and its shade."""
-        camera, robot = self._camera, self._robot
+        camera = self._camera
+        robot = self._robot
         c, s = math.cos(camera.turn_rad), math.sin(camera.turn_rad)
         nearest = camera.height_m - float(links_m[:, 2].max()) - robot.body_radius_m
         scale = camera.width_px / camera.field_width_m * camera.height_m / nearest

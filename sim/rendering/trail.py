@@ -49,7 +49,8 @@ class TrailLine:
         """Append the end of the line up to a time."""
         been = int(np.searchsorted(self.time_s, now_s, side="right"))
         for k in range(max(1, been - MOST), been):
-            kind, piece = mujoco.mjtGeom.mjGEOM_LINE, _next(scene)
+            kind = mujoco.mjtGeom.mjGEOM_LINE
+            piece = _next(scene)
             mujoco.mjv_initGeom(piece, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), self.rgba)
             mujoco.mjv_connector(piece, kind, 3.0, self.points_m[k - 1], self.points_m[k])
 
@@ -79,9 +80,13 @@ class Trail:
         for k, colour in ((current - 1, FORMER), (current, PATH)):
             for at_m in self.dots_m[k] if k >= 0 else ():
                 mujoco.mjv_initGeom(
-                    _next(scene), mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, 0.012), at_m,
-                    np.eye(3).ravel(), colour,
-                )  # fmt: skip
+                    _next(scene),
+                    mujoco.mjtGeom.mjGEOM_SPHERE,
+                    np.full(3, 0.012),
+                    at_m,
+                    np.eye(3).ravel(),
+                    colour,
+                )
         for line in self.lines:
             line.add(scene, now_s)
 
@@ -117,7 +122,8 @@ def add_axes(
     below = np.concatenate([at_m + along_m * np.eye(2)[axis] for axis in range(2)])
     highest_m = _on_ground(below, ground)[:, 2].max()
     foot = np.array([*at_m, highest_m + 0.03 * length_m])  # no hill hides a rod
-    rod, still = mujoco.mjtGeom.mjGEOM_CAPSULE, (np.zeros(3), np.zeros(3), np.eye(3).ravel())
+    rod = mujoco.mjtGeom.mjGEOM_CAPSULE
+    still = (np.zeros(3), np.zeros(3), np.eye(3).ravel())
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
     for axis, (name, colour) in enumerate(zip("xy", AXES, strict=True)):
         along = np.eye(3)[axis] * length_m
@@ -128,7 +134,8 @@ def add_axes(
 
 
 def _label(scene: mujoco.MjvScene, at_m: Floats, text: str) -> None:
-    geom, white = _next(scene), (1.0, 1.0, 1.0, 1.0)
+    geom = _next(scene)
+    white = (1.0, 1.0, 1.0, 1.0)
     kind = mujoco.mjtGeom.mjGEOM_LABEL
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), at_m, np.eye(3).ravel(), white)
     geom.label = text

@@ -57,7 +57,8 @@ class ViewFrustum:
 
 def camera_axes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Directions (..., 3) ahead of cameras, to their right and upwards, of angles (...)."""
-    turn, rise = np.radians(azimuth_deg), np.radians(elevation_deg)
+    turn = np.radians(azimuth_deg)
+    rise = np.radians(elevation_deg)
     level = np.cos(rise)
     ahead = np.stack([level * np.cos(turn), level * np.sin(turn), np.sin(rise)], axis=-1)
     right = np.stack([np.sin(turn), -np.cos(turn), np.zeros_like(turn)], axis=-1)

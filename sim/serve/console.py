@@ -29,7 +29,8 @@ class Console:
     """Executes lines of an operator."""
 
     def __init__(self, line: SimLine, faults: FaultPlayer) -> None:
-        self._line, self._faults = line, faults
+        self._line = line
+        self._faults = faults
         self.set_pace: Callable[[float], None] | None = None
         """Sets a new factor of time; None while no server runs the line in real time."""
         self._commands: dict[str, Callable[[list[str]], str]] = {
@@ -65,18 +66,21 @@ class Console:
     def _set(self, words: list[str]) -> str:
         if len(words) < 3:
             raise ValueError
-        rows, value = self._rows(words[0]), int(words[-1], 0)
+        rows = self._rows(words[0])
+        value = int(words[-1], 0)
         name = set_register(self._line, rows, " ".join(words[1:-1]), value)
         return f"{name} = {value} at {len(rows)} servo{'s' if len(rows) > 1 else ''}"
 
     def _get(self, words: list[str]) -> str:
         rows = self._rows(words[0])
         name = register_name(self._line, " ".join(words[1:]), rows)
-        values, ids = self._line.shown(name), self._line.ids()
+        values = self._line.shown(name)
+        ids = self._line.ids()
         return "  ".join(f"{ids[row]}: {values[row]}" for row in rows)
 
     def _load(self, words: list[str]) -> str:
-        rows, load_n_m = self._rows(words[0]), float(words[1])
+        rows = self._rows(words[0])
+        load_n_m = float(words[1])
         set_load(self._line, rows, load_n_m)
         return f"{load_n_m:g} N m on {len(rows)} shaft{'s' if len(rows) > 1 else ''}"
 

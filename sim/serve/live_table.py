@@ -55,7 +55,8 @@ class LiveTable:
 def servo_rows(line: SimLine) -> Rows:
     """One row per servo of Protocol 2.0: mode, motion and state."""
     line.firmware.refresh()
-    bank, measured = line.bank, line.bank.measures_current
+    bank = line.bank
+    measured = line.bank.measures_current
     columns = {key: np.asarray(bank[name]) for key, name in COLUMNS.items()}
     current = bank["Present Current" if measured.any() else "Present Load"]  # at one address
     rows: Rows = []

@@ -205,7 +205,8 @@ class PtyServer:
 
         A deleted link is restored; a redirected one is left alone.
         """
-        link, now_s = self._link, self._clock.now_s()
+        link = self._link
+        now_s = self._clock.now_s()
         if link is None or now_s - self._link_checked_s < _LINK_CHECK_S:
             return
         self._link_checked_s = now_s

@@ -12,7 +12,9 @@ from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.wire import Wire
 from snakewalk.sim.sniff.trace import read_exchange
 
-_ID_AT, _CODE_AT, _ADDRESS = 4, 7, slice(8, 10)
+_ID_AT = 4
+_CODE_AT = 7
+_ADDRESS = slice(8, 10)
 _WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE)
 
 

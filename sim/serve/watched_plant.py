@@ -22,7 +22,9 @@ class WatchedPlant:
         on_sample: Callable[[], None],
         goal_delay_s: float = 0.0,
     ) -> None:
-        self._plant, self._period_s, self._on_sample = plant, period_s, on_sample
+        self._plant = plant
+        self._period_s = period_s
+        self._on_sample = on_sample
         self._delay_s = goal_delay_s
         self._samples = 0
         self._start_s = plant.time_s

@@ -12,10 +12,13 @@ from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.servo.motor import friction_n_m
 
-GAP, SPEED, SIDE = 0, 1, 2
+GAP = 0
+SPEED = 1
+SIDE = 2
 """Rows of the state: angle of the rotor from the middle of the gap, rotor's speed, and side of the
 tooth that touches (1: the motor is ahead, -1: behind, 0: none)."""
-KICK, KICKED = 3, 4
+KICK = 3
+KICKED = 4
 """Rows of a MuJoCo joint besides: speed by which the rotor was faster when the gap closed, until it
 acts, and until it is taken into account."""
 BACKLASH: Final = 12

@@ -30,8 +30,12 @@ from snakewalk.sim.servo.register_rules import (
 )
 
 _SHARED = (
-    *("Torque Enable", "Goal Position", "Present Position", "Present Input Voltage"),
-    *("Status Return Level", "Bus Watchdog"),
+    "Torque Enable",
+    "Goal Position",
+    "Present Position",
+    "Present Input Voltage",
+    "Status Return Level",
+    "Bus Watchdog",
 )
 """Registers that show whether two models have the same layout."""
 
@@ -56,8 +60,12 @@ class ServoScales:
         """Scales of servos of these models."""
         rows = [
             (
-                *(m.positions_per_rad, m.units.positions_per_turn, m.units.zero_position),
-                *(m.rad_s_per_velocity, m.rad_s2_per_acceleration, m.units.full_pwm),
+                m.positions_per_rad,
+                m.units.positions_per_turn,
+                m.units.zero_position,
+                m.rad_s_per_velocity,
+                m.rad_s2_per_acceleration,
+                m.units.full_pwm,
                 m.units.zero_position - m.units.positions_per_turn / 2.0,
                 math.inf if m.units.homing_limit is None else m.units.homing_limit,
             )

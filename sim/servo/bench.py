@@ -75,9 +75,11 @@ class BenchPlant:
         """Step to the last whole step at or before ``until_s``."""
         last = int(np.floor(until_s / self._step_s + 1e-9))
         while self._steps < last:
-            steps, load_n_m = last - self._steps, self._constant_load
+            steps = last - self._steps
+            load_n_m = self._constant_load
             if self._load is not None:  # it may change with every step
-                steps, load_n_m = 1, np.asarray(self._load(self._position), dtype=np.float64)
+                steps = 1
+                load_n_m = np.asarray(self._load(self._position), dtype=np.float64)
             shafts = (load_n_m, self._gear, self._play, self._position, self._velocity)
             _step(steps, self._step_s, self._shaft_kg_m2, *shafts, *drive.columns())
             self._steps += steps
@@ -125,8 +127,11 @@ def _step(
     ``play`` (3, J): state of the backlash.
     """
     for k in range(len(position)):
-        inertia, viscous = gear[0, k], gear[2, k]
-        on, ohm, load = torque_on[k], resistance_ohm[k], load_n_m[k]
+        inertia = gear[0, k]
+        viscous = gear[2, k]
+        on = torque_on[k]
+        ohm = resistance_ohm[k]
+        load = load_n_m[k]
         stiff = on * torque_constant_n_m_a[k] / ohm
         rotor_kg_m2 = max(inertia - shaft_kg_m2, LEAST_ROTOR_KG_M2)
         has_play = gear[BACKLASH, k] > 0.0
@@ -145,12 +150,22 @@ def _step(
             motor = push - (damping - viscous) * w
             friction = friction_n_m(gear[:, k], w, motor, load)
             brake = h * friction / (inertia + h * damping)
-            before, w, more = w, np.sign(free) * max(abs(free) - brake, 0.0), 0.0
+            before = w
+            w = np.sign(free) * max(abs(free) - brake, 0.0)
+            more = 0.0
             turned = w
             if has_play:
                 w, more = turn_with_backlash(
-                    *(gear[:, k], play[:, k], h, shaft_kg_m2, rotor_kg_m2),
-                    *(before, w, push, damping, load),
+                    gear[:, k],
+                    play[:, k],
+                    h,
+                    shaft_kg_m2,
+                    rotor_kg_m2,
+                    before,
+                    w,
+                    push,
+                    damping,
+                    load,
                 )
                 turned = play[SPEED, k]
             velocity[k] = w

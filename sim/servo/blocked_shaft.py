@@ -47,7 +47,8 @@ class BlockedShaft:
         """
         if not self.any:
             return
-        drive, rows = self._drive, self.rows
+        drive = self._drive
+        rows = self.rows
         updated = rows & (drive.pwm_limit <= 1.0)  # else it is still the brake's
         self._on = np.where(updated, drive.torque_on, self._on)
         self._limit = np.where(updated, drive.pwm_limit, self._limit)

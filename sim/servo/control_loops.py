@@ -27,7 +27,8 @@ TIME_BASED = 0x04
 """Drive Mode(10), bit 2."""
 TINY_GAIN = 1e-9
 """A proportional gain too small to add anything: with it a far goal is a constant output."""
-_READ, _BOOLS = readonly_array(), readonly_array("boolean")
+_READ = readonly_array()
+_BOOLS = readonly_array("boolean")
 _GAINS = readonly_array(dimensions=2, layout="C")
 _FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
@@ -36,13 +37,17 @@ class ControlLoops:
     """Control loops of all servos of a bank; idle in the plain case."""
 
     def __init__(self, bank: ServoBank, drive: ServoDrive, motor: MotorColumns) -> None:
-        self._bank, self._drive, self._motor = bank, drive, motor
+        self._bank = bank
+        self._drive = drive
+        self._motor = motor
         servos = len(bank)
         scales = bank.scales
         self._rad_s_per_velocity = scales.rad_s_per_velocity
         self._scales = np.stack(
             [
-                *(scales.positions_per_rad, scales.full_pwm, scales.rad_s_per_velocity),
+                scales.positions_per_rad,
+                scales.full_pwm,
+                scales.rad_s_per_velocity,
                 scales.rad_s2_per_acceleration,
             ]
         )
@@ -67,12 +72,14 @@ class ControlLoops:
         beyond_p |= bank["Profile Velocity"] != 0
         for name in _FORWARD:
             beyond_p |= bank[name] != 0
-        position, velocity = on & placed & beyond_p, on & (mode == VELOCITY_MODE)
+        position = on & placed & beyond_p
+        velocity = on & (mode == VELOCITY_MODE)
         joined = (position & ~self.position) | (velocity & ~self.velocity)
         if joined.any():
             self.trajectory.restart(joined, shaft_rad)
             self._sum[joined] = self._last_error[joined] = 0.0
-        self.position, self.velocity = position, velocity
+        self.position = position
+        self.velocity = velocity
         self._any_position, self._any_velocity = bool(position.any()), bool(velocity.any())
         self.active = self._any_position or self._any_velocity
         kp = p_gain_per_rad(bank["Position P Gain"], self._motor)
@@ -80,7 +87,8 @@ class ControlLoops:
         if not self.active:
             return
         self._timed = (bank["Drive Mode"] & TIME_BASED) != 0
-        integral, differential = bank["Position I Gain"] / 65_536.0, bank["Position D Gain"] / 16.0
+        integral = bank["Position I Gain"] / 65_536.0
+        differential = bank["Position D Gain"] / 16.0
         forward = [bank[name] / 4.0 for name in _FORWARD]
         self._gains = np.stack([kp, integral, differential, *forward])
         if self._any_velocity:
@@ -103,20 +111,40 @@ class ControlLoops:
 
         ``goal_rad`` is the angle of held servos; ``sign`` converts registers to the shafts' frame.
         """
-        drive, path = self._drive, self.trajectory
+        drive = self._drive
+        path = self.trajectory
         if self._any_velocity:
             _run_velocity(
-                *(self.velocity, held, sign, plant.position_rad, plant.velocity_rad_s),
-                *(drive.pwm_limit, self._settings, self._scales, self._timed),
-                *(path.velocity, self._sum, drive.goal_rad),
+                self.velocity,
+                held,
+                sign,
+                plant.position_rad,
+                plant.velocity_rad_s,
+                drive.pwm_limit,
+                self._settings,
+                self._scales,
+                self._timed,
+                path.velocity,
+                self._sum,
+                drive.goal_rad,
             )
         if self._any_position:
             path.advance(CONTROL_S, self.position)
             _run_position(
-                *(self.position, held, goal_rad, plant.position_rad, drive.pwm_limit, self._gains),
+                self.position,
+                held,
+                goal_rad,
+                plant.position_rad,
+                drive.pwm_limit,
+                self._gains,
                 self._scales,
-                *(path.position, path.velocity, path.acceleration),
-                *(self._sum, self._last_error, drive.p_gain_per_rad, drive.goal_rad),
+                path.position,
+                path.velocity,
+                path.acceleration,
+                self._sum,
+                self._last_error,
+                drive.p_gain_per_rad,
+                drive.goal_rad,
             )
 
 
@@ -155,7 +183,8 @@ def _run_position(
     for k in range(len(run)):
         if not run[k]:
             continue
-        per_rad, full_pwm = scales[0, k], scales[1, k]
+        per_rad = scales[0, k]
+        full_pwm = scales[1, k]
         ticks = per_rad * CONTROL_S
         target = hold_rad[k] if held[k] else path_rad[k]
         error = (target - shaft_rad[k]) * per_rad
@@ -196,9 +225,12 @@ def _run_velocity(
     for k in range(len(run)):
         if not run[k]:
             continue
-        full_pwm, rad_s, rad_s2 = scales[1, k], scales[2, k], scales[3, k]
+        full_pwm = scales[1, k]
+        rad_s = scales[2, k]
+        rad_s2 = scales[3, k]
         goal = 0.0 if held[k] else settings[0, k] * sign[k]
-        ramp, step = settings[1, k], np.inf
+        ramp = settings[1, k]
+        step = np.inf
         if ramp > 0.0 and not held[k]:  # a watchdog's stop has no profile
             if timed[k]:
                 step = abs(goal) / ramp * (CONTROL_S * 1e3)

@@ -41,7 +41,8 @@ FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""
 _NEVER = 1 << 40
 """Beyond every goal."""
-STARTUP_TORQUE_ON, STARTUP_RAM_RESTORE = 0x01, 0x02
+STARTUP_TORQUE_ON = 0x01
+STARTUP_RAM_RESTORE = 0x02
 """Startup Configuration(60)."""
 
 
@@ -96,15 +97,7 @@ class Firmware:
         self._control_s = self._time_s + CONTROL_S
         self._goal_address = bank.register("Goal Position").address
         self._present_values = PresentValues(
-            *(
-                bank,
-                plant,
-                self.drive,
-                motor,
-                self._motor_output,
-                self.control_loops,
-                self.protection,
-            )
+            bank, plant, self.drive, motor, self._motor_output, self.control_loops, self.protection
         )
         self._accepted = np.zeros(joints, bool)
         self.apply_registers()
@@ -114,7 +107,10 @@ class Firmware:
 
     def advance(self, until_s: float) -> None:
         """Step physics, watchdog, heat and protections to ``until_s``."""
-        plant, drive, protection, dog = self.plant, self.drive, self.protection, self._watchdog
+        plant = self.plant
+        drive = self.drive
+        protection = self.protection
+        dog = self._watchdog
         while self._time_s < until_s:
             stop_s = min(until_s, self._slice_s, dog.due_s, self.events.next_s)
             if self.control_loops.active:
@@ -146,7 +142,8 @@ class Firmware:
 
     def apply_registers(self) -> None:
         """Apply the registers after a write of more than goal positions."""
-        bank, drive = self.bank, self.drive
+        bank = self.bank
+        drive = self.drive
         mode = bank["Operating Mode"]
         on = bank["Torque Enable"] == 1
         switched = np.flatnonzero(mode != self._last_mode)
@@ -203,8 +200,11 @@ class Firmware:
             self._holding or self._pushed or self.control_loops.active or self.blocked_shaft.any
         )
         goal_rad = self.drive.goal_rad if plain else np.empty(len(self.bank))
-        table, address, taken = self.bank.table, self._goal_address, self._accepted
-        limits, frame = self._limits, self._frame
+        table = self.bank.table
+        address = self._goal_address
+        taken = self._accepted
+        limits = self._limits
+        frame = self._frame
         per_rad = self._scales.positions_per_rad
         accept_goals(raw, rows, table, at, address, limits, frame, per_rad, goal_rad, taken)
         if self._enabled_by_goals:
@@ -267,7 +267,8 @@ class Firmware:
 
     def hold_position(self) -> None:
         """Set every goal to the present position, at rest, after a shaft was moved."""
-        torque, goal = self.bank["Torque Enable"], self.bank["Goal Position"]
+        torque = self.bank["Torque Enable"]
+        goal = self.bank["Goal Position"]
         on = torque.copy()
         torque[:] = 0
         self.apply_registers()
@@ -323,7 +324,8 @@ class Firmware:
 
     def refresh(self, address: int = 0, length: int = TABLE_BYTES) -> None:
         """Write the present values, at least those in this block."""
-        indirect, present = self.bank.indirect, self._present_values
+        indirect = self.bank.indirect
+        present = self._present_values
         gather = indirect.covers(address, length)
         stop = address + length
         if gather or (address < present.motion_at.stop and stop > present.motion_at.start):
@@ -345,11 +347,13 @@ class Firmware:
             goal = np.where(self._held, self._goal, goal)
         self._goal = goal
         drive_goal = np.where(self._push != 0.0, self._push, goal) if self._pushed else goal
-        control_loops, updated = self.control_loops, None
+        control_loops = self.control_loops
+        updated = None
         if control_loops.active:
             control_loops.set_goals(goal)
             run = control_loops.position | control_loops.velocity
-            drive_goal, updated = np.where(run, self.drive.goal_rad, drive_goal), ~run
+            drive_goal = np.where(run, self.drive.goal_rad, drive_goal)
+            updated = ~run
         self.drive.goal_rad[:] = drive_goal
         self.blocked_shaft.hold(updated)
 

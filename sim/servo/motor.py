@@ -54,7 +54,8 @@ class MotorModel:
             ControlTableError: the model cannot be simulated.
 
         """
-        motor, units = motor_row(facts), facts.units
+        motor = motor_row(facts)
+        units = facts.units
         return MotorModel(
             motor.nominal_v,
             motor.stall_torque_n_m,
@@ -178,7 +179,8 @@ def p_gain_per_rad(register: int | AnyInts, motor: MotorModel | MotorColumns) ->
 
 def make_drive(motors: Sequence[MotorModel], supply_v: ArrayLike) -> ServoDrive:
     """Make a drive of J servos at rest: torque off, zero goals and gains."""
-    joints, columns = len(motors), MotorColumns(motors)
+    joints = len(motors)
+    columns = MotorColumns(motors)
     return ServoDrive(
         torque_on=np.zeros(joints),
         goal_rad=np.zeros(joints),
@@ -261,8 +263,14 @@ def measured_gearbox(facts: ServoModel) -> Gearbox | None:
     if own is None:
         return None
     return Gearbox(
-        *(own.armature_kg_m2, own.dry_n_m, own.viscous_n_m_s, own.stribeck_n_m),
-        *(own.stribeck_rad_s, own.by_motor, own.by_load, own.by_load_slow),
+        own.armature_kg_m2,
+        own.dry_n_m,
+        own.viscous_n_m_s,
+        own.stribeck_n_m,
+        own.stribeck_rad_s,
+        own.by_motor,
+        own.by_load,
+        own.by_load_slow,
     )
 
 
@@ -276,9 +284,18 @@ def gears_of(robot: RobotConfig) -> list[Gearbox]:
         Gearbox(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         if own is None
         else Gearbox(
-            *(0.0, own.dry_n_m, 0.0, own.stribeck_n_m, own.stribeck_rad_s),
-            *(own.by_motor, own.by_load, own.by_load_slow, own.by_motor_slow),
-            *(own.stribeck_exponent, own.by_motor_square, own.by_load_square),
+            0.0,
+            own.dry_n_m,
+            0.0,
+            own.stribeck_n_m,
+            own.stribeck_rad_s,
+            own.by_motor,
+            own.by_load,
+            own.by_load_slow,
+            own.by_motor_slow,
+            own.stribeck_exponent,
+            own.by_motor_square,
+            own.by_load_square,
             own.backlash_rad,
         )
         for own in robot.motors

@@ -23,7 +23,8 @@ class MotorOutput:
     """Output and current of all servos of a bus."""
 
     def __init__(self, drive: ServoDrive, blocked_shaft: BlockedShaft) -> None:
-        self._drive, self._blocked_shaft = drive, blocked_shaft
+        self._drive = drive
+        self._blocked_shaft = blocked_shaft
         self.limited = False
         """Whether the mode of any servo limits its current."""
         self.current_a: Callable[[], Floats] = blocked_shaft.current_a
@@ -45,7 +46,8 @@ class MotorOutput:
         pwm = self._blocked_shaft.pwm()
         if not self.limited:
             return pwm
-        drive, amps = self._drive, self._blocked_shaft.current_a()
+        drive = self._drive
+        amps = self._blocked_shaft.current_a()
         cut = (np.abs(amps) >= AT_LIMIT * self._blocked_shaft.limit_a()) & (drive.torque_on > 0.0)
         volts = amps * drive.resistance_ohm + drive.back_emf_v_s * velocity_rad_s
         left = volts / np.maximum(drive.supply_v, LEAST_SUPPLY_V)

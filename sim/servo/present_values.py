@@ -19,9 +19,12 @@ from snakewalk.sim.servo.motor_output import MotorOutput
 from snakewalk.sim.servo.protection import Protection
 from snakewalk.sim.servo.servo_loops import write_motion
 
-IN_POSITION_TICKS, FOLLOWING_TICKS = 20, 100
+IN_POSITION_TICKS = 20
+FOLLOWING_TICKS = 100
 """Deviations behind the flags of Moving Status(123), "predefined" in the e-manual: ours."""
-IN_POSITION, PROFILE_ONGOING, FOLLOWING_ERROR = 0x01, 0x02, 0x08
+IN_POSITION = 0x01
+PROFILE_ONGOING = 0x02
+FOLLOWING_ERROR = 0x08
 
 
 class PresentValues:
@@ -41,12 +44,12 @@ class PresentValues:
         protection: Protection,
     ) -> None:
         self._start_s = np.full(len(bank), plant.time_s)
-        self._bank, self._plant, self._drive = bank, plant, drive
-        self._motor_output, self._control_loops, self._protection = (
-            motor_output,
-            control_loops,
-            protection,
-        )
+        self._bank = bank
+        self._plant = plant
+        self._drive = drive
+        self._motor_output = motor_output
+        self._control_loops = control_loops
+        self._protection = protection
         # Without a sensor the load is "inferred from the internal output", in tenths of a percent
         first = "Present Current" if "Present Current" in bank else "Present Load"  # one place
         names = (first, "Present Velocity", "Present Position")
@@ -68,7 +71,8 @@ class PresentValues:
 
     def motion(self, frame: Floats) -> None:
         """Present Current (else Load), Velocity and Position(126, 128, 132)."""
-        plant, current_a = self._plant, self._motor_output.current_a()
+        plant = self._plant
+        current_a = self._motor_output.current_a()
         if self._any_load:  # current of full output at stall, in the unit of such a row
             output_a = self._motor_output.pwm(plant.velocity_rad_s) * self._stall_a
             current_a = np.where(self._measured, current_a, output_a)
@@ -90,7 +94,8 @@ class PresentValues:
         output = self._motor_output.pwm(self._plant.velocity_rad_s) * sign
         bank["Present PWM"][:] = np.rint(output * self._scales.full_pwm)
         bank["Realtime Tick"][:] = ((time_s - self._start_s) * 1e3).astype(np.int64) % 32_768
-        goal, present = bank["Goal Position"].astype(float), bank["Present Position"]
+        goal = bank["Goal Position"].astype(float)
+        present = bank["Present Position"]
         places = path.position * sign * self._scales.positions_per_rad + zero
         shown = np.where(control_loops.position, places, goal)
         bank["Position Trajectory"][:] = np.rint(shown)

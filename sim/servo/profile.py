@@ -11,9 +11,13 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_READ, _WHICH = readonly_array(layout="C"), readonly_array("boolean")
+_READ = readonly_array(layout="C")
+_WHICH = readonly_array("boolean")
 
-STEP, RECTANGULAR, TRIANGULAR, TRAPEZOIDAL = 0x00, 0x10, 0x20, 0x30
+STEP = 0x00
+RECTANGULAR = 0x10
+TRIANGULAR = 0x20
+TRAPEZOIDAL = 0x30
 """Moving Status(123), bits 4 and 5."""
 
 
@@ -94,7 +98,9 @@ def _advance(
         if not np.isfinite(speed[k]):
             position[k], velocity[k], acceleration[k] = goal[k], 0.0, 0.0
             continue
-        distance, brake, limit = goal[k] - position[k], ramp[k] * seconds, np.inf
+        distance = goal[k] - position[k]
+        brake = ramp[k] * seconds
+        limit = np.inf
         if np.isfinite(brake):  # so fast that later steps can still stop in time
             root = np.sqrt(1.0 + 8.0 * abs(distance) / max(brake * seconds, 1e-300))
             limit = 0.5 * brake * (root - 1.0)

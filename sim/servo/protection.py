@@ -79,7 +79,9 @@ class Protection:
         around: SupplyAndAmbient,
         motor_output: MotorOutput,
     ) -> None:
-        self._bank, self._drive, self._around = bank, drive, around
+        self._bank = bank
+        self._drive = drive
+        self._around = around
         self._motor_output = motor_output
         self._supply = Supply(
             len(bank), motor.nominal_v if around.supply_v is None else around.supply_v

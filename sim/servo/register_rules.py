@@ -32,8 +32,13 @@ class Rule:
 PROFILE = ("Profile Acceleration", "Profile Velocity")
 GOALS = ("Goal PWM", "Goal Current", "Goal Velocity", "Goal Position")
 MODE_RESETS = (
-    *("Velocity I Gain", "Velocity P Gain", "Position D Gain", "Position I Gain"),
-    *("Position P Gain", "Feedforward 2nd Gain", "Feedforward 1st Gain"),
+    "Velocity I Gain",
+    "Velocity P Gain",
+    "Position D Gain",
+    "Position I Gain",
+    "Position P Gain",
+    "Feedforward 2nd Gain",
+    "Feedforward 1st Gain",
     *PROFILE,
 )
 
@@ -117,11 +122,13 @@ def _registers(layout: ControlTable) -> ModelRegisters:
     motor = motor_row(facts)
     listed = {name: layout[name] for name in facts.registers}
     rules = _rules(facts)
-    blocks, first = tuple(IndirectBlock(*block) for block in facts.indirect), 1
+    blocks = tuple(IndirectBlock(*block) for block in facts.indirect)
+    first = 1
     last = max((block.data + block.count for block in blocks), default=1) - 1
     for block in blocks:
         for k in range(block.count):
-            address, data = f"Indirect Address {first + k}", f"Indirect Data {first + k}"
+            address = f"Indirect Address {first + k}"
+            data = f"Indirect Data {first + k}"
             listed[address] = Register(address, block.addresses + 2 * k, 2, signed=False)
             listed[data] = Register(data, block.data + k, 1, signed=False)
             rules[address] = Rule(block.data + k, facts.ram_from, last)

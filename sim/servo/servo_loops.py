@@ -60,9 +60,12 @@ def write_motion(
     """
     at_current, at_velocity, at_position = places[0], places[1], places[2]
     for row in range(len(table)):
-        rad_s, ticks_per_rad = units[0, row], units[1, row]
-        sign, zero = frame[0, row], frame[1, row]
-        ampere, limit = current_units[0, row], current_units[1, row]
+        rad_s = units[0, row]
+        ticks_per_rad = units[1, row]
+        sign = frame[0, row]
+        zero = frame[1, row]
+        ampere = current_units[0, row]
+        limit = current_units[1, row]
         shown = np.rint(current_a[row] * (sign / ampere))
         write_le(table[row], at_current, int(min(max(shown, -limit), limit)), 2)
         write_le(table[row], at_velocity, int(np.rint(velocity_rad_s[row] * (sign / rad_s))), 4)
@@ -89,11 +92,17 @@ def fill_replies(
         block: (3,) address and length of the data, and address of Hardware Error Status.
 
     """
-    head, share, error_at, data_at = shape[0], shape[1], shape[2], shape[3]
-    address, length, status = block[0], block[1], block[2]
+    head = shape[0]
+    share = shape[1]
+    error_at = shape[2]
+    data_at = shape[3]
+    address = block[0]
+    length = block[1]
+    status = block[2]
     crc = crc_of(packet, 0, head, 0)
     for k in range(len(rows)):
-        row, start = rows[k], head + k * share
+        row = rows[k]
+        start = head + k * share
         packet[start + error_at] = 0x80 if table[row, status] else 0
         for j in range(length):
             packet[start + data_at + j] = table[row, address + j]
@@ -177,7 +186,8 @@ def accept_goals(
     """
     taken[:] = False
     for k in range(len(rows)):
-        row, entry = rows[k], at + 5 * k + 1
+        row = rows[k]
+        entry = at + 5 * k + 1
         ticks = 0
         for j in range(4):
             ticks |= int(raw[entry + j]) << (8 * j)

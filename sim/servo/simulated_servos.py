@@ -47,7 +47,8 @@ class SimulatedServos(ABC):
     def __init__(self, plant: Plant, drive: ServoDrive) -> None:
         """Set up supply and time; subclasses set up registers."""
         servos = len(drive.torque_on)
-        self.plant, self.drive = plant, drive
+        self.plant = plant
+        self.drive = drive
         self.blocked_shaft = BlockedShaft(drive)
         self.events = EventQueue()
         """Events that happen to the servos at a time of their own, such as faults."""

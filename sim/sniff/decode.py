@@ -27,8 +27,10 @@ from snakewalk.drivers.protocol.parser import PacketParser
 Span = tuple[int, int]
 """Address and length of a block."""
 _GROUP_READS = (
-    *(Instruction.SYNC_READ, Instruction.FAST_SYNC_READ),
-    *(Instruction.BULK_READ, Instruction.FAST_BULK_READ),
+    Instruction.SYNC_READ,
+    Instruction.FAST_SYNC_READ,
+    Instruction.BULK_READ,
+    Instruction.FAST_BULK_READ,
 )
 
 
@@ -109,7 +111,8 @@ class Decoder:
         packets = self._reader.feed(data)
         damaged = self._reader.crc_errors - self._crc
         lost = self._reader.dropped_bytes - self._dropped
-        self._crc, self._dropped = self._reader.crc_errors, self._reader.dropped_bytes
+        self._crc = self._reader.crc_errors
+        self._dropped = self._reader.dropped_bytes
         if damaged or lost:
             name = "wrong CRC" if damaged else "no packet"
             yield DecodedPacket(time_s, "noise", -1, name, {"bytes": lost}, data.hex(" "))
@@ -120,7 +123,9 @@ class Decoder:
                 yield self._answer(time_s, packet)
 
     def _question(self, time_s: float, packet: InstructionPacket) -> DecodedPacket:
-        code, params, servo_id = packet.instruction, packet.params, packet.servo_id
+        code = packet.instruction
+        params = packet.params
+        servo_id = packet.servo_id
         known = code in Instruction.__members__.values()
         name = Instruction(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
         self._last = code
@@ -135,7 +140,8 @@ class Decoder:
         elif code in _GROUP_READS:
             values = self._group_read(code, params)
         elif code == Instruction.SYNC_WRITE and len(params) >= 4:
-            address, size = _word(params, 0), _word(params, 2)
+            address = _word(params, 0)
+            size = _word(params, 2)
             for at in range(4, len(params) - size, size + 1):
                 part = self._values(params[at], address, params[at + 1 : at + 1 + size])
                 values |= {f"{params[at]}: {key}": value for key, value in part.items()}
@@ -197,7 +203,8 @@ class Decoder:
         values: dict[str, object] = {}
         at = 0
         for _, (address, size) in self._fast:
-            error, servo_id = said[at], said[at + 1] if at + 1 < len(said) else -1
+            error = said[at]
+            servo_id = said[at + 1] if at + 1 < len(said) else -1
             data = said[at + 2 : at + 2 + size]
             if len(data) < size:
                 break

@@ -44,7 +44,9 @@ def read_exchange(path: Path) -> Iterator[tuple[float, bool, bytes]]:
     for number, line in enumerate(text.splitlines(), 1):
         try:
             entry = parse_json(line)
-            time_s, side, data = float(entry["t"]), entry["from"], bytes.fromhex(entry["hex"])
+            time_s = float(entry["t"])
+            side = entry["from"]
+            data = bytes.fromhex(entry["hex"])
         except (ValueError, KeyError, TypeError):
             raise InputError(
                 f"{path}: line {number}: no packet as bus serve --record writes it"
