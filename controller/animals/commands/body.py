@@ -203,7 +203,8 @@ class _Made:
 
     def solid(self, body: _Measured, skeleton: Floats | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
-        one, worn = body.model, body.texture
+        one = body.model
+        worn = body.texture
         mesh = body_mesh(one, straight() if skeleton is None else skeleton)
         corners = len(mesh.vertices)
         if worn.is_around:
@@ -229,7 +230,8 @@ class _Made:
 
     def skin(self, body: BodySkin, animate: str | None, fps: float | None) -> None:
         facts: dict[str, object] = {}
-        skin, motion = body.skin, None
+        skin = body.skin
+        motion = None
         if animate is None:
             files = self._write(skin.mesh, body.texture)
         else:

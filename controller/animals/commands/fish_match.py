@@ -83,9 +83,15 @@ def match(
     else:
         with ProgressBar("frames", transient=True) as bar:
             matched = match_footage(
-                footage, side, background, side_background, build=build, rate_hz=rate,
-                length_m=length, on_progress=bar.update,
-            )  # fmt: skip
+                footage,
+                side,
+                background,
+                side_background,
+                build=build,
+                rate_hz=rate,
+                length_m=length,
+                on_progress=bar.update,
+            )
     accuracy = None if known is None else compare(matched.postures, known)
     with atomic_write(output) as part:
         save_postures(part, matched.postures)

@@ -56,10 +56,13 @@ def _warn(facts: SynthesisFacts) -> None:
     if facts.wall_distance is not None and facts.wall_distance < 0.0:
         LOGGER.warning(
             "--tank: the fish leaves the tank by %.3g; its segments turn too little; %s",
-            -facts.wall_distance, advice,
-        )  # fmt: skip
+            -facts.wall_distance,
+            advice,
+        )
     elif facts.pieces_too_close:
         LOGGER.warning(
             "%s of %s segments come nearer than --apart to walls or fish; %s",
-            facts.pieces_too_close, facts.pieces_used, advice,
-        )  # fmt: skip
+            facts.pieces_too_close,
+            facts.pieces_used,
+            advice,
+        )

@@ -101,9 +101,13 @@ def people(
     rig = person.rig if worn is None else worn
     with atomic_write(output) as part:
         write_skin(
-            part, rig, made.bones, person.texture if worn is None else texture, gait.name,
+            part,
+            rig,
+            made.bones,
+            person.texture if worn is None else texture,
+            gait.name,
             both_sides=True,
-        )  # fmt: skip
+        )
     if picture is not None:
         rest, stages = _view().stages_of_cycle(person, made, (worn, texture))
         pictures()[2].draw_person(picture, person, rest, stages, f"{gait.name}, feet: {feet}")
@@ -192,13 +196,13 @@ def _slide_m(made: PersonMotion) -> float:
 def _lowest_m(person: Person, made: PersonMotion) -> float:
     """Lowest corner of the skin over the cycle."""
     return min(
-        float(posed_m(person.rig, made.bones, k)[:, 2].min())
-        for k in range(len(made.bones.time_s))
-    )  # fmt: skip
+        float(posed_m(person.rig, made.bones, k)[:, 2].min()) for k in range(len(made.bones.time_s))
+    )
 
 
 def _difference_m(person: Person, made: PersonMotion) -> float:
     """Largest distance of the played skin from the solved surface, at a quarter of the cycle."""
-    k, bones = FRAMES // 4, made.bones
+    k = FRAMES // 4
+    bones = made.bones
     solved = person.solved_m(bones.front_m[k], bones.rotation[k])
     return float(np.linalg.norm(posed_m(person.rig, bones, k) - solved, axis=1).max())

@@ -97,7 +97,8 @@ def skin_picture(
             LOGGER.warning(
                 "%s: shows no part of the body that %s or a matched photograph shows; its "
                 "brightness stays as it is",
-                *(file, files[0]),
+                file,
+                files[0],
             )
     facts = {
         "texture": files,
@@ -118,7 +119,8 @@ def _shown(one: Shot, top: Silhouettes, side: Silhouettes | None) -> tuple[Image
             "give their .npz as --side"
         )
     check_frame(str(one.file), track.points, one.frame)
-    image, points = _read_picture(one.file), track.points[one.frame]
+    image = _read_picture(one.file)
+    points = track.points[one.frame]
     if not track.pixels:
         raise InputError(
             f"{one.file}: the track holds no places in pictures (points_px, skeletons)"

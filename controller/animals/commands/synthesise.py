@@ -132,9 +132,15 @@ def synthesise(
     """Make an animal's motion over a world: a snake from states ([PT]), or legs ([KP])."""
     record = None if tongue is None or animal is not None else TongueRecord.read(tongue)
     prepared = prepare_walk(
-        run, keys=key_values("--set", set_), on_paper=True, seed=seed, motion=motion, robot=robot,
-        world=world, track=track,
-    )  # fmt: skip
+        run,
+        keys=key_values("--set", set_),
+        on_paper=True,
+        seed=seed,
+        motion=motion,
+        robot=robot,
+        world=world,
+        track=track,
+    )
     if prepared.run.motion not in _SYNTHESISED:
         raise InputError(f"--motion {prepared.run.motion}: {', '.join(_SYNTHESISED)}")
     name = Path(prepared.run.name) if output is None else output

@@ -83,7 +83,8 @@ def match_footage(
     model = fish_model(build)
     above = open_film(top, background, rate_hz)
     beside = None if side is None else open_film(side, side_background, rate_hz)
-    total, done = above.footage.count, 0
+    total = above.footage.count
+    done = 0
 
     def count() -> None:
         nonlocal done

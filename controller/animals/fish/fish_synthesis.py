@@ -105,11 +105,16 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
     around = _surroundings(source, options)
     reached: dict[str, Any] = {}
     if options.through:
-        points, radius = np.array(options.through), options.radius * source.length
+        points = np.array(options.through)
+        radius = options.radius * source.length
         sequence = sequence_through(
-            pieces, points, radius=0.5 * radius, limit_s=options.limit_s,
-            capture=max(_CAPTURE * source.length, radius), around=around,
-        )  # fmt: skip
+            pieces,
+            points,
+            radius=0.5 * radius,
+            limit_s=options.limit_s,
+            capture=max(_CAPTURE * source.length, radius),
+            around=around,
+        )
         found = steered(
             compose(pieces, sequence, options.blend_s, around.start),
             points,
@@ -127,9 +132,11 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         sequence = random_sequence(pieces, options.seconds, rng, around)
         composed = compose(pieces, sequence, options.blend_s, around.start)
     motion = replace(
-        composed, name=f"{source.name}, put together anew", source=source.source,
+        composed,
+        name=f"{source.name}, put together anew",
+        source=source.source,
         licence=source.licence,
-    )  # fmt: skip
+    )
     retarget = Retarget(robot)
     joints = joint_motion(pieces, sequence, retarget, options.blend_s)
     kinds = Counter(str(segment.kind) for segment in segments)
@@ -148,10 +155,10 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
     facts = replace(facts, **reached)
     if motion.height is not None and motion.pitch_rad is not None:
         facts = replace(
-            facts, height_range=_range(motion.height), pitch_range_deg=_range(
-                np.degrees(motion.pitch_rad)
-            ),
-        )  # fmt: skip
+            facts,
+            height_range=_range(motion.height),
+            pitch_range_deg=_range(np.degrees(motion.pitch_rad)),
+        )
     steps = _steps(joint_pieces(pieces, sequence, retarget))
     if len(steps):
         after = np.abs(np.diff(joints, axis=0))[junctions(pieces, sequence)]
@@ -199,7 +206,8 @@ def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
             raise InputError(
                 f"{file}: is not a track of snakewalk animal fish synthesise; make one"
             )
-        base, rate_hz = np.asarray(held["base"], float), float(held["rate_hz"])
+        base = np.asarray(held["base"], float)
+        rate_hz = float(held["rate_hz"])
         time_s = np.arange(len(base)) / rate_hz
         even = np.arange(0.0, time_s[-1] + 1e-9, 1.0 / source.rate_hz)
         others.append(np.column_stack([np.interp(even, time_s, base[:, k]) for k in (0, 1)]))

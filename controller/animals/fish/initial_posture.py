@@ -23,7 +23,8 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
     rows, columns = np.nonzero(mask)
     if len(rows) < 8:
         return None
-    top, left = int(rows.min()), int(columns.min())
+    top = int(rows.min())
+    left = int(columns.min())
     part = mask[top : rows.max() + 1, left : columns.max() + 1].astype(np.uint8) * 255
     scale = min(1.0, size_px / max(part.shape))
     shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
@@ -41,8 +42,10 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
     smooth = np.stack(
         [points[max(0, k - soft) : k + soft + 1].mean(axis=0) for k in range(len(points))]
     )
-    ends = [_beyond(smooth, float(depth[tuple(path[0])])),
-            _beyond(smooth[::-1], float(depth[tuple(path[-1])]))]  # fmt: skip
+    ends = [
+        _beyond(smooth, float(depth[tuple(path[0])])),
+        _beyond(smooth[::-1], float(depth[tuple(path[-1])])),
+    ]
     whole = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
     return np.asarray((whole + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
 

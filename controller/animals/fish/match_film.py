@@ -84,7 +84,8 @@ def match_film(
     numbers = set(np.linspace(0, frames - 1, min(frames, SAMPLE)).astype(int).tolist())
     sample = [frame for k, frame in enumerate(top()) if k in numbers]
     model = calibrate(model, sample, name)
-    camera, side_view = None, None
+    camera = None
+    side_view = None
     if side is not None:
         side_sample = [frame for k, frame in enumerate(side()) if k in numbers]
         if len(side_sample) != len(sample):
@@ -92,7 +93,9 @@ def match_film(
         camera = align(sample, side_sample, name)
         model = _with_height(model, camera, sample, side_sample)
         side_view = SideView(model, camera)
-    rows, sides, values = [], [], []
+    rows = []
+    sides = []
+    values = []
     lost: dict[str, int] = {}
     side_frames = side() if side is not None else None
     no_posture, no_side = np.full(3 + model.joints, np.nan), np.full(2, np.nan)

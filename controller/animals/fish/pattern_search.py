@@ -52,7 +52,9 @@ def pattern_search(
                 at[k] = here
         return at, best
 
-    here, best, size = np.array(start, dtype=float), score(start), np.array(steps, dtype=float)
+    here = np.array(start, dtype=float)
+    best = score(start)
+    size = np.array(steps, dtype=float)
     for _ in range(halvings + 1):
         while used < evaluations:
             there, found = explore(here, best, size)
@@ -60,7 +62,8 @@ def pattern_search(
                 break
             while found > best and used < evaluations:
                 leap = there + (there - here)
-                here, best = there, found
+                here = there
+                best = found
                 there, found = explore(leap, score(leap), size)
         size *= 0.5
     return here, best

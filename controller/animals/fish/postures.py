@@ -230,5 +230,6 @@ def _model(path: Path, held: dict[str, Any], joints_at: tuple[float, ...]) -> Fi
     wide, high = (np.asarray(held[key], float) for key in _SECTIONS)
     if any(one.shape != (STATIONS,) or not np.isfinite(one).all() for one in (wide, high)):
         raise InputError(f"{path}: {' and '.join(_SECTIONS)} must be {STATIONS} numbers each")
-    size, fin = float(held["length_px"]), float(held.get("fin", 0.0))
+    size = float(held["length_px"])
+    fin = float(held.get("fin", 0.0))
     return FishModel(size, joints_at, wide, high, str(held["build"]), fin)

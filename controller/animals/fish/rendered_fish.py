@@ -132,7 +132,8 @@ def _fin_ends(points: Floats, width: Floats, length: float) -> list[tuple[Floats
 def _blade(places: Floats, root: Floats, tip: Floats) -> Floats:
     """(n,) how much of each pixel a fin covers, which widens a little to its round tip."""
     length = float(np.hypot(*(tip - root)))
-    way, away = (tip - root) / length, places - root
+    way = (tip - root) / length
+    away = places - root
     on = np.clip(away @ way, 0.0, length)
     gap = np.hypot(*(away - on[:, None] * way).T)
     return np.asarray(np.clip(length * (0.14 + 0.08 * on / length) - gap + 0.5, 0.0, 1.0))

@@ -56,12 +56,14 @@ def basic_frames(angles_rad: Floats, reference_rad: Floats, within_rad: float) -
 def commonest_posture(angles_rad: Floats, within_rad: float) -> Floats:
     """(J,) the frame's posture that the motion comes back to most often."""
     known = angles_rad[np.isfinite(angles_rad).all(axis=1)]
-    best, most = known[0], -1
+    best = known[0]
+    most = -1
     for posture in known[:: max(1, len(known) // 400)]:
         at = basic_frames(angles_rad, posture, within_rad)
         visits = int(np.count_nonzero(at[1:] & ~at[:-1])) + int(at[0])
         if visits > most:
-            best, most = posture, visits
+            best = posture
+            most = visits
     return np.asarray(best)
 
 

@@ -79,7 +79,8 @@ class SideView:
         model = self._model
         scale = min(1.0, 180.0 / model.length_px)
         edge = max(8, round(0.15 * model.length_px))
-        left, top = max(int(columns[0]) - edge, 0), max(int(rows[0]) - edge, 0)
+        left = max(int(columns[0]) - edge, 0)
+        top = max(int(rows[0]) - edge, 0)
         right = min(int(columns[-1]) + edge, frame.mask.shape[1])
         bottom = min(int(rows[-1]) + edge, frame.mask.shape[0])
         window = Window(left, top, right - left, bottom - top, scale)

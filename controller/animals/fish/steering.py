@@ -44,9 +44,12 @@ def steered(
 
     """
     place = _place(motion, points.shape[1])
-    head, pitch = motion.head_rad.copy(), np.zeros(motion.frames)
+    head = motion.head_rad.copy()
+    pitch = np.zeros(motion.frames)
     samples = round(_SEARCH_S * motion.rate_hz)
-    begin, at, turned = 0, [], 0.0
+    begin = 0
+    at = []
+    turned = 0.0
     for number, (point, guess) in enumerate(zip(points, reached_at, strict=True), 1):
         # each later point needs a later frame
         end = min(guess + samples + 1, motion.frames - (len(points) - number))

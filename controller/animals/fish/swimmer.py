@@ -52,7 +52,9 @@ def swim(
     """
     joints_at = fish_model(build).joints_at
     share = np.linspace(0.0, 1.0, len(joints_at))
-    head, angles, speed = [0.0], [np.zeros(len(joints_at))], [0.8]
+    head = [0.0]
+    angles = [np.zeros(len(joints_at))]
+    speed = [0.8]
     for stroke in script:
         count = round(stroke.seconds * rate_hz)
         start = head[-1]

@@ -25,7 +25,8 @@ STEERED = 0.2
 _BEAM = 40
 _BEAM_EACH = 3
 _DEPTH = 5
-_LOOK, _LOOK_BEAM = 5, 6
+_LOOK = 5
+_LOOK_BEAM = 6
 """Pieces that a random motion looks ahead in a tank, and sequences that it compares."""
 
 
@@ -213,14 +214,18 @@ def compose(
     A film with a side view also gives height, which continues from piece to piece, and pitch.
     """
     parts = [pieces.pieces[k] for k in sequence.order]
-    base, head = [], []
-    origin, direction = np.array(start[:2]), start[2]
+    base = []
+    head = []
+    origin = np.array(start[:2])
+    direction = start[2]
     for part in parts:
         base.append(placed(part.base, origin, direction))
         head.append(part.head_rad + direction)
-        origin, direction = base[-1][-1], float(head[-1][-1])
+        origin = base[-1][-1]
+        direction = float(head[-1][-1])
     samples = max(1, round(blend_s * pieces.rate_hz))
-    rise, up = [], 0.0
+    rise = []
+    up = 0.0
     for part in parts:
         if part.rise is not None:
             rise.append(part.rise + np.array([up, 0.0]))
@@ -247,7 +252,9 @@ def junctions(pieces: PieceGraph, sequence: PieceSequence) -> list[int]:
 def _ahead(pieces: PieceGraph, here: _Node, aim: _Aim, depth: int) -> _Node:
     """Return the first piece of the best sequence found."""
     reached = len(here.reached_at)
-    beam, best, first = [here], None, len(here.order)
+    beam = [here]
+    best = None
+    first = len(here.order)
     for level in range(depth):
         grown = [
             _take(pieces, node, k, by_rule, aim)
@@ -298,7 +305,8 @@ def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim)
         path = np.column_stack([path, node.base[2] + part.rise[:, 0]])
     step = np.diff(path[:, :2], axis=0)
     way = node.way + np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
-    reached, at = node.reached_at, 1
+    reached = node.reached_at
+    at = 1
     while len(reached) < len(aim.points):
         found = aim.nearest(path[at:], way[at:], len(reached))
         if found is None:
@@ -307,8 +315,11 @@ def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim)
         missing = aim.points[len(reached)] - path[at]
         if np.linalg.norm(missing) > aim.radius:  # from here on the motion is steered through it
             path[at:] += missing
-        reached, way = (*reached, node.samples + at), way - way[at]
-    crowded, clearance, head_rad = False, np.inf, node.head_rad + float(part.head_rad[-1])
+        reached = (*reached, node.samples + at)
+        way = way - way[at]
+    crowded = False
+    clearance = np.inf
+    head_rad = node.head_rad + float(part.head_rad[-1])
     if aim.around.any:
         clearance = aim.around.clearance(path, node.samples)
         crowded = clearance < aim.around.apart

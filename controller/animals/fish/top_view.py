@@ -51,11 +51,13 @@ def window_of(
         if high_x - low_x < 2 or high_y - low_y < 2:
             return None
     part = frame.mask[low_y:high_y, low_x:high_x]
-    tall, wide = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
+    tall = np.flatnonzero(part.any(axis=1))
+    wide = np.flatnonzero(part.any(axis=0))
     if len(tall) == 0:
         return None
     edge = max(8, round(0.15 * model.length_px))
-    left, top = max(low_x + int(wide[0]) - edge, 0), max(low_y + int(tall[0]) - edge, 0)
+    left = max(low_x + int(wide[0]) - edge, 0)
+    top = max(low_y + int(tall[0]) - edge, 0)
     right = min(low_x + int(wide[-1]) + edge, columns)
     bottom = min(low_y + int(tall[-1]) + edge, rows)
     return Window(left, top, right - left, bottom - top, scale)
@@ -65,7 +67,9 @@ class TopViewFit:
     """A frame at one size, as a function of the posture's parameters (3 + J,)."""
 
     def __init__(self, target: Target, model: FishModel, weight: float = EDGE_WEIGHT) -> None:
-        self._target, self._model, self._weight = target, model, weight
+        self._target = target
+        self._model = model
+        self._weight = weight
 
     def outline(self, at: Floats) -> Floats:
         """(n, 2) outline of parameters."""
@@ -163,7 +167,8 @@ def refine(
     here = np.array(start, dtype=float)
     kinks = stiffness * _alternation(len(start))
     apart = target - picture(here)
-    cost, damping = float(np.vdot(apart, apart)) + float(here @ kinks @ here), 1e-2
+    cost = float(np.vdot(apart, apart)) + float(here @ kinks @ here)
+    damping = 1e-2
     for _ in range(rounds):
         slope = np.empty((count, apart.size), dtype=np.float32)
         for k in range(count):
@@ -181,7 +186,10 @@ def refine(
             found = float(np.vdot(away, away)) + float((here + step) @ kinks @ (here + step))
             if found < cost:
                 gained = cost - found
-                here, apart, cost, damping = here + step, away, found, max(damping / 5.0, 1e-4)
+                here = here + step
+                apart = away
+                cost = found
+                damping = max(damping / 5.0, 1e-4)
                 break
             damping *= 5.0
         if gained < 1e-3 * cost:

@@ -36,7 +36,9 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
     """
     length_m = animal.length_m
     base = spine_rig(skin, np.full(SEGMENTS, length_m / SEGMENTS))
-    parts, rest, parent = [(base.mesh, base.held)], list(base.rest_m), base.parent.tolist()
+    parts = [(base.mesh, base.held)]
+    rest = list(base.rest_m)
+    parent = base.parent.tolist()
 
     def hang(corners: Floats, carrier: int, uv: tuple[float, float]) -> None:
         """Add a bone with its part."""

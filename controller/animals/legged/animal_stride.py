@@ -72,7 +72,8 @@ class MeasuredAnimal:
 
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
-        found, animal = self.stride, self.animal
+        found = self.stride
+        animal = self.animal
         return {
             "rate_hz": self.rate_hz,
             "rate_assumed": self.rate_assumed,

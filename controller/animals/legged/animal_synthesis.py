@@ -37,7 +37,8 @@ class SynthesisedAnimal:
 
     def reached_s(self) -> list[float]:
         """When the middle of the trunk came within the radius of each waypoint."""
-        at, middle = 0, self.middle_m
+        at = 0
+        middle = self.middle_m
         found = []
         for point in self.waypoints_m:
             near = np.hypot(*(middle[at:] - point).T) <= self.waypoint_radius_m
@@ -60,14 +61,16 @@ class SynthesisedAnimal:
     @property
     def slip_m(self) -> float:
         """Largest distance that a foot moved while it was on the ground."""
-        foot, on = self.motion.foot_m, self.motion.on_ground
+        foot = self.motion.foot_m
+        on = self.motion.on_ground
         stays = on[1:] & on[:-1]
         return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays].max(initial=0.0))
 
     @property
     def stance_slip_m(self) -> float:
         """Largest distance between the places where a foot came down and where it left."""
-        foot, on = self.motion.foot_m, self.motion.on_ground
+        foot = self.motion.foot_m
+        on = self.motion.on_ground
         way = np.linalg.norm(np.diff(foot, axis=0), axis=-1) * (on[1:] & on[:-1])
         total = np.concatenate([np.zeros((1, way.shape[1])), np.cumsum(way, axis=0)])
         begun = np.maximum.accumulate(np.where(on, 0.0, total), axis=0)
@@ -75,7 +78,8 @@ class SynthesisedAnimal:
 
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
-        animal, motion = self.animal, self.motion
+        animal = self.animal
+        motion = self.motion
         spine = motion.spine_m
         stretch = np.linalg.norm(np.diff(spine, axis=1), axis=-1).sum(axis=1) / animal.length_m
         low = spine[..., 2]
@@ -161,7 +165,8 @@ def synthesise_animal(
         InputError: the path bends more sharply than the animal is wide.
 
     """
-    run, path = prepared.run, prepared.path
+    run = prepared.run
+    path = prepared.path
     rate_hz = max(run.synthesis.rate_hz, CYCLE_FRAMES / animal.cycle_s)
     to_end = frames is None
     if frames is None:

@@ -21,7 +21,8 @@ DUTIES = (0.12, 0.93)
 _PLACES = 16
 _SHAPES = (1.8, 3.0)
 _SHAPE_LIMITS = (1.2, 5.0)
-_SHAPE, _SHAPE_SPREAD = np.log(2.3), 0.5
+_SHAPE = np.log(2.3)
+_SHAPE_SPREAD = 0.5
 """Logarithm of the expected p and q and its standard deviation (ours)."""
 
 
@@ -78,7 +79,8 @@ def fit_contacts(
 
     shape0 = float(np.log(np.median([start[2] for start in starts])))
     low, high = np.log(_SHAPE_LIMITS)
-    duties, downs = [start[0] for start in starts], [start[1] for start in starts]
+    duties = [start[0] for start in starts]
+    downs = [start[1] for start in starts]
     found = least_squares(
         left,
         np.array([*duties, *downs, shape0, shape0]),
@@ -91,7 +93,8 @@ def fit_contacts(
     shape = float(np.exp(found[-2])), float(np.exp(found[-1]))
     contacts = []
     for k in range(count):
-        duty, down = float(found[k]), float(found[count + k]) % 1.0
+        duty = float(found[k])
+        down = float(found[count + k]) % 1.0
         rest = ahead[k] - step((phases[k] - down) % 1.0, stride, duty, shape)
         contacts.append(Contact(duty, down, float(rest.mean()), float(rest.std())))
     return contacts, shape

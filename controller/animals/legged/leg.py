@@ -30,9 +30,14 @@ class LegFrame:
 
 
 def leg_joints_m(
-    pair: LegPairConfig, length_m: float, root_m: Floats, toe_m: Floats, air: Floats,
-    frame: LegFrame, side: float,
-) -> Floats:  # fmt: skip
+    pair: LegPairConfig,
+    length_m: float,
+    root_m: Floats,
+    toe_m: Floats,
+    air: Floats,
+    frame: LegFrame,
+    side: float,
+) -> Floats:
     """Joints (T, J, 3) of one leg, from root to toe.
 
     Args:
@@ -125,7 +130,8 @@ def triangle_m(
     turn = np.exp(1j * np.arccos(np.clip(cosine, -1.0, 1.0))) * long_m / rigid
     segments = [turn * part for part in first]
     segments += [reach - turn * rigid, *(turn * part for part in third)]
-    joints, at = [root_m], np.zeros_like(rigid)
+    joints = [root_m]
+    at = np.zeros_like(rigid)
     for segment in segments:
         at = at + segment
         joints.append(root_m + at.real[:, None] * down + at.imag[:, None] * out)

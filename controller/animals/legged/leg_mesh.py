@@ -53,7 +53,8 @@ def leg_parts(
     if pair.foot == 0.0 or pair.sole == "round":
         return parts
     hoof = pair.sole == "hoof"
-    sine, cosine = np.sin(np.radians(pair.foot_deg)), np.cos(np.radians(pair.foot_deg))
+    sine = np.sin(np.radians(pair.foot_deg))
+    cosine = np.cos(np.radians(pair.foot_deg))
     # from ahead, left and up of the foot on the ground into the foot's bone
     turn = np.array([[-sine, 0.0, cosine], [0.0, -1.0, 0.0], [cosine, 0.0, sine]])
     tip = np.array([-long_m.sum(), 0.0, 0.0])  # of the leg at rest
@@ -94,7 +95,11 @@ def _tube(
     """Return the leg from its root to its toe, or into its hoof."""
     wide_m, deep_m = (length_m * radii for radii in _radii(pair))
     starts = np.concatenate([[0.0], np.cumsum(long_m)])
-    x, width, depth, bones, shares = [], [], [], [], []
+    x = []
+    width = []
+    depth = []
+    bones = []
+    shares = []
     last = len(long_m) - 1
     for k, long in enumerate(long_m):
         on = np.linspace(0.0, 1.0, _ROWS, endpoint=False)
@@ -121,7 +126,8 @@ def _tube(
     turn = np.arange(AROUND) * TURN / AROUND
     y, z = np.outer(wide, np.cos(turn)), np.outer(deep, np.sin(turn))
     corners = np.stack([np.repeat(rings, AROUND), y.ravel(), z.ravel()], axis=-1)
-    top, end = [_CAP * wide_m[0], 0.0, 0.0], [rings[-1] - 0.6 * wide[-1], 0.0, 0.0]
+    top = [_CAP * wide_m[0], 0.0, 0.0]
+    end = [rings[-1] - 0.6 * wide[-1], 0.0, 0.0]
     corners = np.vstack([corners, top, end])
     held = [np.repeat(np.concatenate(parts), AROUND, axis=0) for parts in (bones, shares)]
     ends = np.array([[0, 0, min(1, last)], [max(last - 1, 0), last, last]])
@@ -138,7 +144,8 @@ def _shared(away_m: Floats, own_m: float, other_m: float) -> Floats:
 
 def _radii(pair: LegPairConfig) -> tuple[Floats, Floats]:
     """Half widths and half depths at the joints from root to toe, over the body's length."""
-    thick, thin = pair.thick, 0.5 * pair.thick if pair.thin is None else pair.thin
+    thick = pair.thick
+    thin = 0.5 * pair.thick if pair.thin is None else pair.thin
     if pair.cannon > 0.0:
         width = [thick, 0.62 * thick, 1.45 * thin, 1.25 * thin]
         depth = [pair.deep * thick, 0.95 * thick, 1.9 * thin, 1.4 * thin]
@@ -156,7 +163,8 @@ def _radii(pair: LegPairConfig) -> tuple[Floats, Floats]:
 
 def _hoof(pair: LegPairConfig, length_m: float, _side: float) -> list[tuple[Floats, int]]:
     """Two claws, flat on the ground; the tip of the toe is the origin: ahead, left, up."""
-    long, high = length_m * pair.toe, 0.62 * length_m * pair.toe
+    long = length_m * pair.toe
+    high = 0.62 * length_m * pair.toe
     thin = 0.5 * pair.thick if pair.thin is None else pair.thin
     half = 0.62 * length_m * thin
     turn = np.arange(AROUND) * TURN / AROUND
@@ -181,13 +189,15 @@ def _hoof(pair: LegPairConfig, length_m: float, _side: float) -> list[tuple[Floa
 def _toes(pair: LegPairConfig, length_m: float, side: float) -> list[tuple[Floats, int]]:
     """Five toes that spread from the end of the sole, and end on the ground."""
     thin = length_m * (0.5 * pair.thick if pair.thin is None else pair.thin)
-    around, found = AROUND // 2, []
+    around = AROUND // 2
+    found = []
     turn = np.arange(around) * TURN / around
     for share, out_deg in _TOES:
         out = side * np.radians(out_deg)
         ahead = np.array([np.cos(out), np.sin(out), 0.0])
         beside = np.array([-np.sin(out), np.cos(out), 0.0])
-        rings, middles = [], []
+        rings = []
+        middles = []
         for on, radius in ((0.0, 0.5), (0.35, 0.42), (0.7, 0.34), (1.0, 0.14)):
             at = share * length_m * pair.toe * on * ahead
             at[2] += thin * (0.25 * np.sin(np.pi * on) - (1.0 - radius) * on**0.5)

@@ -77,9 +77,11 @@ class PathNormals:
             InputError: a point is further from the path than the path's centre of curvature.
 
         """
-        s, beside = points[..., 0], points[..., 1]
+        s = points[..., 0]
+        beside = points[..., 1]
         on = np.clip(s, 0.0, self.length_m)
-        slope, bend = self._slope(on), self._bend(on)
+        slope = self._slope(on)
+        bend = self._bend(on)
         speed = np.hypot(slope[..., 0], slope[..., 1])
         forward = slope / speed[..., None]
         curvature = (slope[..., 0] * bend[..., 1] - slope[..., 1] * bend[..., 0]) / speed**3
@@ -118,7 +120,8 @@ def transformed(
         turned = np.einsum("tij,tkj->tki", turn, points - centre[:, None])
         return np.asarray(turned + base[:, None])
 
-    spine, hip = stood(spine), stood(hip)
+    spine = stood(spine)
+    hip = stood(hip)
     frame = body_frame(spine, up)
     front_left, front_right, hind_left, hind_right = (
         leg_joints_m(
@@ -148,8 +151,10 @@ def local_planes(plan_m: Floats, height_m: Floats) -> tuple[Floats, Floats, Floa
         middles (T, 2) of the places, heights (T,) of the planes there, upward normals (T, 3).
 
     """
-    middle, level = plan_m.mean(axis=1), height_m.mean(axis=1)
-    off, rise = plan_m - middle[:, None], height_m - level[:, None]
+    middle = plan_m.mean(axis=1)
+    level = height_m.mean(axis=1)
+    off = plan_m - middle[:, None]
+    rise = height_m - level[:, None]
     xx, xy, yy = ((off[..., a] * off[..., b]).sum(axis=1) for a, b in ((0, 0), (0, 1), (1, 1)))
     zx, zy = ((off[..., a] * rise).sum(axis=1) for a in (0, 1))
     determinant = xx * yy - xy * xy

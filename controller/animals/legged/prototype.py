@@ -48,7 +48,11 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     cycles = time_s / animal.cycle_s
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
     phase = [_since_down(pair, cycles) for pair in animal.leg_pairs]
-    foot, hip, contact, air, high = [], [], [], [], []
+    foot = []
+    hip = []
+    contact = []
+    air = []
+    high = []
     for pair, at in zip(animal.leg_pairs, phase, strict=True):
         ahead, rise, on = footfall(animal, pair, at)
         high.append(_ride(animal, pair, ahead, at))

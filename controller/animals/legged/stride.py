@@ -123,9 +123,11 @@ def measure_stride(
 
     """
     time_s = np.arange(len(spine)) / rate_hz
-    spine, feet = _bridged(spine, time_s), np.asarray(feet, float)
+    spine = _bridged(spine, time_s)
+    feet = np.asarray(feet, float)
     length = float(np.median(np.linalg.norm(np.diff(spine, axis=1), axis=-1).sum(axis=1)))
-    spine, feet = spine / length, feet / length
+    spine = spine / length
+    feet = feet / length
     mean = np.linalg.norm(np.diff(spine, axis=1), axis=-1).mean(axis=0)
     places = np.concatenate([[0.0], np.cumsum(mean)]) / mean.sum()
     from_side = view == "side"
@@ -164,18 +166,29 @@ def measure_stride(
         on = (phase - one.down) % 1.0 < one.duty
         spread = _spread(phase, ahead[:, k], stride, one, shape)
         aside = float(np.abs(_median(side[on, k])))
-        down, long = (one.down - first) % 1.0, stride * one.duty
+        down = (one.down - first) % 1.0
+        long = stride * one.duty
         found.append(Foot(one.duty, spread, down, long, one.ahead, aside, one.residual))
     at = float(places[front]), float(places[hind])
-    turned, lifts = (float("nan"), float("nan")), (float("nan"), float("nan"))
+    turned = (float("nan"), float("nan"))
+    lifts = (float("nan"), float("nan"))
     if from_side:
         lifts = _lifts(fitted, phase, height)
     else:
         turned = _turns(spine, travel, phase, places, at)
     return Stride(
-        1.0 / frequency_hz, float(cycles), stride, length, at, turned,
-        (found[0], found[1], found[2], found[3]), phase - first, ahead, shape, lifts,
-    )  # fmt: skip
+        1.0 / frequency_hz,
+        float(cycles),
+        stride,
+        length,
+        at,
+        turned,
+        (found[0], found[1], found[2], found[3]),
+        phase - first,
+        ahead,
+        shape,
+        lifts,
+    )
 
 
 def _fitted(
@@ -205,7 +218,8 @@ def _lifts(fitted: list[Contact], phase: Floats, height: Floats) -> tuple[float,
         rise = lift((phase[seen] - one.down) % 1.0, one.duty)
         basis = np.stack([np.ones_like(rise), rise], axis=-1)
         found.append(float(np.linalg.lstsq(basis, height[seen, k], rcond=None)[0][1]))
-    front, hind = 0.5 * (found[0] + found[1]), 0.5 * (found[2] + found[3])
+    front = 0.5 * (found[0] + found[1])
+    hind = 0.5 * (found[2] + found[3])
     return max(front, 0.0), max(hind, 0.0)
 
 

@@ -89,7 +89,8 @@ def read_silhouettes(file: Path) -> Silhouettes:
         held.setdefault("radius_px", 0.5 * held["width"])
     for where, how in _PAIRS:
         if where in held and how in held:
-            points, radius = held[where].astype(float), held[how].astype(float)
+            points = held[where].astype(float)
+            radius = held[how].astype(float)
             break
     else:
         raise InputError(

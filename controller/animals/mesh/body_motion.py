@@ -80,7 +80,8 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
         fish = load_postures(path)
         points = fish.points_in_space()
         seen = np.isfinite(points).all(axis=(1, 2))
-        points, time_s = points[seen], np.flatnonzero(seen) / fish.rate_hz
+        points = points[seen]
+        time_s = np.flatnonzero(seen) / fish.rate_hz
         points[..., 2] += _belly_m(skin, fish.length) - points[..., 2].min(initial=0.0)
         return time_s, points
     track = load_track(source)
@@ -127,7 +128,8 @@ def from_poses(robot: RobotConfig, time_s: Floats, qpos: Floats) -> BoneMotion:
     bone_m = np.array(robot.link_lengths_m)
     half = 0.5 * bone_m[:, None]
     turns = Rotation.from_quat(qpos[:, 3:7], scalar_first=True).as_matrix()
-    front, rotation = np.empty((len(qpos), links, 3)), np.empty((len(qpos), links, 3, 3))
+    front = np.empty((len(qpos), links, 3))
+    rotation = np.empty((len(qpos), links, 3, 3))
     for k, row in enumerate(qpos):
         body = body_in_world(robot, BodyPose(float(time_s[k]), row[:3], turns[k]), row[7:])
         front[k], rotation[k] = body.link_m + half * body.forward, body.rotation

@@ -130,7 +130,8 @@ def fish_skin(file: Path) -> SkinConfig:
         raise InputError(
             f"{file}: holds no fish; snakewalk animal fish match writes one from a film"
         )
-    plain, config = fish_model(fish.build), load(locate("skins", fish.build), SkinConfig)
+    plain = fish_model(fish.build)
+    config = load(locate("skins", fish.build), SkinConfig)
     higher = float(np.median(fish.half_height / plain.half_height))
     at = np.linspace(0.0, 1.0, len(fish.half_width))
     sections = tuple(

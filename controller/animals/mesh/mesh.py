@@ -112,7 +112,9 @@ def tube_faces(points: int, around: int) -> Ints:
     here = np.arange(points - 1)[:, None] * around
     a, b, c, d = here + k, here + after, here + around + k, here + around + after
     sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)]).reshape(-1, 3)
-    last, head, tail = (points - 1) * around, points * around, points * around + 1
+    last = (points - 1) * around
+    head = points * around
+    tail = points * around + 1
     front = np.stack([np.full(around, head), k, after], axis=-1)
     back = np.stack([np.full(around, tail), last + after, last + k], axis=-1)
     return np.concatenate([sides, front, back]).astype(np.int64)

@@ -53,7 +53,8 @@ class Tube:
         way = np.concatenate([[0.0], np.cumsum(span)])
         given = [CubicSpline(way, curves_m)(way, k) for k in range(order)]
         given[0] = np.asarray(curves_m, dtype=float)
-        at, slopes = np.repeat([0.0, 1.0], order), [*range(order)] * 2
+        at = np.repeat([0.0, 1.0], order)
+        slopes = [*range(order)] * 2
         patches = tuple(
             PdeSurface.through(
                 np.array(

@@ -127,8 +127,9 @@ class PdeSurface:
 
     def spine_m(self, u: ArrayLike) -> Floats:
         """(U, 3) the zeroth term: the spine."""
-        return np.asarray(_basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0)
-                          @ self.spine_terms)  # fmt: skip
+        return np.asarray(
+            _basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0) @ self.spine_terms
+        )
 
     def points_m(self, u: ArrayLike, v: ArrayLike, along: int = 0, around: int = 0) -> Floats:
         """(U, V, 3) at all pairs, or the derivative there; the remainder is linear between samples.
@@ -178,7 +179,8 @@ def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Fl
         after_m: the same points, moved.
 
     """
-    mesh, rest = np.asarray(mesh_m, float), np.asarray(before_m, float).reshape(-1, 3)
+    mesh = np.asarray(mesh_m, float)
+    rest = np.asarray(before_m, float).reshape(-1, 3)
     nearest = cKDTree(rest).query(mesh)[1]
     return np.asarray(mesh + np.asarray(after_m, float).reshape(-1, 3)[nearest] - rest[nearest])
 
@@ -213,7 +215,6 @@ def _power(u: Floats, k: int, times: int) -> Floats:
 def _faded(u: Floats, rate: float | Floats, k: int, times: int) -> Floats:
     """``u^k e^(-w u)``, differentiated by Leibniz' rule."""
     parts = [
-        comb(times, j) * (-rate) ** (times - j) * _power(u, k, j)
-        for j in range(min(times, k) + 1)
-    ]  # fmt: skip
+        comb(times, j) * (-rate) ** (times - j) * _power(u, k, j) for j in range(min(times, k) + 1)
+    ]
     return np.asarray(sum(parts) * np.exp(-rate * u))

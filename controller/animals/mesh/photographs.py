@@ -73,12 +73,14 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
         np.maximum(np.interp(at, even, half), 1e-6)
         for half in (model.half_width, model.half_height)
     )
-    colours, cosines = [], []
+    colours = []
+    cosines = []
     for one in photographs:
         across, cosine = _seen_from(one.turn_rad, turn[:, None], wide, high)
         colours.append(colours_across(one.image, one.points_px, one.radius_px, across))
         cosines.append(cosine)
-    colour, cosine = np.array(colours), np.array(cosines)
+    colour = np.array(colours)
+    cosine = np.array(cosines)
     gains = _gains(colour, cosine)
     factor = np.array([(1.0, 1.0, 1.0) if gain is None else gain for gain in gains])
     weight = np.clip((cosine - _GRAZING) / (1.0 - _GRAZING), 0.0, None) ** 2
@@ -100,7 +102,8 @@ def _seen_from(
     camera_rad: float, turn: Floats, wide: Floats, high: Floats
 ) -> tuple[Floats, Floats]:
     """Place across the body in a picture, 1 on the left of its heading, and cosine of the view."""
-    side, up = math.sin(camera_rad), -math.cos(camera_rad)  # to the left in the picture
+    side = math.sin(camera_rad)
+    up = -math.cos(camera_rad)  # to the left in the picture
     half = np.hypot(wide * side, high * up)
     across = (wide * np.cos(turn) * side + high * np.sin(turn) * up) / half
     normal = np.stack(np.broadcast_arrays(np.cos(turn) / wide, np.sin(turn) / high))
@@ -112,7 +115,8 @@ def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] |
     """Factors that make photographs (K, R, C, 3) equally bright where two show the same skin."""
     count = len(colour)
     usable = (cosine > _COMPARED) & ((colour > _TONES[0]) & (colour < _TONES[1])).all(axis=-1)
-    rows, differences = [], []
+    rows = []
+    differences = []
     joined = np.eye(count, dtype=bool)
     for i in range(count):
         for k in range(i + 1, count):
@@ -146,7 +150,9 @@ def _filled(mean: Floats, total: Floats) -> Floats:
     row = np.arange(AROUND)
     back_and_belly = (AROUND // 2 - 1 - row) % AROUND
     left_and_right = AROUND - 1 - row
-    sums, weights, share = mean.copy(), total.copy(), 1.0
+    sums = mean.copy()
+    weights = total.copy()
+    share = 1.0
     for mirrored in (back_and_belly, left_and_right, (row + AROUND // 2) % AROUND):
         share *= _FEATHER
         sums += share * mean[mirrored]

@@ -76,7 +76,8 @@ def pde_skin(sections: CrossSections, tube: Tube, fins: tuple[Fin, ...] = ()) ->
             np.full(points.shape[0] * points.shape[1] + 1, 0.5 + 0.5 * np.cos(fin.root_v.mean()))
         ]
         faces.append(_fin_faces(points, tip) + start)
-    corners, triangles = np.concatenate(vertices), np.concatenate(faces)
+    corners = np.concatenate(vertices)
+    triangles = np.concatenate(faces)
     places = np.concatenate(along)
     mesh = Mesh(
         vertices=corners,
@@ -126,7 +127,8 @@ def _fin_faces(points: Floats, tip: Floats) -> Ints:
     rows, around = points.shape[:2]
     # without the fan at the root, which is inside the body
     faces = tube_faces(rows, around)[: -2 * around]
-    last, k = (rows - 1) * around, np.arange(around)
+    last = (rows - 1) * around
+    k = np.arange(around)
     after = (k + 1) % around
     fan = np.stack([np.full(around, rows * around), last + after, last + k], axis=-1)
     faces = np.concatenate([faces, fan])

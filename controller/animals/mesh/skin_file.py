@@ -92,7 +92,8 @@ def write_skin(
         gltf.textures = [pygltflib.Texture(source=0, sampler=0)]
         clamp = pygltflib.CLAMP_TO_EDGE
         gltf.samplers = [pygltflib.Sampler(wrapS=clamp, wrapT=clamp)]
-    gltf.accessors, gltf.bufferViews = out.accessors, out.views
+    gltf.accessors = out.accessors
+    gltf.bufferViews = out.views
     gltf.buffers = [pygltflib.Buffer(byteLength=len(out.data))]
     gltf.set_binary_blob(bytes(out.data))
     file.write_bytes(b"".join(gltf.save_to_bytes()))
@@ -100,7 +101,8 @@ def write_skin(
 
 def _surface(out: "_Builder", rig: Rig, *, textured: bool) -> pygltflib.Attributes:
     """Append places, normals, bones and weights of the corners."""
-    mesh, held = rig.mesh, rig.held
+    mesh = rig.mesh
+    held = rig.held
     shares = np.zeros((len(mesh.vertices), 4), np.float32)
     shares[:, [0, 2]] = held.shares[:, [0, 2]]
     shares[:, 1] = np.float32(1.0) - shares[:, 0] - shares[:, 2]  # sum 1 in single precision
@@ -131,7 +133,8 @@ def _to_bones(rig: Rig) -> Floats:
 
 def _bones(rig: Rig) -> tuple[list[pygltflib.Node], Floats]:
     """Return the nodes, and the places (K, 3) of the bones at rest in their parents."""
-    rest, carried = rig.rest_m, rig.parent >= 0
+    rest = rig.rest_m
+    carried = rig.parent >= 0
     local = np.where(carried[:, None], rest - rest[rig.parent], rest)
     nodes = [
         pygltflib.Node(name="body", mesh=0, skin=0),
@@ -174,7 +177,8 @@ def _animation(
 def _carried(motion: BoneMotion, parent: Ints) -> tuple[Floats, Floats]:
     """Quaternions (T, K, 4), x y z w, and places (T, K, 3) of bones in those that carry them."""
     frames, bones = motion.front_m.shape[:2]
-    rotation, place = motion.rotation.copy(), motion.front_m.copy()
+    rotation = motion.rotation.copy()
+    place = motion.front_m.copy()
     rows = np.flatnonzero(parent >= 0)
     before = motion.rotation[:, parent[rows]]
     off = motion.front_m[:, rows] - motion.front_m[:, parent[rows]]

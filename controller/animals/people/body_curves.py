@@ -105,7 +105,9 @@ def body_parts(skeleton: PersonSkeleton, girth: float = 1.0) -> tuple[BodyPart, 
     trunk = _trunk(girth)
     surface = Tube.through(trunk.curves_m, trunk.stations)
     on_trunk = surface.points_m(surface.rows(8), np.arange(4 * AROUND) * TURN / (4 * AROUND))
-    leg, arm, shoe = _leg(girth, on_trunk), _arm(girth, on_trunk), _shoe(girth)
+    leg = _leg(girth, on_trunk)
+    arm = _arm(girth, on_trunk)
+    shoe = _shoe(girth)
     sides = [part for one in (leg, arm, shoe) for part in (one, _mirrored(one))]
     size = skeleton.stature_m
     return tuple(
@@ -114,7 +116,8 @@ def body_parts(skeleton: PersonSkeleton, girth: float = 1.0) -> tuple[BodyPart, 
 
 
 def _trunk(girth: float) -> BodyPart:
-    curves, shares = [], []
+    curves = []
+    shares = []
     for height, wide, deep, middle in TRUNK:
         nose = NOSE.get(height, 0.0) * np.exp(-((np.angle(np.exp(1j * _V)) / 0.15) ** 2))
         slim = 1.0 if height > 0.85 else girth
@@ -134,16 +137,22 @@ def _spine_shares(height: float) -> dict[str, float]:
 
 
 def _leg(girth: float, on_trunk: Floats) -> BodyPart:
-    curves, shares = [], []
+    curves = []
+    shares = []
     top = THIGH + SHANK + ANKLE
     for height, wide, deep, middle, upper in LEG:
         slim = girth if height > 0.07 else 1.0
         inner = np.where(np.sin(_V) < 0.0, min(1.0, 0.95 * HIP_SIDE / (slim * wide)), 1.0)
-        curves.append(np.stack([
-            middle + slim * deep * np.cos(_V),
-            HIP_SIDE + slim * wide * inner * np.sin(_V),
-            np.full(AROUND, height),
-        ], axis=-1))  # fmt: skip
+        curves.append(
+            np.stack(
+                [
+                    middle + slim * deep * np.cos(_V),
+                    HIP_SIDE + slim * wide * inner * np.sin(_V),
+                    np.full(AROUND, height),
+                ],
+                axis=-1,
+            )
+        )
         if height > 0.42:
             shares.append({"pelvis": 1.0 - upper, "left thigh": upper})
         elif upper >= 0.0:
@@ -161,7 +170,8 @@ def _leg(girth: float, on_trunk: Floats) -> BodyPart:
 def _arm(girth: float, on_trunk: Floats) -> BodyPart:
     along = np.array([0.0, np.sin(ABDUCTION_RAD), -np.cos(ABDUCTION_RAD)])
     out = np.array([0.0, np.cos(ABDUCTION_RAD), np.sin(ABDUCTION_RAD)])
-    curves, shares = [], []
+    curves = []
+    shares = []
     for far, thick, broad, forearm, hand in ARM:
         slim = girth if far < 0.3 else 1.0
         middle = np.array(SHOULDER) + far * along
@@ -184,7 +194,8 @@ def _arm(girth: float, on_trunk: Floats) -> BodyPart:
 
 
 def _shoe(girth: float) -> BodyPart:
-    curves, shares = [], []
+    curves = []
+    shares = []
     for ahead, wide, high in SHOE:
         up = np.cos(_V)
         flat = np.where(up < 0.0, -(np.abs(up) ** 0.45), up)

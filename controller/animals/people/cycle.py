@@ -177,7 +177,8 @@ def _ankles(skeleton: PersonSkeleton, gait: PersonGait, ways: Feet, pitch: Float
     size = skeleton.stature_m
     high = float(skeleton.joint_m[INDEX["left foot"], 2])
     pivot = size * np.where(pitch > 0.0, HEEL, BALL)
-    back, up = -pivot, np.full_like(pivot, high)
+    back = -pivot
+    up = np.full_like(pivot, high)
     x = ways.ahead_m + size * gait.middle + pivot + back * np.cos(pitch) - up * np.sin(pitch)
     z = ways.height_m + back * np.sin(pitch) + up * np.cos(pitch)
     y = np.broadcast_to(size * gait.side * np.array([1.0, -1.0]), x.shape)
@@ -186,8 +187,10 @@ def _ankles(skeleton: PersonSkeleton, gait: PersonGait, ways: Feet, pitch: Float
 
 def _trunk_turns(gait: PersonGait, phase: Floats) -> tuple[Floats, Floats]:
     """(T, 3, 3) turns of pelvis and chest; the left foot comes down at phase 0."""
-    wave, quarter = np.cos(TURN * phase), np.sin(TURN * phase)
-    yaw, roll = -gait.turn * wave, gait.drop * quarter
+    wave = np.cos(TURN * phase)
+    quarter = np.sin(TURN * phase)
+    yaw = -gait.turn * wave
+    roll = gait.drop * quarter
     lean = np.full_like(phase, gait.lean)
     pelvis = Rotation.from_euler("ZYX", np.stack([yaw, 0.5 * lean, roll], -1), degrees=True)
     chest = Rotation.from_euler("ZYX", np.stack([-yaw, lean, -0.3 * roll], -1), degrees=True)
@@ -246,7 +249,9 @@ def _turns(
 
 def _joints(skeleton: PersonSkeleton, pelvis_m: Floats, turn: Floats, ankle_m: Floats) -> Floats:
     """(T, K, 3) joints; writes the turns of thighs and shanks by inverse kinematics."""
-    rest, parent, frames = skeleton.joint_m, skeleton.parent, len(pelvis_m)
+    rest = skeleton.joint_m
+    parent = skeleton.parent
+    frames = len(pelvis_m)
     front = np.empty((frames, len(rest), 3))
     front[:, 0] = pelvis_m
     legs = {INDEX[f"{side} {part}"] for side in ("left", "right") for part in ("shank", "foot")}

@@ -43,7 +43,8 @@ class PersonView:
             OffscreenError: off-screen rendering is missing.
 
         """
-        self._person, self._worn = person, worn
+        self._person = person
+        self._worn = worn
         size = person.skeleton.stature_m
         robot = as_long_robot(load_robot("yaw16"), size)
         look = _look(person, worn, texture)
@@ -79,7 +80,8 @@ def stages_of_cycle(
     person: Person, motion: PersonMotion, worn: tuple[Rig | None, Image | None]
 ) -> tuple[Image, list[tuple[float, Image]]]:
     """Return the person at rest, and stages of one cycle on the spot: share and picture."""
-    size, bones = person.skeleton.stature_m, motion.bones
+    size = person.skeleton.stature_m
+    bones = motion.bones
     near, turns = (1.32, (130.0, 112.0)) if worn[0] is None else (1.9, (165.0, 150.0))
     front = OrbitCamera((0.0, 0.0, 0.5 * size), near * size, turns[0], -6.0)
     side = OrbitCamera((0.0, 0.0, 0.49 * size), (near + 0.06) * size, turns[1], -5.0)
@@ -112,7 +114,8 @@ def film_person(
         The number of frames.
 
     """
-    size, frames = person.skeleton.stature_m, len(motion.bones.time_s)
+    size = person.skeleton.stature_m
+    frames = len(motion.bones.time_s)
     view = PersonView(person, *worn)
     try:
         with MovieFile(file, FPS, FILM_PX) as film:
@@ -130,8 +133,11 @@ def film_person(
 
 def _look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
     """Join the two meshes and their textures, the person's above."""
-    mesh, picture = person.rig.mesh, person.texture
-    vertices, uv, faces = mesh.vertices, mesh.uv, mesh.faces
+    mesh = person.rig.mesh
+    picture = person.texture
+    vertices = mesh.vertices
+    uv = mesh.uv
+    faces = mesh.faces
     if worn is not None:
         cloth = np.full((128, 8, 3), _CLOTH, np.uint8) if texture is None else texture
         picture = _stacked(picture, cloth)

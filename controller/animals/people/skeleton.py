@@ -33,12 +33,26 @@ ABDUCTION_RAD: Final = 0.42
 """Angle of the arms at rest from the vertical (ours)."""
 
 BONES: Final = (
-    ("pelvis", -1), ("waist", 0), ("chest", 1), ("neck", 2), ("head", 3),
-    ("left upper arm", 2), ("left forearm", 5), ("left hand", 6),
-    ("right upper arm", 2), ("right forearm", 8), ("right hand", 9),
-    ("left thigh", 0), ("left shank", 11), ("left foot", 12), ("left toes", 13),
-    ("right thigh", 0), ("right shank", 15), ("right foot", 16), ("right toes", 17),
-)  # fmt: skip
+    ("pelvis", -1),
+    ("waist", 0),
+    ("chest", 1),
+    ("neck", 2),
+    ("head", 3),
+    ("left upper arm", 2),
+    ("left forearm", 5),
+    ("left hand", 6),
+    ("right upper arm", 2),
+    ("right forearm", 8),
+    ("right hand", 9),
+    ("left thigh", 0),
+    ("left shank", 11),
+    ("left foot", 12),
+    ("left toes", 13),
+    ("right thigh", 0),
+    ("right shank", 15),
+    ("right foot", 16),
+    ("right toes", 17),
+)
 """Name and parent of each bone."""
 INDEX: Final = {name: k for k, (name, _) in enumerate(BONES)}
 
@@ -78,10 +92,19 @@ class PersonSkeleton:
             places[f"{side} foot"] = (0.0, hip, ANKLE)
             places[f"{side} toes"] = (BALL, hip, 0.0)
         lengths = {
-            "pelvis": 0.07, "waist": 0.08, "chest": 0.145, "neck": 0.045, "head": 0.13,
-            "upper arm": UPPER_ARM, "forearm": FOREARM, "hand": HAND,
-            "thigh": THIGH, "shank": SHANK, "foot": BALL, "toes": FOOT + HEEL - BALL,
-        }  # fmt: skip
+            "pelvis": 0.07,
+            "waist": 0.08,
+            "chest": 0.145,
+            "neck": 0.045,
+            "head": 0.13,
+            "upper arm": UPPER_ARM,
+            "forearm": FOREARM,
+            "hand": HAND,
+            "thigh": THIGH,
+            "shank": SHANK,
+            "foot": BALL,
+            "toes": FOOT + HEEL - BALL,
+        }
         return cls(
             stature_m,
             stature_m * np.array([places[name] for name, _ in BONES]),

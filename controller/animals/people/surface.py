@@ -29,10 +29,13 @@ _ROWS = 3
 """Rows of the mesh from one curve to the next."""
 _BANDS = {"trunk": (0.0, 0.4), "arm": (0.4, 0.6), "leg": (0.6, 0.8), "shoe": (0.8, 1.0)}
 """Where the parts lie in the texture, along u."""
-_SKIN, _HAIR, _SHIRT, _TROUSERS, _SHOE, _DARK, _LIPS = (
-    (222, 178, 148), (70, 46, 32), (52, 104, 150), (62, 66, 82), (44, 38, 36), (40, 30, 28),
-    (186, 110, 100),
-)  # fmt: skip
+_SKIN = (222, 178, 148)
+_HAIR = (70, 46, 32)
+_SHIRT = (52, 104, 150)
+_TROUSERS = (62, 66, 82)
+_SHOE = (44, 38, 36)
+_DARK = (40, 30, 28)
+_LIPS = (186, 110, 100)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +73,11 @@ def _corners(part: BodyPart, curves_m: Floats) -> Floats:
 
 def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
     """Join the parts, and give each corner bones of the next curves."""
-    corners, uv, faces, bones, shares = [], [], [], [], []
+    corners = []
+    uv = []
+    faces = []
+    bones = []
+    shares = []
     start = 0
     for part in parts:
         points = _corners(part, part.curves_m)
@@ -86,7 +93,8 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
         bones.append(np.repeat(row_bones, AROUND, axis=0))
         shares.append(np.repeat(row_shares, AROUND, axis=0))
         start += len(points)
-    vertices, triangles = np.concatenate(corners), np.concatenate(faces)
+    vertices = np.concatenate(corners)
+    triangles = np.concatenate(faces)
     mesh = Mesh(vertices, vertex_normals(vertices, triangles), np.concatenate(uv), triangles)
     held = Weights(np.concatenate(bones), np.concatenate(shares))
     return Rig(mesh, held, skeleton.joint_m, skeleton.parent)
@@ -126,7 +134,8 @@ def _outwards(faces: Ints, points: Floats) -> Ints:
 
 def texture() -> Image:
     """(H, W, 3) skin, hair, shirt, trousers and shoes; the first row, v = 1, faces forward."""
-    high, wide = 128, 1280
+    high = 128
+    wide = 1280
     picture = np.empty((high, wide, 3), np.uint8)
     u = (np.arange(wide) + 0.5) / wide
     v = 1.0 - (np.arange(high) + 0.5) / high

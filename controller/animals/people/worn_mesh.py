@@ -11,7 +11,8 @@ from snakewalk.controller.animals.mesh.skin import Weights
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.images.mesh import Mesh
 
-_TRIED, _AGREE = 24, 0.17
+_TRIED = 24
+_AGREE = 0.17
 """Number of near corners that are tried, and the least cosine between the normals (ours)."""
 
 

@@ -80,7 +80,8 @@ def _body(axes: Axes, made: SynthesisedAnimal, frame: int) -> None:
 
 def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
     """[KP] Fig. 13 (b): which feet are on the ground."""
-    motion, cycle_s = made.motion, made.animal.cycle_s
+    motion = made.motion
+    cycle_s = made.animal.cycle_s
     shown = motion.time_s <= _CYCLES * cycle_s
     cycles = motion.time_s[shown] / cycle_s
     for k, colour in enumerate(_LEG_COLOURS):
@@ -95,7 +96,8 @@ def _contacts(axes: Axes, made: SynthesisedAnimal) -> None:
 
 def _feet(axes: Axes, animal: AnimalConfig) -> None:
     """Paths of the front feet over a cycle, seen from the trunk: ours, and [GC] Eq. 9-10."""
-    pair, length_m = animal.leg_pairs[0], animal.length_m
+    pair = animal.leg_pairs[0]
+    length_m = animal.length_m
     cycles = np.linspace(0.0, 1.0, 241)
     at = (cycles[:, None] - [pair.left, pair.right]) % 1.0
     ahead, rise, _ = footfall(animal, pair, at)
@@ -103,9 +105,12 @@ def _feet(axes: Axes, animal: AnimalConfig) -> None:
     axes.plot(100.0 * ahead[order, 0], 100.0 * rise[order, 0], color=BLUE, label="footfall (ours)")
     ahead, rise, _ = printed_feet(animal, pair, cycles)
     axes.plot(
-        100.0 * ahead[:, 0], 100.0 * rise[:, 0], color=AMBER, linestyle="--",
+        100.0 * ahead[:, 0],
+        100.0 * rise[:, 0],
+        color=AMBER,
+        linestyle="--",
         label="gc-printed: [GC] Eq. 9-10",
-    )  # fmt: skip
+    )
     for k, way in ((0, "left foot: forward while low"), (1, "right foot: back while low")):
         x = 55.0 * float(np.abs(ahead).max()) * (1.0 - 2.0 * k)
         arrow = {"arrowstyle": "->", "color": AMBER, "linewidth": 1.4}

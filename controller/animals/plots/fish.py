@@ -54,7 +54,8 @@ def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
     """Crop frames to the fish; outline, spine, base of the head."""
     known = np.flatnonzero(np.isfinite(matched.parameters[:, 2]))
     shown = known[np.linspace(0, len(known) - 1, min(len(panels), len(known))).astype(int)]
-    model, wanted = matched.model, set(shown.tolist())
+    model = matched.model
+    wanted = set(shown.tolist())
     reach = 0.7 * model.length_px
     images = ((k, image) for k, image in enumerate(open_footage(footage).shown()) if k in wanted)
     for axes, (k, image) in zip(panels, images, strict=False):

@@ -62,7 +62,8 @@ def _curves(axes: Axes, person: Person) -> None:
 
 def _skeleton(axes: Axes, person: Person) -> None:
     """Draw the bones, and the handles of the feet."""
-    bones, place = person.skeleton, _seen(person.skeleton.joint_m)
+    bones = person.skeleton
+    place = _seen(person.skeleton.joint_m)
     for k, parent in enumerate(bones.parent):
         if parent >= 0:
             axes.plot(*place[[parent, k]].T, color=INK, linewidth=1.4)
@@ -74,7 +75,8 @@ def _skeleton(axes: Axes, person: Person) -> None:
 
 def _seen(points_m: Floats) -> Floats:
     """(P, 2) points (P, 3) seen from ahead, right and above, without perspective."""
-    turn, up = np.radians(40.0), np.radians(8.0)
+    turn = np.radians(40.0)
+    up = np.radians(8.0)
     across = points_m[:, 0] * np.sin(turn) + points_m[:, 1] * np.cos(turn)
     back = points_m[:, 1] * np.sin(turn) - points_m[:, 0] * np.cos(turn)
     return np.stack([across, points_m[:, 2] * np.cos(up) + back * np.sin(up)], axis=-1)

@@ -117,7 +117,8 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
 def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     """Distance, states, angles, behaviour; speed and bends, heading, head movement, tongue."""
     distance, states, angles, behaviour, speed, heading, head, tongue = panels
-    time, targets = made.time_s, made.targets
+    time = made.time_s
+    targets = made.targets
     end = len(targets.distance_m)
     current = np.minimum(targets.current, targets.count - 1)
     passed = np.flatnonzero(np.diff(current, prepend=current[0]))
@@ -144,9 +145,13 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     swing = made.plan.angles_rad - made.plan.angles_rad.mean(axis=1, keepdims=True)
     most = float(np.abs(swing).max())
     angles.imshow(
-        swing[:: max(1, len(time) // 600)].T, aspect="auto", cmap=ANGLES, vmin=-most, vmax=most,
+        swing[:: max(1, len(time) // 600)].T,
+        aspect="auto",
+        cmap=ANGLES,
+        vmin=-most,
+        vmax=most,
         extent=(0.0, float(time[-1]), 1.0, 0.0),
-    )  # fmt: skip
+    )
     angles.grid(visible=False)
     angles.set_yticks([0.0, 1.0], ["head", "tail"])
     angles.set_title(f"angle about the heading; to ±{most:.1f} rad")

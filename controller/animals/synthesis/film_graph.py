@@ -92,10 +92,12 @@ def film_angles(
         return max(after[state], key=lambda q: float(degree[q]) * 0.5 ** float(visits[q] - fewest))
 
     state = int(rng.choice(np.flatnonzero(np.diff(film.frame) == 1)))
-    coming, share = follow(state), 0.0
+    coming = follow(state)
+    share = 0.0
     while True:
         while share >= 1.0:
-            state, share = coming, share - 1.0
+            state = coming
+            share = share - 1.0
             coming = follow(state)
         between = film.states[state] + share * (film.states[coming] - film.states[state])
         yield state, to_angles(between, points)

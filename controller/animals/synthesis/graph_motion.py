@@ -89,8 +89,11 @@ def graph_motion(
     """
     state, body = next(shapes)
     on_state(0, state)
-    m, at_m = leading(len(body)), 0.0
-    angles, points, speed = [], [], []
+    m = leading(len(body))
+    at_m = 0.0
+    angles = []
+    points = []
+    speed = []
     for t in range(frames):
         if t > 0:
             now, wanted = next(shapes)

@@ -105,7 +105,8 @@ class SynthesisedWalk:
 
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
-        plan, targets = self.plan, self.targets
+        plan = self.plan
+        targets = self.targets
         length_m = float(np.hypot(*np.diff(plan.points_m[0], axis=0).T).sum())
         return {
             "frames": len(plan.speed_m_s),
@@ -217,7 +218,9 @@ class SnakeSynthesis:
             InputError: the run's time limit allows more than ``FRAMES_MAX``.
 
         """
-        run, how, robot = self.run, self.how, self.prepared.robot
+        run = self.run
+        how = self.how
+        robot = self.prepared.robot
         if frames is None and run.time_limit_s * how.rate_hz > FRAMES_MAX:
             raise InputError(
                 f"run {run.name}: time_limit_s: {run.time_limit_s:g} s at {how.rate_hz:g} Hz are "
@@ -283,7 +286,8 @@ class SnakeSynthesis:
         printed = run.motion == "walk-printed"
         walker = self._with_share.walker(self.library, self.shape_filters)
         heading_rad = self.prepared.start_heading_rad
-        states, at = [(0, 0)], [0]
+        states = [(0, 0)]
+        at = [0]
 
         def observe(frame: int, points_m: Floats) -> bool:
             at[0] = frame + 1
@@ -343,7 +347,8 @@ class SnakeSynthesis:
 
     def _graph_shapes(self) -> Iterator[tuple[int, Floats]]:
         """States and angles A_c of [KP] 4.2.1, from consecutive frames if there are any."""
-        run, library = self.run, self.library
+        run = self.run
+        library = self.library
         coefficients = to_states(library.shapes_rad, self.how.coefficients)
         rng = np.random.default_rng(run.seed)
         film = self._film(coefficients[: library.recorded])
@@ -360,7 +365,8 @@ class SnakeSynthesis:
             return None
         pulse = analyse(track).pulse
         known = np.isfinite(pulse.body_points_per_frame)
-        rows, speeds = pulse.frame[known], pulse.body_points_per_frame[known]
+        rows = pulse.frame[known]
+        speeds = pulse.body_points_per_frame[known]
         if len(speeds) == 0 or np.median(speeds) <= 0.0:
             return None
         return FilmStates(states, number, np.interp(self.library.frame, rows, speeds))
@@ -368,7 +374,8 @@ class SnakeSynthesis:
     @property
     def law(self) -> SpeedLaw:
         """The speed law in metres."""
-        how, unit_m = self.how, self.how.length_unit_m
+        how = self.how
+        unit_m = self.how.length_unit_m
         return SpeedLaw(how.viscous, how.coulomb * unit_m, how.bend * unit_m, how.turn * unit_m)
 
     def _over(self, curve: Curve, along: Along, frames: int) -> Floats:

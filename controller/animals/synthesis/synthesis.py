@@ -47,7 +47,8 @@ class Behaviour:
             raise ValueError(f"sliding {self.sliding}: expected 0 to 1")
 
 
-NECK, HIPS = 0.2, 0.6
+NECK = 0.2
+HIPS = 0.6
 """End of a held head, and start of a calm tail, along the body (ours)."""
 
 
@@ -139,12 +140,15 @@ def synthesise(
     how = behaviour or Behaviour()
     n = np.arange(track.points, dtype=float)
     ahead = np.full(track.points, float(track.points))  # place + n + 1: constant if nothing slides
-    angles, place = np.empty((frames, len(n))), np.empty((frames, len(n)))
-    points, speed = np.empty((frames, len(n) + 1, 2)), np.empty(frames)
+    angles = np.empty((frames, len(n)))
+    place = np.empty((frames, len(n)))
+    points = np.empty((frames, len(n) + 1, 2))
+    speed = np.empty(frames)
     place[0], speed[0] = ahead - n - 1, speed_m_s
     angles[0], _ = _posture(track.body_rad(track.points) + heading_rad, how, 0)
     points[0] = chain(angles[0], segment_m) + head_m
-    turn, last = 0.0, frames - 1
+    turn = 0.0
+    last = frames - 1
     mean, bend = _moments(angles[0])
     for t in range(1, frames):
         if until is not None and until(t - 1, points[t - 1]):
@@ -159,7 +163,8 @@ def synthesise(
         angles[t], leader = _posture(track.at_rad(place[t]) + heading_rad, how, t)
         was, (mean, bend) = mean, _moments(angles[t])
         turn = (mean - was) / dt_s
-        shape, step = chain(angles[t], segment_m), speed[t] * dt_s
+        shape = chain(angles[t], segment_m)
+        step = speed[t] * dt_s
         along = step * np.array([cos(angles[t, leader]), sin(angles[t, leader])])
         points[t] = shape + (points[t - 1, leader] + along - shape[leader])
     made = slice(0, last + 1)
@@ -171,7 +176,8 @@ def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, in
 
     [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads.
     """
-    held, calm = float(at_frame(how.head_held, frame)), float(at_frame(how.calm_tail, frame))
+    held = float(at_frame(how.head_held, frame))
+    calm = float(at_frame(how.calm_tail, frame))
     if held == 0.0 and calm == 0.0:
         return angles_rad, 0
     s = np.linspace(0.0, 1.0, len(angles_rad))
@@ -212,7 +218,8 @@ def _shifted(ahead: Floats, shift: Floats) -> Floats:
 @compiled(f"UniTuple(float64, 2)({_VALUES})")
 def _moments(angles_rad: Floats) -> tuple[float, float]:
     """Mean, and standard deviation K, of (N,) angles."""
-    mean, square = 0.0, 0.0
+    mean = 0.0
+    square = 0.0
     for angle in angles_rad:
         mean += angle
     mean /= len(angles_rad)
@@ -255,7 +262,8 @@ class Targets:
         replan: Replan | None = None,
     ) -> None:
         self.radius_m, self._carrot_m, self._spacing_m = radius_m, carrot_m, spacing_m
-        self._waypoints_m, self._replan = waypoints_m, replan
+        self._waypoints_m = waypoints_m
+        self._replan = replan
         self.points_m = np.empty((0, 2))
         """(L, 2); after a miss, the reached ones and those of the new path."""
         self.required = np.empty(0, dtype=bool)
@@ -275,7 +283,9 @@ class Targets:
 
     def _extend(self, path: SplinePath, waypoints_m: Floats) -> None:
         """Go on along a path through waypoints (W, 2)."""
-        self.path, self._head_s_m, at_s_m = path, 0.0, 0.0
+        self.path = path
+        self._head_s_m = 0.0
+        at_s_m = 0.0
         self._planned.append((len(self.current), path))
         for waypoint in waypoints_m:
             to_s_m = max(path.first_pass(waypoint, at_s_m), at_s_m)
@@ -331,7 +341,8 @@ class Targets:
         if passed and self._replan is not None:
             self.missed += 1
             left = self._waypoints_m[int(self.required[: self.index].sum()) :]
-            self.points_m, self.required = self.points_m[: self.index], self.required[: self.index]
+            self.points_m = self.points_m[: self.index]
+            self.required = self.required[: self.index]
             self._marks_m = self._marks_m[: self.index]
             self._ahead = self._ahead[: self.index]
             self._extend(self._replan(np.vstack([head, left]), heading_rad), left)

@@ -57,7 +57,8 @@ class SynthesisSkin:
             write_skin(part, rig, bones, texture, worn.name, both_sides=worn.both_sides)
 
     def _rig(self, made: SynthesisedWalk, segments: int) -> tuple[Rig, BoneMotion, Image | None]:
-        bones, texture = made.bones(segments), self.dressed.texture
+        bones = made.bones(segments)
+        texture = self.dressed.texture
         rig = spine_rig(self.skin, bones.bone_m)
         if not self.tongue:
             return rig, bones, texture

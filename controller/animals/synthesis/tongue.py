@@ -122,7 +122,8 @@ class HeightChain:
         for k in range(steps):
             x = int(np.searchsorted(cumulative[two, one], rng.random(), side="right"))
             drawn[k] = min(x, self.levels - 1)
-            two, one = one, int(drawn[k])
+            two = one
+            one = int(drawn[k])
         return drawn / (self.levels - 1)
 
 
@@ -140,7 +141,9 @@ class Tongue:
         """
         if not RATE_LIMITS[0] <= speed <= RATE_LIMITS[1]:
             raise ValueError(f"tongue speed {speed}: expected 0.4 to 2.5")
-        self._chain, self._seed, self._pace = chain, seed, rate_hz * speed
+        self._chain = chain
+        self._seed = seed
+        self._pace = rate_hz * speed
         self._heights = chain.sequence(256, np.random.default_rng(seed))
 
     def height(self, time_s: float) -> float:

@@ -12,7 +12,8 @@ from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import BoneMotion
 
-LENGTH, RADIUS = 0.05, 0.0018
+LENGTH = 0.05
+RADIUS = 0.0018
 """Length and radius of the whole tongue, over the body's length (ours)."""
 _RGB = 191, 26, 38
 _ROWS = 8
@@ -29,10 +30,12 @@ def rig_with_tongue(rig: Rig, length_m: float, texture: Image | None) -> tuple[R
 
     ``length_m`` is the body's; its texture gets rows of the tongue's colour.
     """
-    mesh, bone = rig.mesh, len(rig.rest_m)
+    mesh = rig.mesh
+    bone = len(rig.rest_m)
     corners, faces = _forked(LENGTH * length_m, RADIUS * length_m)
     corners = corners + rig.rest_m[0] - [_HIDDEN * RADIUS * length_m, 0.0, 0.0]
-    uv, colour = mesh.uv, np.array([0.5, 0.5])
+    uv = mesh.uv
+    colour = np.array([0.5, 0.5])
     if texture is not None:
         high = len(texture) + _ROWS
         red = np.broadcast_to(np.array(_RGB, np.uint8), (_ROWS, texture.shape[1], 3))
@@ -69,7 +72,9 @@ def bones_with_tongue(bones: BoneMotion, heights: Floats) -> BoneMotion:
 def _forked(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
     """Corners (V, 3) and faces of a stem along -x and two tips that end at x = 0."""
     turn = np.arange(_AROUND) * TURN / _AROUND
-    vertices, faces, count = [], [], 0
+    vertices = []
+    faces = []
+    count = 0
     split = -_FORK * long_m
     for ends, aside, radii in (
         ((split, -long_m), (0.0, 0.0), (1.0, 1.0)),
@@ -77,13 +82,16 @@ def _forked(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
         ((0.0, split), (-3.5, 0.0), (0.35, 0.8)),
     ):
         rings = [
-            np.stack([
-                np.full(_AROUND, x),
-                thick_m * (off + radius * np.cos(turn)),
-                thick_m * radius * np.sin(turn),
-            ], axis=-1)
+            np.stack(
+                [
+                    np.full(_AROUND, x),
+                    thick_m * (off + radius * np.cos(turn)),
+                    thick_m * radius * np.sin(turn),
+                ],
+                axis=-1,
+            )
             for x, off, radius in zip(ends, aside, radii, strict=True)
-        ]  # fmt: skip
+        ]
         vertices += [*rings, *(ring.mean(axis=0, keepdims=True) for ring in rings)]
         faces.append(tube_faces(2, _AROUND) + count)
         count += 2 * _AROUND + 2
