@@ -222,7 +222,8 @@ def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Fin
         drawn_a: (T, S) from the supply, measured at the same times; NaN where nobody measures it.
 
     """
-    ids, supply_v = robot.servo_ids, robot.servo.supply_v
+    ids = robot.servo_ids
+    supply_v = robot.servo.supply_v
     worst = np.argsort(voltage_v.min(axis=1))[: max(len(voltage_v) // 10, 1)]
     loaded_v = voltage_v[worst].mean(axis=0)
     high, low = int(np.argmax(loaded_v)), int(np.argmin(loaded_v))
@@ -235,7 +236,8 @@ def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Fin
         return Finding(CHECK, "ok", found)
     leads, note = leads_of(robot, voltage_v.mean(axis=0))
     estimate = estimate_cables(voltage_v, drawn_a, leads)
-    cabling, load_a = estimate.cabling(leads), drawn_a[worst].mean(axis=0)
+    cabling = estimate.cabling(leads)
+    load_a = drawn_a[worst].mean(axis=0)
     bad = [
         f"the one between servos {ids[k]} and {ids[k + 1]} has {estimate.cable_ohm[k]:.2f} ohm "
         f"({estimate.low_ohm[k]:.2f} to {estimate.high_ohm[k]:.2f})"

@@ -81,7 +81,9 @@ def examine(
 
     """
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
-    expected, baud, models = robot.servo_ids, port.getBaudRate(), robot.models_on(on_it)
+    expected = robot.servo_ids
+    baud = port.getBaudRate()
+    models = robot.models_on(on_it)
     imu = robot.imu
     if on_it is not None:
         expected = tuple(each for each in expected if each in on_it)
@@ -161,7 +163,8 @@ def _presence(
     on_progress: Callable[[str], None],
 ) -> list[Finding]:
     """Findings about the devices on the line: the robot's, others, and those that are missing."""
-    port, noisy = bus.port, noise is not None or overheard.noise_bytes > 0
+    port = bus.port
+    noisy = noise is not None or overheard.noise_bytes > 0
     missing = [i for i in expected if i not in found]
     elsewhere = _at_other_bauds(bus, missing, on_progress)
     on_progress("other devices")
@@ -175,7 +178,7 @@ def _presence(
     foreign = foreign_replies(port, silent, bus.latency_s, feetech=feetech)
     findings += foreign.findings(bus.table.facts.model)
     findings += servos.presence(
-        *(expected, found, elsewhere, foreign.ids, list(others), baud, port.name)
+        expected, found, elsewhere, foreign.ids, list(others), baud, port.name
     )
     silent = [i for i in silent if i not in foreign.ids]
     findings += [] if noise is None else [noise]
@@ -183,9 +186,7 @@ def _presence(
     findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)
     new = None
     if not feetech:
-        new = factory_servos(
-            *(port, {*found, *others}, silent), noisy=noisy, on_progress=on_progress
-        )
+        new = factory_servos(port, {*found, *others}, silent, noisy=noisy, on_progress=on_progress)
     already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
     findings += [] if new is None or already else [new]
     return findings
@@ -197,9 +198,11 @@ def _line_quality(
     reports: Sequence[ServoReport],
     latency_s: float,
 ) -> Finding:
-    port, patience_s = bus.port, line_checks.PATIENCE_S
+    port = bus.port
+    patience_s = line_checks.PATIENCE_S
     port.drain_until_quiet(patience_s)  # late replies to earlier requests
-    ids, fast = [s.servo_id for s in reports], all(s.fast_reads for s in reports)
+    ids = [s.servo_id for s in reports]
+    fast = all(s.fast_reads for s in reports)
     cycle = servo_bus(port, models, latency_s=patience_s).cycle(ids, fast=fast)
     asked = [each for each in ids for _ in range(_ASKED)]
     return line_checks.line_quality(

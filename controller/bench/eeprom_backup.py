@@ -21,8 +21,12 @@ from snakewalk.drivers.errors import ChainError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 
 _IDENTITY = (
-    *("Model Number", "Model Information", "Firmware Version"),
-    *("ID", "Baud Rate", "Protocol Type"),
+    "Model Number",
+    "Model Information",
+    "Firmware Version",
+    "ID",
+    "Baud Rate",
+    "Protocol Type",
 )
 
 

@@ -104,7 +104,8 @@ def named_ports(port: str) -> list[str]:
 
 
 def _is_meant(button: PressedButton, run: str) -> bool:
-    known, path = button.run, os.path.realpath(run)
+    known = button.run
+    path = os.path.realpath(run)
     where = None if known.folder is None else os.path.realpath(known.folder)
     return run in (known.name, str(known.process)) or where in (path, os.path.dirname(path))
 
@@ -191,7 +192,9 @@ def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
             clock.sleep_until_s(clock.now_s() + _LOOK_S)
         if button.end is not None or not button.is_held:
             break
-    after_s, run, said = clock.now_s(), button.run, button.end
+    after_s = clock.now_s()
+    run = button.run
+    said = button.end
     safe = said is not None and "torque off failed" not in said and "torque may be on" not in said
     if said is None:
         said = "it ended without a word" if not button.is_held else "it does not end"
@@ -217,7 +220,8 @@ class Stop:
             InputError: the run is unknown, or no port can be chosen.
 
         """
-        run, port = self.run, self.port
+        run = self.run
+        port = self.port
         if run is not None and port is not None:
             raise InputError("stop: a run and --port exclude each other; leave one out")
         who = f"snakewalk stop (process {os.getpid()})"
@@ -227,7 +231,8 @@ class Stop:
         devices = [] if outcomes else _free_ports(port)
         held = stop_holders(devices, who)
         if held:
-            outcomes, devices = held, []
+            outcomes = held
+            devices = []
         # a run that was killed leaves its servos with torque on
         devices += [port for each in outcomes if not each.safe for port in each.ports]
         outcomes += _torque_off(devices, self.bauds)

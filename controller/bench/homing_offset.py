@@ -39,7 +39,8 @@ def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ..
         BusError: a servo does not answer.
 
     """
-    faults, planned = [], []
+    faults = []
+    planned = []
     for joint, servo_id in enumerate(robot.servo_ids):
         table = bus.table_of(servo_id)
         row = table.facts.registers.get("Homing Offset")

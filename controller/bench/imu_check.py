@@ -9,7 +9,8 @@ from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.errors import ChainError
 from snakewalk.drivers.types import ImuState
 
-_READS, _PAUSE_S = 10, 0.02
+_READS = 10
+_PAUSE_S = 0.02
 _LEVEL_DEG = 20.0
 """A link that lies flat shows less (ours): more is a wrong mounting, or a robot that lies askew."""
 _STILL_DPS = 5.0
@@ -23,7 +24,8 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
         PortError: the port vanished.
 
     """
-    reader, clock = ImuReader(bus, imu), bus.port.clock
+    reader = ImuReader(bus, imu)
+    clock = bus.port.clock
     try:
         reader.find()
     except ChainError as error:

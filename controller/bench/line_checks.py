@@ -165,7 +165,9 @@ def line_quality(
         ask_each: asks each servo by itself, to see whose replies get lost.
 
     """
-    reads, lost, longest_s = 0, 0, 0.0
+    reads = 0
+    lost = 0
+    longest_s = 0.0
     while reads < _TEST_READS and lost <= _BAD_SHARE * _TEST_READS:  # a bad line needs time
         began_s = port.clock.now_s()
         complete = bool(cycle.read().valid.all())

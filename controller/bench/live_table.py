@@ -77,7 +77,8 @@ class LiveScreen:
 
 def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
     give_way()
-    decoder, recent = make_decoder(), deque[DecodedPacket](maxlen=_SHOWN)
+    decoder = make_decoder()
+    recent = deque[DecodedPacket](maxlen=_SHOWN)
     screen = PlainConsole(file=sys.stderr)
     with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):
         while True:

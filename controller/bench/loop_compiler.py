@@ -48,7 +48,9 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
 
     """
     total = sum(len(loop_modules(f"snakewalk.{each}")) for share in _SHARES for each in share)
-    lock, done, compiled = threading.Lock(), 0, 0
+    lock = threading.Lock()
+    done = 0
+    compiled = 0
     children = [start_module(__name__, *share) for share in _SHARES]
 
     def follow(lines: IO[str] | None) -> None:

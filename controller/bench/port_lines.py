@@ -76,7 +76,8 @@ def open_lines(port: str | None, baud: int) -> Iterator[PortLines]:
         return
     segments = parse_port_map(port)
     _check_segments(port, segments)
-    clock, lines = WallClock(), []
+    clock = WallClock()
+    lines = []
     with ExitStack() as opened:
         for name, ids in segments:
             line = network_port.open_port(name, baud, clock)

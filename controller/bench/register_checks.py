@@ -37,17 +37,40 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.sim.servo.register_rules import registers_of
 
 _GAINS = (
-    *("Position P Gain", "Position I Gain", "Position D Gain"),
-    *("Feedforward 1st Gain", "Feedforward 2nd Gain"),
+    "Position P Gain",
+    "Position I Gain",
+    "Position D Gain",
+    "Feedforward 1st Gain",
+    "Feedforward 2nd Gain",
 )
 _PROFILE = ("Profile Acceleration", "Profile Velocity")
 _READ = (
-    *("Status Return Level", "Secondary(Shadow) ID", "Homing Offset", "Drive Mode"),
-    *("Operating Mode", "Startup Configuration", "Shutdown", "PWM Limit", "Current Limit"),
-    *("Goal PWM", *_GAINS, *_PROFILE, IDENTITY, "Bus Watchdog", "Present Position"),
-    *("Min Position Limit", "Max Position Limit", "Velocity Limit", "Temperature Limit"),
-    *("Min Voltage Limit", "Max Voltage Limit", "Registered Instruction", "Goal Current"),
-    *("Torque Enable", "Present Current", "Present Velocity"),
+    "Status Return Level",
+    "Secondary(Shadow) ID",
+    "Homing Offset",
+    "Drive Mode",
+    "Operating Mode",
+    "Startup Configuration",
+    "Shutdown",
+    "PWM Limit",
+    "Current Limit",
+    "Goal PWM",
+    *_GAINS,
+    *_PROFILE,
+    IDENTITY,
+    "Bus Watchdog",
+    "Present Position",
+    "Min Position Limit",
+    "Max Position Limit",
+    "Velocity Limit",
+    "Temperature Limit",
+    "Min Voltage Limit",
+    "Max Voltage Limit",
+    "Registered Instruction",
+    "Goal Current",
+    "Torque Enable",
+    "Present Current",
+    "Present Velocity",
 )
 _SECONDARY_SERVO = 0x02
 """Bit of Drive Mode(10): the servo follows another one by a sync cable."""
@@ -95,7 +118,9 @@ class _Checks:
     def __init__(
         self, servos: Sequence[ServoRegisters], robot: RobotConfig, units: JointUnits
     ) -> None:
-        self._servos, self._robot, self._units = servos, robot, units
+        self._servos = servos
+        self._robot = robot
+        self._units = units
         self._factory = [_factory_values(facts) for facts in robot.servo_records]
         self._full = units.full_pwm.tolist()
         first = servos[0].joint if servos else 0
@@ -105,9 +130,11 @@ class _Checks:
     def all(self) -> list[Finding | None]:
         """Findings in the order of their weight; None where all is well."""
         facts = self._facts
-        all_reply, shutdown = ALL_REPLY, SHUTDOWN_ALARMS
+        all_reply = ALL_REPLY
+        shutdown = SHUTDOWN_ALARMS
         if facts.is_feetech:
-            all_reply, shutdown = 1, feetech.shutdown_alarms(facts)
+            all_reply = 1
+            shutdown = feetech.shutdown_alarms(facts)
         return [
             self._pose(),
             self._exchanged(),
@@ -198,7 +225,8 @@ class _Checks:
 
     def _limits(self) -> list[Finding | None]:
         """Limits, goals and sensors that other programs and faults leave behind."""
-        units, rows = self._units, self._facts.registers
+        units = self._units
+        rows = self._facts.registers
         low, high = (rows[f"{end} Position Limit"].address for end in ("Max", "Min"))
         return [
             self._bad(
@@ -222,7 +250,9 @@ class _Checks:
                 "voltage limits", "Max Voltage Limit", "do they fit the supply? alarms come beyond"
             ),
             self._weak(
-                *("goal current", "warn", "Goal Current"),
+                "goal current",
+                "warn",
+                "Goal Current",
                 f"a {self._at('Goal Current')} below the robot's current limit: weak",
             ),
             self._bad(
@@ -340,7 +370,9 @@ class _Checks:
 
     def _current_limit(self) -> Finding | None:
         return self._weak(
-            *("current limit", "fail", "Current Limit"),
+            "current limit",
+            "fail",
+            "Current Limit",
             f"a {self._at('Current Limit')} below the robot's current limit",
             "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
         )
@@ -361,7 +393,8 @@ class _Checks:
         self, check: str, grade: Grade, register: str, what: str, remedy: str = _BY_A_RUN
     ) -> Finding | None:
         """Pitch joints with a register of their current below the robot's limit."""
-        robot, units = self._robot, self._units
+        robot = self._robot
+        units = self._units
         return self._bad(
             check,
             grade,

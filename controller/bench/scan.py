@@ -175,7 +175,8 @@ def _answers(
     """
     baud = port.getBaudRate()
     replies: dict[int, StatusPacket] = {}
-    state, same = "sound", 0
+    state = "sound"
+    same = 0
     for turn in range(_MOST):
         answer = broadcast_ping(port)
         new = [reply for reply in answer.replies if reply.servo_id not in replies]
@@ -228,7 +229,8 @@ def _pings_back(port: BytePort, servo_id: int, baud: int) -> bool:
 
 
 def _result(port: BytePort, baud: int, reply: StatusPacket, tries: int | None) -> ScanResult:
-    number, firmware = int.from_bytes(reply.params[:2], "little"), reply.params[2]
+    number = int.from_bytes(reply.params[:2], "little")
+    firmware = reply.params[2]
     model = model_numbers().get(number) or _other(port, reply.servo_id, number)
     shadow = _secondary_id(port, reply.servo_id, model, tries)
     return ScanResult(reply.servo_id, model, firmware, baud, shadow)

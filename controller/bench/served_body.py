@@ -109,7 +109,8 @@ class PosePublisher:
     def __init__(
         self, tracker: SimulatedTracker, line_s: Callable[[], float], address: tuple[str, int]
     ) -> None:
-        self._tracker, self._line_s = tracker, line_s
+        self._tracker = tracker
+        self._line_s = line_s
         self._sender = UdpSender(*address)
         self.sent = 0
         """Datagrams so far."""

@@ -23,7 +23,8 @@ from snakewalk.drivers.protocol.registers import (
     bauds_of,
 )
 
-RESTART_S, _ASK_AGAIN_S = 3.0, 0.1
+RESTART_S = 3.0
+_ASK_AGAIN_S = 0.1
 """Longest time until a servo replies after a reboot, and between the tries (ours)."""
 _LIMITS = {
     "min_position_rad": "Min Position Limit",

@@ -19,7 +19,9 @@ from snakewalk.drivers.safety.safe_link import SafeLink
 from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
-_AMPLITUDE_RAD, _FREQUENCY_HZ, _CYCLES = 0.15, 3.0, 6
+_AMPLITUDE_RAD = 0.15
+_FREQUENCY_HZ = 3.0
+_CYCLES = 6
 """At most 2.8 rad/s: within the limits of a run (4 rad/s) and of the servos' motors."""
 _GROWING_CYCLES = 3
 """At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
@@ -89,7 +91,8 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
 
     """
     chain = ServoChain(bus, robot, watchdog_s=safety.watchdog_s)
-    limits, clock = SafetyLimits.from_config(robot, safety), chain.clock
+    limits = SafetyLimits.from_config(robot, safety)
+    clock = chain.clock
     rest_v = np.full(robot.joint_count, np.nan)
     voltage_v: list[Floats] = []
     drawn: list[Floats] = []

@@ -180,7 +180,10 @@ def unlisted(
             "name a robot that has them with --robot, or remove them from the bus",
         )
     ]
-    numbers, alarms, torque, shared = model_numbers(protocol), [], [], []
+    numbers = model_numbers(protocol)
+    alarms = []
+    torque = []
+    shared = []
     for servo_id, reply in others.items():
         model = numbers.get(reply.model_number)
         if model is None:

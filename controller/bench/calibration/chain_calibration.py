@@ -279,7 +279,8 @@ class _Steps:
         def push_each() -> None:
             with self.bench.straight(straight_rad) as push:
                 for servo_id in [each for each in in_order if each not in self.known.ranges]:
-                    bend, row = self.known.bends[servo_id], rows[servo_id]
+                    bend = self.known.bends[servo_id]
+                    row = rows[servo_id]
                     reach_rad = self.like.limit_rad[bend.joint] + BEYOND_RAD
                     for side in 1, -1:
                         at = servo_id, side
@@ -309,7 +310,9 @@ def _found(
         InputError: a joint has no range to speak of, or its servo's turn ends within it.
 
     """
-    joints, faults, notes = [], [], []
+    joints = []
+    faults = []
+    notes = []
     rows = {known.bends[servo_id].joint: row for row, servo_id in enumerate(unknown.servo_ids)}
     ids = [unknown.servo_ids[rows[joint]] for joint in range(like.joint_count)]
     ranges = [known.ranges[servo_id] for servo_id in ids] if sweep else []

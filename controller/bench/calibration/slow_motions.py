@@ -93,7 +93,8 @@ class CalibrationBench:
         on_progress: Callable[[str], None],
     ) -> None:
         self._robot = robot
-        self._stop_requested, self._on_progress = stop_requested, on_progress
+        self._stop_requested = stop_requested
+        self._on_progress = on_progress
         self._clock = port.clock
         bus = servo_bus(port, robot.models_by_id, latency_s=latency_s, tries=BUS_TRIES)
         self._chain = ServoChain(bus, robot, watchdog_s=_WATCHDOG_S)
@@ -114,7 +115,8 @@ class CalibrationBench:
             DriverError: another reason ended it.
 
         """
-        tries, before = _MOTION_TRIES, progress()
+        tries = _MOTION_TRIES
+        before = progress()
         while True:
             try:
                 motion()
@@ -123,7 +125,8 @@ class CalibrationBench:
                 raise
             except BusError as error:
                 if progress() != before:
-                    tries, before = _MOTION_TRIES, progress()
+                    tries = _MOTION_TRIES
+                    before = progress()
                 tries -= 1
                 if tries <= 0:
                     raise
@@ -158,7 +161,8 @@ class CalibrationBench:
 
     def _wiggle(self, row: int) -> None:
         with self._link() as (link, here):
-            most, seen = 0.0, 0
+            most = 0.0
+            seen = 0
             for time_s, state in self._cycles(link, 2.0 * WIGGLE_S):
                 seen += bool(state.valid[row])
                 most = max(most, float(state.position_rad[row] - here[row]))
@@ -206,7 +210,10 @@ class CalibrationBench:
         """
         zero_rad = float(here[row])
         reach_rad = min(reach_rad, RANGE_RAD - abs(zero_rad))
-        stop, pushing_s, last_s, goal = None, 0.0, 0.0, zero_rad
+        stop = None
+        pushing_s = 0.0
+        last_s = 0.0
+        goal = zero_rad
         least_a = STOP_EFFORT * self._robot.current_limits_a[row]
         for time_s, state in self._cycles(link, reach_rad / self._speed_rad_s[row] + STOP_S):
             far = side * (goal - float(state.position_rad[row]))

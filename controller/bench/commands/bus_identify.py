@@ -67,7 +67,8 @@ def bus_identify(
     heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
     table = Table(*heads, *(["port"] if lines.several else []), box=None)
     for name, entry in entries:
-        found, state = entry.found, entry.report
+        found = entry.found
+        state = entry.report
         state_told = ("-",) * 3
         if state is not None:
             torque = "on" if state.torque_on else "off"

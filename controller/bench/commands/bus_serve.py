@@ -124,9 +124,15 @@ def serve(
     if PtyServer is None:
         raise InputError("bus serve: pseudo-terminals are for Linux and macOS")
     body = ServedBody(
-        robot=robot, world=world, run=run, at=at, pose_out=pose_out, tracker=tracker,
-        truth=truth, seed=seed,
-    )  # fmt: skip
+        robot=robot,
+        world=world,
+        run=run,
+        at=at,
+        pose_out=pose_out,
+        tracker=tracker,
+        truth=truth,
+        seed=seed,
+    )
     body.check()
     if sum(each is not None for each in (servos, robot or run, play)) > 1:
         raise InputError("give one of --servos, --robot, --run and --play")

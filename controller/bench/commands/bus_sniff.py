@@ -109,7 +109,8 @@ def sniff(
         pieces = stand_between(str(source), baud, for_s)
     else:
         pieces = receive(str(source), baud, for_s)
-    size, packets = 0, 0
+    size = 0
+    packets = 0
     waiting: list[str] = []  # a recording without any packet is rejected before it is shown
     try:
         for time_s, data in pieces:

@@ -37,7 +37,8 @@ def power(
     robot = load_robot(name)
     described = robot.power or PowerConfig()
     drop = drop_along(robot, described, current)
-    ids, cabling = robot.servo_ids, Cabling.of(robot, described)
+    ids = robot.servo_ids
+    cabling = Cabling.of(robot, described)
     most_a = float(abs(drop.cable_a).max(initial=0.0))
     low_v, high_v = float(drop.servo_v.min()), float(drop.servo_v.max())
     facts: dict[str, object] = {

@@ -202,7 +202,8 @@ class _Person:
     """Asks at the terminal."""
 
     def __init__(self, robot: RobotConfig) -> None:
-        self._axes, self._names = robot.joint_axes, robot.joint_names
+        self._axes = robot.joint_axes
+        self._names = robot.joint_names
 
     def which(
         self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
@@ -247,9 +248,11 @@ class _Person:
 
     def _direction(self, joint: int, servo_id: int) -> Literal[1, -1] | None:
         """Ask for the side; None: the servo has to move again."""
-        letters, asked = ("lr", "to the left or right (l, r)")
+        letters = "lr"
+        asked = "to the left or right (l, r)"
         if self._axes[joint] != "y":
-            letters, asked = ("ud", "up or down (u, d)")
+            letters = "ud"
+            asked = "up or down (u, d)"
         label = f"{joint + 1} is {joint_label(self._names[joint], servo_id)}"
         while True:
             side = _ask(f"{label}: the head side went first {asked}, a = again: ").lower()
