@@ -26,7 +26,8 @@ from snakewalk.controller.cameras.pose_tracking import (
 from snakewalk.controller.images.compression import Compression, compression_of, without_blocks
 
 _CALM_PX: Final = 200  # fewest pixels away from the body for the noise
-_CLEAR, _CLEAR_IN_BLOCKS = 0.2, 0.4
+_CLEAR = 0.2
+_CLEAR_IN_BLOCKS = 0.4
 """Shares of the body's contrast: halos of compression have less, without and with blocks (ours)."""
 _DISAGREES: Final = 0.7
 """Variance of a pose over the square of its distance from that of the frame with blocks (ours)."""
@@ -73,7 +74,8 @@ class BodyContrast:
         rows, columns = image.shape[:2]
         left, top = np.clip(np.floor(px.min(axis=0)).astype(int), 0, (columns - 1, rows - 1))
         right, low = np.clip(np.ceil(px.max(axis=0)).astype(int) + 1, 1, (columns, rows))
-        high, wide = slice(top, max(low, top + 1)), slice(left, max(right, left + 1))
+        high = slice(top, max(low, top + 1))
+        wide = slice(left, max(right, left + 1))
         coded = np.ascontiguousarray(image[high, wide])
         compression = compression_of(image)
         frame = coded if compression is None else without_blocks(coded, compression)
@@ -147,11 +149,12 @@ class BodyContrast:
             return _smooth(lit_floor(self.frame, ground, self.area_px))
         channels = [  # compression shifts colours over large parts
             lit_floor(
-                np.ascontiguousarray(self.frame[..., k]), np.ascontiguousarray(ground[..., k]),
+                np.ascontiguousarray(self.frame[..., k]),
+                np.ascontiguousarray(ground[..., k]),
                 self.area_px,
             )
             for k in range(self.frame.shape[2])
-        ]  # fmt: skip
+        ]
         return _smooth(np.dstack(channels))
 
 

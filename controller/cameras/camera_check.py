@@ -28,7 +28,8 @@ _LOOK_S: Final = 0.25
 """Time between two searches for markers, which need longer than a frame."""
 _LINE_S: Final = 0.05
 """Between two frames in which the body is looked for."""
-_LINES, _READS = 400, 1000
+_LINES = 400
+_READS = 1000
 """The latest samples for the latency: 20 s."""
 _SPARSE: Final = 8  # pixel step for the light
 
@@ -73,7 +74,9 @@ class CameraCheck:
 
         ``detector`` has a picture of the empty floor; None: neither latency nor bumps are reported.
         """
-        self._camera, self._robot, self._detector = camera, robot, detector
+        self._camera = camera
+        self._robot = robot
+        self._detector = detector
         self._frame_s: list[float] = []
         self._light: list[float] = []
         self._lines: deque[LineDetection] = deque(maxlen=_LINES)
@@ -144,12 +147,15 @@ class CameraCheck:
         """
         if self._latest is None:
             raise InputError("the camera has handed over no frame")
-        size_px, times = (self._latest.shape[1], self._latest.shape[0]), np.array(self._frame_s)
+        size_px = (self._latest.shape[1], self._latest.shape[0])
+        times = np.array(self._frame_s)
         apart = np.diff(times)
         places = self._camera.marker_places_m
         first = None if self._detector is None else self._detector.model
         lens = None if first is None else first.lens
-        floor, fault, distortion = None, "", None
+        floor = None
+        fault = ""
+        distortion = None
         if places:
             try:
                 floor = fit_floor(self.markers, places, lens)

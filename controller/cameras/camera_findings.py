@@ -49,9 +49,11 @@ def _frames(report: CameraReport, camera: CameraConfig) -> Finding:
         return Finding("frames", "fail", found, f"asked for are {asked} pixels: correct [camera]")
     if not report.rate_hz >= _SLOW * camera.rate_hz:
         return Finding(
-            "frames", "warn", found,
+            "frames",
+            "warn",
+            found,
             f"asked for are {camera.rate_hz:g} a second: less exposure time, another USB port",
-        )  # fmt: skip
+        )
     if report.gap_max_s > _GAP / camera.rate_hz:
         return Finding("frames", "warn", found, "frames were lost: is the machine or USB busy?")
     return Finding("frames", "ok", found)
@@ -71,9 +73,11 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
     else:
         lost = ", ".join(str(name) for name in seldom)
         first = Finding(
-            "markers", "warn" if steady >= FEWEST else "fail", f"found of the pictures: {shown}",
+            "markers",
+            "warn" if steady >= FEWEST else "fail",
+            f"found of the pictures: {shown}",
             f"marker {lost}: in view, lit, flat, white around it, at least 14 px wide?",
-        )  # fmt: skip
+        )
     if report.floor is None:
         return [first, Finding("floor", "fail", report.fault, "four markers fix a floor")]
     floor = report.floor
@@ -89,17 +93,21 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
     if report.distortion is not None:
         error_mm = 1e3 * report.distortion.error_m
         second = Finding(
-            "floor", "warn", f"{found}; the lens distorts by up to {error_mm:.0f} mm",
+            "floor",
+            "warn",
+            f"{found}; the lens distorts by up to {error_mm:.0f} mm",
             "calibrate the lens: snakewalk pose board, snakewalk pose calibrate",
-        )  # fmt: skip
+        )
     elif floor.residual_m[worst] > MISPLACED_M:
         second = Finding("floor", "fail", found, f"measure the place of marker {worst} again")
     elif abs(side / camera.marker_side_m - 1.0) > _SIDE:
         second = Finding(
-            "floor", "warn", found,
+            "floor",
+            "warn",
+            found,
             f"marker_side_m is {1e3 * camera.marker_side_m:.0f} mm: was the print scaled, or are "
             "all places?",
-        )  # fmt: skip
+        )
     else:
         second = Finding("floor", "ok", found)
     return [first, second]
@@ -137,10 +145,12 @@ def _latency(report: CameraReport, camera: CameraConfig) -> list[Finding]:
     if fit is None:
         return [
             Finding(
-                "latency", "warn", "not measured",
+                "latency",
+                "warn",
+                "not measured",
                 "with --port, a joint that is turned by hand, and a background in [camera]",
             )
-        ]  # fmt: skip
+        ]
     if fit.fault:
         return [Finding("latency", "warn", f"not measured: {fit.fault}")]
     found = (

@@ -71,18 +71,21 @@ def fit_latency(
     if inside.sum() < _LEAST:
         return replace(_NONE, fault="it looked too short: frames and joints hardly overlap")
     frame_s = frame_s[inside]
-    expected = np.stack([
-        np.stack([np.interp(frame_s - delay, joint_s, one) for one in known.T], axis=1)
-        for delay in delays
-    ])  # fmt: skip
+    expected = np.stack(
+        [
+            np.stack([np.interp(frame_s - delay, joint_s, one) for one in known.T], axis=1)
+            for delay in delays
+        ]
+    )
     lines_m = [line.line_m for line, used in zip(found, inside, strict=True) if used]
     lines_m = _same_end_first(lines_m)
     shown, delay, likeness = max(
-        ((shape, *_best(delays, expected, shape)) for shape in (
-            _shapes(robot, lines_m), _shapes(robot, [line[::-1] for line in lines_m])
-        )),
+        (
+            (shape, *_best(delays, expected, shape))
+            for shape in (_shapes(robot, lines_m), _shapes(robot, [line[::-1] for line in lines_m]))
+        ),
         key=lambda tried: tried[2],
-    )  # fmt: skip
+    )
     parts = [
         _best(delays, expected[:, part], shown[part])[0]
         for part in np.array_split(np.arange(len(shown)), _PARTS)

@@ -33,7 +33,8 @@ class CameraPage:
     """Serves the page; ``stop`` it."""
 
     def __init__(self, host: str, port: int, camera: CameraConfig, watch: CameraWatch) -> None:
-        self._camera, self._watch = camera, watch
+        self._camera = camera
+        self._watch = watch
         self._server, self.url = open_page(host, port)
         """To be opened in a browser; contains the token."""
         blank = np.full((camera.height_px, camera.width_px, 3), 230, np.uint8)

@@ -75,12 +75,10 @@ class CameraPose:
         ground: HeightField | None = None,
     ) -> None:
         self._rest = GroundRest(robot, heights_of(ground))
-        self._robot, self._camera, self._reckoning, self._on_event = (
-            robot,
-            camera,
-            reckoning,
-            on_event,
-        )
+        self._robot = robot
+        self._camera = camera
+        self._reckoning = reckoning
+        self._on_event = on_event
         self._history: deque[_Moment] = deque()
         self._offset = np.zeros(3)  # of the drifting frame in the world
         self._fixed_s: float | None = None
@@ -104,7 +102,8 @@ class CameraPose:
 
     def row(self) -> dict[str, Any]:
         """Return a row of the log about the newest frame that was used; it has its own time."""
-        now_s, nothing = self._history[-1].time_s, float("nan")
+        now_s = self._history[-1].time_s
+        nothing = float("nan")
         fixed_s = nothing if self._fixed_s is None else self._fixed_s
         variance = np.full((3, 3), nothing) if self.covariance is None else self.covariance
         return {
@@ -157,7 +156,8 @@ class CameraPose:
 
     def _place(self, found: PoseFit | TrackedPose, time_s: float) -> None:
         """Move the drifting frame to the head's place in a frame."""
-        head_m, heading_rad = found.head_m, found.heading_rad
+        head_m = found.head_m
+        heading_rad = found.heading_rad
         self.covariance = found.covariance
         self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(found.covariance[:2, :2])[-1])))
         then = self._at(time_s)
@@ -192,7 +192,8 @@ class CameraPose:
             return self._history[0]
         times = np.array([moment.time_s for moment in self._history])
         k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
-        one, two = self._history[k - 1], self._history[k]
+        one = self._history[k - 1]
+        two = self._history[k]
         part = float(np.clip((time_s - one.time_s) / (two.time_s - one.time_s), 0.0, 1.0))
         change = two.place - one.place
         change[2] = np.arctan2(np.sin(change[2]), np.cos(change[2]))

@@ -81,8 +81,11 @@ class OverheadCameraPose:
 
 
 def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":
-    prepared, backend = context.prepared, context.backend
-    run, robot, ground = prepared.run, prepared.robot, prepared.ground
+    prepared = context.prepared
+    backend = context.backend
+    run = prepared.run
+    robot = prepared.robot
+    ground = prepared.ground
     if ground is not None and float(ground.z_m.max()) > 0.8 * run.camera.height_m:
         raise InputError(
             f"camera: height_m: {run.camera.height_m:g} m above height 0 of the world, whose "

@@ -56,7 +56,9 @@ class CameraWatch:
             InputError: a port for a simulated camera.
 
         """
-        self._prepared, self._port, self._camera = prepared, port, prepared.run.camera
+        self._prepared = prepared
+        self._port = port
+        self._camera = prepared.run.camera
         self.locks: dict[str, Lock] = {}
         """Locks of exposure and white balance, after ``check``."""
         if self._camera.device is None and port is not None:
@@ -86,12 +88,16 @@ class CameraWatch:
             top_view,
         )
 
-        prepared, run, camera = self._prepared, self._prepared.run, self._camera
+        prepared = self._prepared
+        run = self._prepared.run
+        camera = self._camera
         robot = prepared.robot
         self.locks = {"exposure": "locked", "white balance": "locked"}
         pose = prepared.initial_pose()
         backend = simulated(run, robot, prepared.world, prepared.ground, pose)
-        chain, clock, qpos = backend.chain, backend.clock, backend.qpos
+        chain = backend.chain
+        clock = backend.clock
+        qpos = backend.qpos
         if qpos is None:
             raise AssertionError("the simulator knows its coordinates")
         with closing(top_view(run, robot, prepared.world, prepared.ground)) as view:
@@ -99,8 +105,11 @@ class CameraWatch:
             detector = rendered_detector(run, robot, floor, prepared.ground)
             check = CameraCheck(camera, robot, detector)
             begin = chain.enable()
-            goal, begin_s, cycles = begin.position_rad, clock.now_s(), 0
-            next_s, coming = begin_s, list[tuple[float, Image]]()
+            goal = begin.position_rad
+            begin_s = clock.now_s()
+            cycles = 0
+            next_s = begin_s
+            coming = list[tuple[float, Image]]()
             while clock.now_s() < begin_s + seconds:
                 state = chain.read()  # the simulated body has the pose of this read
                 now_s = state.time_s
@@ -119,7 +128,9 @@ class CameraWatch:
         return check
 
     def _real(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
-        run, robot, camera = self._prepared.run, self._prepared.robot, self._camera
+        run = self._prepared.run
+        robot = self._prepared.robot
+        camera = self._camera
         ground = self._prepared.ground
         detector = None if camera.background is None else overhead_detector(run, robot, ground)
         check = CameraCheck(camera, robot, detector)
@@ -127,14 +138,16 @@ class CameraWatch:
             chain = None
             if self._port is not None:
                 backend = metal(run, robot, self._port)
-                chain, clock = backend.chain, backend.clock
+                chain = backend.chain
+                clock = backend.clock
             else:
                 clock = WallClock()
             device = open_device(camera)
             stack.callback(device.release)
             self.locks = device_locks(device)
             frames: queue.SimpleQueue[tuple[Image | None, float]] = queue.SimpleQueue()
-            stop, film = threading.Event(), Path(camera.device or "").is_file()
+            stop = threading.Event()
+            film = Path(camera.device or "").is_file()
 
             def take() -> None:
                 while not stop.is_set():
@@ -149,7 +162,8 @@ class CameraWatch:
             thread.start()
             stack.callback(thread.join, PATIENCE_S)
             stack.callback(stop.set)
-            reads, patient_s = 0, PATIENCE_S
+            reads = 0
+            patient_s = PATIENCE_S
             while clock.now_s() < begin_s + seconds:
                 if chain is not None:
                     state = chain.read()

@@ -63,9 +63,11 @@ class DeviceCamera:
     ) -> None:
         """Open it; ``on_picture`` is called from the capture thread."""
         camera = run.camera
-        self._clock, self._on_picture = clock, on_picture
+        self._clock = clock
+        self._on_picture = on_picture
         self.detector = overhead_detector(run, robot, ground)
-        self._name, self._latency_s = f"camera {camera.device}", camera.latency_s
+        self._name = f"camera {camera.device}"
+        self._latency_s = camera.latency_s
         self._device = open_device(camera)
         self._robot = robot
         self._learning = FloorLearning(robot, camera.learn_s)
@@ -153,7 +155,8 @@ class DeviceCamera:
                 return
             taken += 1
             try:
-                picture, time_s = in_colour(frame), self._clock.now_s() - self._latency_s
+                picture = in_colour(frame)
+                time_s = self._clock.now_s() - self._latency_s
                 self._on_picture(picture, time_s)
                 if taken % CHECK_FRAMES == 0:
                     self.detector = self.detector.registered(picture)

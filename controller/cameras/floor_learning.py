@@ -30,7 +30,8 @@ class FloorLearning:
 
     def __init__(self, robot: RobotConfig, learn_s: float) -> None:
         """Learn with the time constant ``learn_s``; 0: never."""
-        self._robot, self._learn_s = robot, learn_s
+        self._robot = robot
+        self._learn_s = learn_s
         self._floor: NDArray[np.float32] | None = None
         self._shown: Image | None = None
         self._last_s: float | None = None

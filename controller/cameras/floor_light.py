@@ -82,10 +82,12 @@ def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
     most, least = channels[0], channels[0]
     for one in channels[1:]:
         most, least = np.maximum(most, one), np.minimum(least, one)
-    shadow, glare = np.clip(most, 1.0 - shade, 1.0), np.clip(least, 1.0, 1.0 + _GLARE)
+    shadow = np.clip(most, 1.0 - shade, 1.0)
+    glare = np.clip(least, 1.0, 1.0 + _GLARE)
     apart = np.zeros(most.shape, dtype=np.float32)
     for k in range(ratio.shape[2]):
-        here, ground = now[..., k], floor[..., k]
+        here = now[..., k]
+        ground = floor[..., k]
         np.maximum(apart, np.maximum(shadow * ground - here, here - glare * ground), out=apart)
     return apart
 

@@ -36,7 +36,8 @@ class GroundRest:
     """Puts a body on the ground: the plane of its links fits the ground below."""
 
     def __init__(self, robot: RobotConfig, heights: Heights | None) -> None:
-        self._spine, self._heights = SpineLinks.of(robot), heights
+        self._spine = SpineLinks.of(robot)
+        self._heights = heights
         self._radius_m = robot.body_radius_m
 
     def pose(self, place: Floats, joint_rad: Floats, time_s: float) -> BodyPose:

@@ -71,9 +71,10 @@ class Lens:
             raise InputError(why_no_file(file))
         size, held = _stored(file)
         faults = [
-            f"{file}: holds no {name}" for name, value in zip(_MATRICES, held, strict=True)
+            f"{file}: holds no {name}"
+            for name, value in zip(_MATRICES, held, strict=True)
             if value is None
-        ]  # fmt: skip
+        ]
         if not all(1.0 <= side <= 100_000.0 for side in size):
             faults.append(f"{file}: image_width and image_height are needed, whole and above 0")
         if faults:

@@ -98,8 +98,11 @@ def _calibrated(
         rms, matrix, distortion, turns, _, errors, _, residuals = cv2.calibrateCameraExtended(
             [points.astype(np.float32) for points in board],
             [view.corners_px.astype(np.float32) for view in views.values()],
-            size_px, np.eye(3), np.zeros(5), flags=_FLAGS,
-        )  # fmt: skip
+            size_px,
+            np.eye(3),
+            np.zeros(5),
+            flags=_FLAGS,
+        )
     except cv2.error as error:
         raise InputError(f"the pictures fix no lens: {error.err}") from None
     matrix = np.asarray(matrix, dtype=float)

@@ -41,7 +41,8 @@ from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_SHADOW, _LARGE_SHADOW = 0.02, 0.05  # of the body's area: dark and colourless next to it (ours)
+_SHADOW = 0.02
+_LARGE_SHADOW = 0.05  # of the body's area: dark and colourless next to it (ours)
 _SURROUNDINGS = 0.25  # of the picture's width: a square in which the body is small
 _MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
 _HALF = 2  # reduction of the picture to match the floor
@@ -155,7 +156,8 @@ class CameraModel:
             fit = fit_floor(markers, places, lens)
         except InputError as fault:
             raise InputError(f"camera: markers_m: {fault}") from None
-        size_px, side_m = (background.shape[1], background.shape[0]), camera.marker_side_m
+        size_px = (background.shape[1], background.shape[0])
+        side_m = camera.marker_side_m
         distortion = None if lens else marker_distortion(markers, places, size_px, side_m)
         if distortion is not None and not distortion.is_certain:
             distortion = None
@@ -166,9 +168,11 @@ class CameraModel:
                 f"camera: markers_m: marker {worst} lies {1e3 * fit.residual_m[worst]:.0f} mm from "
                 f"where it must be by the others: {cause}"
             )
-        foot, height = np.array(centre_m, dtype=float), camera.height_m
+        foot = np.array(centre_m, dtype=float)
+        height = camera.height_m
         if fit.lens_m is not None:
-            foot, height = fit.lens_m[:2], float(fit.lens_m[2])
+            foot = fit.lens_m[:2]
+            height = float(fit.lens_m[2])
         return cls(fit.floor_from_px, foot, height, lens, markers=markers, distortion=distortion)
 
     def matrix(self, size_px: tuple[int, int]) -> Floats:
@@ -211,7 +215,8 @@ class CameraModel:
         onto_floor = np.diag([grow, grow, 1.0])  # a higher point covers the floor farther out
         onto_floor[:2, 2] = self.foot_m * (1.0 - grow)
         back = np.asarray(np.linalg.inv(self.floor_from_px) @ onto_floor, dtype=float)
-        lens, moved_px = self.lens, np.array(self.moved_px)
+        lens = self.lens
+        moved_px = np.array(self.moved_px)
 
         def project(points_m: Floats) -> Floats:
             plain = projected(back, points_m)
@@ -290,15 +295,19 @@ class OverheadDetector:
             size_px = image.shape[1], image.shape[0]
             model = first.model
             move = picture_move(
-                model.markers, find_markers(image), model.floor_from_px, model.matrix(size_px),
+                model.markers,
+                find_markers(image),
+                model.floor_from_px,
+                model.matrix(size_px),
                 model.lens,
-            )  # fmt: skip
+            )
             if move is not None:
                 return self._moved_by_markers(first, move, size_px)
         return self._moved_by_texture(image)
 
     def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
-        known, now = self.bump or Bump((0.0, 0.0)), move.bump
+        known = self.bump or Bump((0.0, 0.0))
+        now = move.bump
         corners = np.array(
             [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
         )
@@ -320,11 +329,14 @@ class OverheadDetector:
         at = (then if lens is None else lens.distorted(then)).astype(np.float32)
         ground = np.asarray(
             cv2.remap(
-                first.background, at[..., 0], at[..., 1], cv2.INTER_LINEAR,
+                first.background,
+                at[..., 0],
+                at[..., 1],
+                cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_REPLICATE,
             ),
             dtype=np.uint8,
-        )  # fmt: skip
+        )
         return replace(self, model=model, background=ground, bump=now, first=first, pictured=None)
 
     def _moved_by_texture(self, image: Image) -> Self:
@@ -351,11 +363,14 @@ class OverheadDetector:
         def shifted(ground: Image) -> Image:
             return np.asarray(
                 cv2.warpAffine(
-                    ground, np.array([[1.0, 0.0, x], [0.0, 1.0, y]]), (columns, rows),
-                    flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE,
+                    ground,
+                    np.array([[1.0, 0.0, x], [0.0, 1.0, y]]),
+                    (columns, rows),
+                    flags=cv2.INTER_LINEAR,
+                    borderMode=cv2.BORDER_REPLICATE,
                 ),
                 dtype=np.uint8,
-            )  # fmt: skip
+            )
 
         moved = shifted(self.background)
         if _parts_explained(now, floor, _texture(moved)) < _LEAST_PARTS:
@@ -463,11 +478,11 @@ def _parts_explained(
 ) -> int:
     far = _FURTHEST_PX // _HALF
     before, after = (
-        cv2.resize(
-            ((now - one) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA
-        ) for one in (floor, moved)
-    )  # fmt: skip
-    better, worse = after < _BETTER * before, before < _BETTER * after
+        cv2.resize(((now - one) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA)
+        for one in (floor, moved)
+    )
+    better = after < _BETTER * before
+    worse = before < _BETTER * after
     return int(better.sum()) - int(worse.sum())
 
 

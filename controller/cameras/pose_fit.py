@@ -100,7 +100,8 @@ def _shift_along(
 def _motions(links: Floats, ahead: Floats, weight: Floats) -> Floats:
     """(2 L + 1, 4) weighted motion of the links for a shift, a turn and a slide."""
     count = len(links)
-    one, none = np.ones(count), np.zeros(count)
+    one = np.ones(count)
+    none = np.zeros(count)
     columns = [
         np.stack([one, none], axis=1),
         np.stack([none, one], axis=1),

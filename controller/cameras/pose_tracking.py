@@ -50,7 +50,8 @@ _UNKNOWN: Final = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows 
 _ALIKE: Final = 1.0  # adjacent sections have similar errors (ours)
 _ALIKE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
 _SHAPE: Final = 0.04  # radii: common error of all sections, from the body's look (ours)
-_THIN, _THICK = 0.2, 1.5  # of the body's width: limits of a section's content
+_THIN = 0.2
+_THICK = 1.5  # of the body's width: limits of a section's content
 
 
 ToPixels = Callable[[Floats], Floats]
@@ -204,24 +205,27 @@ def _look(
     c, s = np.cos(turn), np.sin(turn)
     spin = np.array([[c, s], [-s, c]])
     at = chain.middle_m + shift
-    here, forward = (chain.places_m - chain.middle_m) @ spin, chain.ahead @ spin
-    ends_m, out = (chain.tips_m - chain.middle_m) @ spin, chain.out @ spin
+    here = (chain.places_m - chain.middle_m) @ spin
+    forward = chain.ahead @ spin
+    ends_m = (chain.tips_m - chain.middle_m) @ spin
+    out = chain.out @ spin
     section_spots, off = _section_spots(here + at, forward, wide * radius_m)
     tip_spots, off_tip = _tip_spots(ends_m + at, out, radius_m)
     value = seen.at(np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)]))
     count = section_spots.shape[0] * section_spots.shape[1]
     across, width = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
     along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
-    sections, ends = (width > _THIN) & (width < _THICK), ends & ~hidden
+    sections = (width > _THIN) & (width < _THICK)
+    ends = ends & ~hidden
     free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
     used = sections & free
     if wide != _NARROW or used.mean() < _LEAST_FREE or seen.compression is not None:
         used = sections
     tip_m = _TIP_M if seen.compression is None else _TIP_IN_BLOCKS_M
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
-    rows = np.concatenate([
-        _rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m
-    ])  # fmt: skip
+    rows = np.concatenate(
+        [_rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m]
+    )
     target = np.concatenate([across[used] / _SECTION_M, along[ends] / tip_m])
     return _Look(across, sections, used, along, ends, rows, target)
 
@@ -264,7 +268,8 @@ def _fit_tips(
         usual = max(1.0, 1.4826 * float(np.median(size)))
         weight = np.sqrt(1.0 / np.maximum(1.0, size / (1.5 * usual)))
         step = least_squares(look.rows * weight[:, None], look.target * weight, _REGULAR)
-        shift, turn = shift + step[:2], turn + float(step[2])
+        shift = shift + step[:2]
+        turn = turn + float(step[2])
         if float(np.hypot(*step[:2])) < _STILL_M:
             if wide == _NARROW:
                 break
@@ -321,24 +326,34 @@ def _search(
     turns = np.arange(-_TURN_RAD, _TURN_RAD + 1e-9, _STEP_RAD)
     x, y = (one.ravel() for one in np.meshgrid(side, side))
     moves = np.stack([x, y], axis=1) @ grow
-    best, found = -np.inf, (np.zeros(2), 0.0)
+    best = -np.inf
+    found = (np.zeros(2), 0.0)
     rows, columns = ridge.shape
     for turn in turns:
         r = places - middle
-        swung = np.stack([
-            (np.cos(turn) - 1.0) * r[:, 0] - np.sin(turn) * r[:, 1],
-            np.sin(turn) * r[:, 0] + (np.cos(turn) - 1.0) * r[:, 1],
-        ], axis=1) @ grow  # fmt: skip
+        swung = (
+            np.stack(
+                [
+                    (np.cos(turn) - 1.0) * r[:, 0] - np.sin(turn) * r[:, 1],
+                    np.sin(turn) * r[:, 0] + (np.cos(turn) - 1.0) * r[:, 1],
+                ],
+                axis=1,
+            )
+            @ grow
+        )
         spots = np.rint((at + swung)[None] + moves[:, None]).astype(np.int32)
         inside = (
-            (spots[..., 0] >= 0) & (spots[..., 0] < columns)
-            & (spots[..., 1] >= 0) & (spots[..., 1] < rows)
-        )  # fmt: skip
+            (spots[..., 0] >= 0)
+            & (spots[..., 0] < columns)
+            & (spots[..., 1] >= 0)
+            & (spots[..., 1] < rows)
+        )
         value = ridge[np.clip(spots[..., 1], 0, rows - 1), np.clip(spots[..., 0], 0, columns - 1)]
         score = np.where(inside, value, 0.0).mean(axis=1)
         k = int(score.argmax())
         if score[k] > best:
-            best, found = float(score[k]), (np.array([x[k], y[k]]), float(turn))
+            best = float(score[k])
+            found = (np.array([x[k], y[k]]), float(turn))
     return found
 
 
@@ -367,9 +382,10 @@ def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floa
     normal = np.stack([-out[:, 1], out[:, 0]], axis=1)
     side = 0.4 * radius_m * np.array([-1.0, 0.0, 1.0])
     spots = (
-        tips[:, None, None] + off[:, None, None] * out[:, None, None]
+        tips[:, None, None]
+        + off[:, None, None] * out[:, None, None]
         + side[:, None] * normal[:, None, None]
-    )  # fmt: skip
+    )
     return spots, off
 
 

@@ -89,7 +89,9 @@ class RenderedCamera:
     ) -> None:
         self._view = top_view(run, robot, world, ground)
         self.detector = rendered_detector(run, robot, self._view.empty_floor(), ground)
-        self._qpos, self._clock, self._on_picture = qpos, clock, on_picture
+        self._qpos = qpos
+        self._clock = clock
+        self._on_picture = on_picture
         self._period_s = 1.0 / run.camera.rate_hz
         self._next_s = clock.now_s()
         self._coming: deque[LineDetection | TrackedPose] = deque()

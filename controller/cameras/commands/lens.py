@@ -75,7 +75,8 @@ def calibrate_camera(
     used = sum(math.isfinite(one) for one in found.view_rms_px)
     with atomic_write(out) as part:
         found.lens.write(part, found.rms_px, used)
-    focal, matrix = found.lens.matrix[[0, 1], [0, 1]], found.lens.matrix
+    focal = found.lens.matrix[[0, 1], [0, 1]]
+    matrix = found.lens.matrix
     show(
         {
             "lens": str(out),
@@ -120,7 +121,8 @@ def _from_device(
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")
     wanted = CameraConfig(device=name, width_px=int(width), height_px=int(height))
-    device, clock = open_device(wanted), WallClock()
+    device = open_device(wanted)
+    clock = WallClock()
     seen: list[BoardView | None] = []
     picture: Image | None = None
     try:

@@ -118,7 +118,8 @@ def marker_picture(number: int, side_px: int) -> Image:
 def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
     """(H, W) a page: the marker, half a cell of white, and its number and side."""
     drawn = marker_picture(number, round(side_m / _INCH_M * dots_per_inch))
-    margin, foot = len(drawn) // (2 * _CELLS), len(drawn) // 6
+    margin = len(drawn) // (2 * _CELLS)
+    foot = len(drawn) // 6
     page = np.pad(drawn, ((margin, margin + foot), (margin, margin)), constant_values=255)
     text = f"marker {number}   {1e3 * side_m:g} mm"
     thick = max(1, len(drawn) // 400)
@@ -155,7 +156,8 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
     flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
     seen = cv2.warpPerspective(grey, there, sheet.shape[::-1], flags=flags).astype(np.float32)
     sheet = np.asarray(cv2.GaussianBlur(sheet, (0, 0), max(0.3, 0.5 * cell / cells_px)))
-    start, whole = np.eye(2, 3, dtype=np.float32), np.full(seen.shape, 255, np.uint8)
+    start = np.eye(2, 3, dtype=np.float32)
+    whole = np.full(seen.shape, 255, np.uint8)
     try:
         _, move = cv2.findTransformECC(
             sheet, seen, start, cv2.MOTION_AFFINE, _STEPS, whole, _SMOOTH
@@ -200,7 +202,8 @@ def fit_floor(
     if lens is not None:
         rotation, shift = _pose(floor, middles, lens.matrix)  # six parameters instead of eight
         homography = np.linalg.inv(_over_floor((rotation, shift), lens.matrix))
-        homography, lens_m = homography / homography[2, 2], -rotation.T @ shift
+        homography = homography / homography[2, 2]
+        lens_m = -rotation.T @ shift
     if homography is None or not np.isfinite(homography).all():
         raise InputError("the markers fix no floor: three of four lie on a line")
     away = projected(homography, middles) - floor
@@ -239,7 +242,8 @@ def picture_move(
     names = sorted(set(one) & set(two))
     if len(names) < _FEWEST_MOVED:
         return None
-    rest, left_out = list(names), list[int]()
+    rest = list(names)
+    left_out = list[int]()
     while len(rest) >= _FEWEST_MOVED:
         move = _turned(matrix, one, two, rest)
         off_px = _residual_px(move, one, two, rest)

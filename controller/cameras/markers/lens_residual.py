@@ -80,7 +80,8 @@ def marker_distortion(
     names = sorted(set(seen) & set(places_m))
     if len(names) < FEWEST:
         return None
-    middle, unit = 0.5 * (np.array(size_px) - 1.0), 0.5 * size_px[0]
+    middle = 0.5 * (np.array(size_px) - 1.0)
+    unit = 0.5 * size_px[0]
     px = (np.array([seen[name] for name in names]) - middle) / unit
     floor = np.array([places_m[name] for name in names], dtype=float)
     start, _ = cv2.findHomography(np.array([middle_of(one) for one in px]), floor)
@@ -95,15 +96,16 @@ def marker_distortion(
 
     def off(values: Floats) -> Floats:
         homography = np.append(values[:8], 1.0).reshape(3, 3)
-        turn, away = values[10 : 10 + count], values[10 + count :].reshape(count, 2)
+        turn = values[10 : 10 + count]
+        away = values[10 + count :].reshape(count, 2)
         c, s = np.cos(turn), np.sin(turn)
         spin = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
         squares = side_m * (1.0 + _SIDE * values[9]) * (_SQUARE @ spin)
         wanted = (floor + _PLACE_M * away)[:, None] + squares
         found = projected(homography, _undone(px, float(values[8])))
-        return np.concatenate([
-            ((found - wanted) * metre_px / _CORNER_PX).ravel(), away.ravel(), values[9:10]
-        ])  # fmt: skip
+        return np.concatenate(
+            [((found - wanted) * metre_px / _CORNER_PX).ravel(), away.ravel(), values[9:10]]
+        )
 
     first = np.concatenate([start.ravel()[:8], [0.0, 0.0], turns, np.zeros(2 * count)])
     fits = []

@@ -33,15 +33,20 @@ class DrawnTags:
         self, robot: RobotConfig, view: TagView, fixed: tuple[FixedTag, ...] = (), seed: int = 0
     ) -> None:
         assert robot.tags is not None
-        self._spine, self._tags, self._view = SpineLinks.of(robot), robot.tags, view
+        self._spine = SpineLinks.of(robot)
+        self._tags = robot.tags
+        self._view = view
         self._random = np.random.default_rng(seed)
         self._dictionary = tag_dictionary(robot.tags.dictionary)
         self._prints: dict[int, Image] = {}
         self._fixed = [
-            (tag.id, np.array(tag.place_m) + square(tag.side_m or robot.tags.side_m)
-             @ turned(tag.turn_deg).T)
+            (
+                tag.id,
+                np.array(tag.place_m)
+                + square(tag.side_m or robot.tags.side_m) @ turned(tag.turn_deg).T,
+            )
             for tag in fixed
-        ]  # fmt: skip
+        ]
 
     def picture(self, head: BodyPose, joint_rad: Floats) -> Image:
         """Return the picture (H, W) of a body."""

@@ -51,7 +51,9 @@ class DeviceTags:
     def __init__(
         self, camera: CameraConfig, detector: TagDetector, clock: Clock, on_picture: OnPicture
     ) -> None:
-        self._camera, self._detector, self._clock = camera, detector, clock
+        self._camera = camera
+        self._detector = detector
+        self._clock = clock
         self._on_picture = on_picture
         self._device = open_device(camera)
         self._found: queue.SimpleQueue[TagPicture] = queue.SimpleQueue()
@@ -114,7 +116,9 @@ class SimulatedTags:
     ) -> None:
         """Watch a body: ``body`` returns its head pose and joint angles."""
         self._drawn = DrawnTags(robot, TagView.of(camera), camera.fixed_tags, seed)
-        self._detector, self._body, self._on_picture = detector, body, on_picture
+        self._detector = detector
+        self._body = body
+        self._on_picture = on_picture
         self._period_s, self._next_s = 1.0 / camera.rate_hz, clock.now_s()
         self._coming: deque[TagPicture] = deque()
 
@@ -143,7 +147,8 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
         InputError: no tag within 5 s.
 
     """
-    until_s, seen = clock.now_s() + PATIENCE_S, 0
+    until_s = clock.now_s() + PATIENCE_S
+    seen = 0
     while clock.now_s() < until_s:
         for picture in pictures.arrived(clock.now_s()):
             seen += 1

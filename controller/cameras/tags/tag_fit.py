@@ -75,7 +75,8 @@ class TagFit:
 
     def __init__(self, robot: RobotConfig, view: TagView) -> None:
         assert robot.tags is not None
-        self._spine, self._tags = SpineLinks.of(robot), robot.tags
+        self._spine = SpineLinks.of(robot)
+        self._tags = robot.tags
         self._mounts = {tag.id: tag for tag in robot.tags.on}
         self.view = view
 
@@ -119,8 +120,10 @@ class TagFit:
     def _seen(self, corners_px: Corners, joint_rad: Floats) -> _Seen:
         body = self._spine.in_world(BodyPose(0.0, np.zeros(3), np.eye(3)), joint_rad)
         numbers = [number for number in corners_px if number in self._mounts]
-        area = {number: abs(cv2.contourArea(corners_px[number].astype(np.float32)))
-                for number in numbers}  # fmt: skip
+        area = {
+            number: abs(cv2.contourArea(corners_px[number].astype(np.float32)))
+            for number in numbers
+        }
         numbers.sort(key=lambda number: -area[number])
         if not numbers:
             return _Seen((), np.zeros((0, 3)), np.zeros((0, 2)))
@@ -147,8 +150,9 @@ class TagFit:
             return close[0][1:]
         in_world = [self.view.rotation @ turn for _, turn, _ in close]
         # the trace grows as the angle between two attitudes falls
-        likely = [turn[2, 2] if before is None else float(np.trace(before.T @ turn))
-                  for turn in in_world]  # fmt: skip
+        likely = [
+            turn[2, 2] if before is None else float(np.trace(before.T @ turn)) for turn in in_world
+        ]
         return close[int(np.argmax(likely))][1:]
 
     def _candidates(self, seen: _Seen) -> Iterator[tuple[Floats, Floats]]:
@@ -156,9 +160,12 @@ class TagFit:
         for k in range(min(_TRIED, len(seen.tags))):
             rows = slice(4 * k, 4 * k + 4)
             count, turns, shifts, _ = cv2.solvePnPGeneric(
-                flat, seen.pixels[rows], self.view.lens.matrix, None,
+                flat,
+                seen.pixels[rows],
+                self.view.lens.matrix,
+                None,
                 flags=cv2.SOLVEPNP_IPPE_SQUARE,
-            )  # fmt: skip
+            )
             axes, middle = _axes_of(seen.points_m[rows])
             for turn, shift in zip(turns[:count], shifts[:count], strict=True):
                 rotation = cv2.Rodrigues(turn)[0] @ axes.T
@@ -170,13 +177,16 @@ class TagFit:
         """Fit all corners; ``weighted``: outlying tags count less (Cauchy's weights)."""
         scale_px = _MISFIT * self._tags.noise_px
         for _ in range(_ROBUST_ROUNDS if weighted else _ROUNDS):
-            off, slope = self._off_px(seen, turn, at).ravel(), self._slope(seen, turn, at)
+            off = self._off_px(seen, turn, at).ravel()
+            slope = self._slope(seen, turn, at)
             if weighted:
                 share = 1.0 / (1.0 + (self._per_tag_px(seen, turn, at) / scale_px) ** 2)
                 root = np.sqrt(np.repeat(share, 8))
-                off, slope = root * off, root[:, None] * slope
+                off = root * off
+                slope = root[:, None] * slope
             step = np.asarray(np.linalg.lstsq(slope, -off, rcond=None)[0], dtype=float)
-            at, turn = at + step[:3], rotation_by(step[3:]) @ turn
+            at = at + step[:3]
+            turn = rotation_by(step[3:]) @ turn
         return turn, at
 
     def _per_tag_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
@@ -232,7 +242,9 @@ def tag_corners(tag: TagMount, side_m: float) -> Floats:
 def _axes_of(corners: Sequence[Floats] | Floats) -> tuple[Floats, Floats]:
     """Axes (3, 3) and centre (3,) of a square from its corners (4, 3)."""
     upper_left, upper_right, lower_right, lower_left = corners
-    right, top = upper_right - upper_left, upper_left - lower_left
-    right, top = right / np.linalg.norm(right), top / np.linalg.norm(top)
+    right = upper_right - upper_left
+    top = upper_left - lower_left
+    right = right / np.linalg.norm(right)
+    top = top / np.linalg.norm(top)
     middle = 0.25 * (upper_left + upper_right + lower_right + lower_left)
     return np.column_stack([right, top, np.cross(right, top)]), middle

@@ -45,7 +45,8 @@ class TagsPose:
     ) -> list[str]:
         """Return why the tags cannot give the pose here, one line per fault."""
         require_extra("pose: tags need", "cv2")
-        faults, camera = [], run.camera
+        faults = []
+        camera = run.camera
         if robot.tags is None:
             faults.append(
                 f"pose: tags: robot {robot.name} has no tags; add a table [tags] "
@@ -83,13 +84,20 @@ class TagsPose:
             InputError: the camera is missing, shows no tag, or shows the robot elsewhere.
 
         """
-        run, robot = context.prepared.run, context.prepared.robot
+        run = context.prepared.run
+        robot = context.prepared.robot
         assert robot.tags is not None
         # the tags give the head in the world: ignore another source's mounting
-        config = (robot.pose or PoseConfig()).model_copy(update={
-            "link": 0, "offset_m": (0.0,) * 3, "offset_deg": (0.0,) * 3,
-            "world_m": (0.0,) * 3, "world_deg": (0.0,) * 3, "frame": WORLD,
-        })  # fmt: skip
+        config = (robot.pose or PoseConfig()).model_copy(
+            update={
+                "link": 0,
+                "offset_m": (0.0,) * 3,
+                "offset_deg": (0.0,) * 3,
+                "world_m": (0.0,) * 3,
+                "world_deg": (0.0,) * 3,
+                "frame": WORLD,
+            }
+        )
         with closing(_pictures(context)) as pictures:
             first = first_picture(pictures, context.backend.clock)
             view = TagView.of(run.camera)
@@ -112,7 +120,8 @@ class TagFeed:
     """Head poses from pictures and the joint angles at their times."""
 
     def __init__(self, robot: RobotConfig, pictures: TagPictures, fit: TagFit) -> None:
-        self._pictures, self._fit = pictures, fit
+        self._pictures = pictures
+        self._fit = fit
         self._joints = MotionHistory(robot.joint_count)
         self._before: Floats | None = None
         self._sequence = self._tags = self._used = 0
@@ -158,7 +167,8 @@ class _NotedJoints:
     """Passes each joint state to the feed before the pose is computed."""
 
     def __init__(self, feed: TagFeed, pose: Callable[[JointState], BodyPose]) -> None:
-        self._feed, self._pose = feed, pose
+        self._feed = feed
+        self._pose = pose
 
     def __call__(self, state: JointState) -> BodyPose:
         self._feed.note(state)
@@ -173,16 +183,24 @@ def _detector(robot: RobotConfig, fixed: Sequence[FixedTag]) -> TagDetector:
 
 
 def _pictures(context: PoseContext) -> TagPictures:
-    prepared, backend = context.prepared, context.backend
-    run, robot = prepared.run, prepared.robot
+    prepared = context.prepared
+    backend = context.backend
+    run = prepared.run
+    robot = prepared.robot
     detector = _detector(robot, run.camera.fixed_tags)
-    qpos, head = backend.qpos, backend.pose
+    qpos = backend.qpos
+    head = backend.pose
     if qpos is None or head is None:
         return DeviceTags(run.camera, detector, backend.clock, context.on_picture)
     return SimulatedTags(
-        robot, run.camera, detector, lambda: (head(), qpos()[7:]), backend.clock,
-        context.on_picture, run.seed,
-    )  # fmt: skip
+        robot,
+        run.camera,
+        detector,
+        lambda: (head(), qpos()[7:]),
+        backend.clock,
+        context.on_picture,
+        run.seed,
+    )
 
 
 def _check_start(context: PoseContext, fit: TagFit, first: TagPicture, config: PoseConfig) -> None:
@@ -192,7 +210,8 @@ def _check_start(context: PoseContext, fit: TagFit, first: TagPicture, config: P
         InputError: only fixed tags are seen, or the robot is elsewhere.
 
     """
-    run, robot = context.prepared.run, context.prepared.robot
+    run = context.prepared.run
+    robot = context.prepared.robot
     alone = fit.of_link(first.corners_px)
     if alone is None:
         raise InputError("pose tags: no tag of the robot is in the picture; turn it, or the camera")

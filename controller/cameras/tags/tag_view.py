@@ -85,10 +85,12 @@ class TagView:
         if not tags:
             numbers = ", ".join(str(tag.id) for tag in fixed)
             raise InputError(f"camera.fixed_tags: none is in the picture; show tag {numbers}")
-        corners = np.concatenate([
-            np.array(tag.place_m) + square(tag.side_m or side_m) @ turned(tag.turn_deg).T
-            for tag in tags
-        ])  # fmt: skip
+        corners = np.concatenate(
+            [
+                np.array(tag.place_m) + square(tag.side_m or side_m) @ turned(tag.turn_deg).T
+                for tag in tags
+            ]
+        )
         pixels = self.lens.undistorted(np.concatenate([seen[tag.id] for tag in tags]))
         flags = cv2.SOLVEPNP_IPPE if len(tags) == 1 else cv2.SOLVEPNP_SQPNP
         count, turns, shifts, errors = cv2.solvePnPGeneric(
@@ -110,7 +112,8 @@ class TagView:
 
 def _aimed(camera: CameraConfig) -> tuple[Floats, Floats]:
     """Place and axes of a camera that looks at a place; the picture's top is up."""
-    place, aim = np.array(camera.place_m), np.array(camera.aim_m)
+    place = np.array(camera.place_m)
+    aim = np.array(camera.aim_m)
     ahead = (aim - place) / np.linalg.norm(aim - place)
     # for a vertical camera, the picture's top is along y
     up = np.array([0.0, 1.0, 0.0]) if abs(ahead[2]) > 1.0 - 1e-9 else np.array([0.0, 0.0, 1.0])
