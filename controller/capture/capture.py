@@ -342,7 +342,8 @@ def load_capture(path: Path) -> CaptureFile:
             f"{path}: is not a track that `animal capture` wrote: data of its frames are "
             "missing; choose another file"
         )
-    scale, rate_hz = float(held["m_per_px"]), float(held["rate_hz"])
+    scale = float(held["m_per_px"])
+    rate_hz = float(held["rate_hz"])
     even_s = np.arange(frames) / rate_hz  # files of before held no times
     time_s = np.asarray(held.get("time_s", even_s), dtype=float)
     return CaptureFile(

@@ -254,7 +254,8 @@ def _captured_clearly(
 
 def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
     """Reject a film in which a few rough frames are all that is found of an unclear outline."""
-    used, good = int(captured.used.sum()), int(captured.good.sum())
+    used = int(captured.used.sum())
+    good = int(captured.good.sum())
     unclear = [one for one in captured.status if one in _UNCLEAR]
     if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
         reason = max(dict.fromkeys(unclear), key=unclear.count)
@@ -271,7 +272,8 @@ def in_doubt(captured: Capture) -> Capture:
     If most outlines are broken, the used lines may be parts of a patterned body. If the length
     varies and most other frames are not solved, two animals in contact may be taken for one.
     """
-    used, broken = int(captured.used.sum()), sum(one in _BROKEN for one in captured.status)
+    used = int(captured.used.sum())
+    broken = sum(one in _BROKEN for one in captured.status)
     unsolved = len(_shown(captured)) - used
     low, usual, high = np.nanpercentile(captured.length_px, (5.0, 50.0, 95.0))
     varies = float((high - low) / usual)
@@ -334,7 +336,9 @@ def _write_pictures(
     scale: float,
 ) -> None:
     """Write what the options ask for to look at; ``scale`` is that of the review page."""
-    captured, footage, region = held.captured, film.footage, film.region
+    captured = held.captured
+    footage = film.footage
+    region = film.region
     if options.sheet is not None:
         contact_sheet(options.sheet, footage.read(), captured)
     if options.trail is not None:

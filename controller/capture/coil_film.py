@@ -171,7 +171,9 @@ class _Film:
         body = CoilBody.of([skeletons[k] for k in good])
         shapes = {k: Shape.of(outlines[k], body.scale) for k in good}
         values = {k: body.values_of(skeletons[k], shapes[k]) for k in good}
-        squares, left, misfit = [], [], []
+        squares = []
+        left = []
+        misfit = []
         for k in good[:: max(1, len(good) // _SAMPLE)]:
             fit, normal = fit_coil(values[k], body, shapes[k], 0.1, coarse=False)
             squares.append(normal.squares)
@@ -206,14 +208,16 @@ class _Film:
         out = _Solved([], [], turned)
         for n, k in enumerate(stretch):
             own, status, error = skeletons[k], *self._check(n, best)
-            body, error_px = _unsolved(own, status), np.nan
+            body = _unsolved(own, status)
+            error_px = np.nan
             if status is FrameStatus.COIL:
                 line = self.body.line(best.values[n], shapes[n], 4 * SEGMENTS)
                 body = self._skeleton(shapes[n].to_px(line))
                 error_px = float(np.hypot(error / self.body.scale, own_px))
             beside = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
             if own.status is FrameStatus.GOOD and (beside or _apart(own, body) < error_px):
-                body, error_px = own, np.nan  # the medial axis was right
+                body = own
+                error_px = np.nan  # the medial axis was right
             out.skeletons.append(body)
             out.expected_px.append(error_px)
         return out
@@ -303,7 +307,8 @@ class _Film:
 
     def _followed(self, shapes: Sequence[Shape], start: Floats) -> Floats:
         """(K, PARAMETERS) each frame fitted from the one before it."""
-        before, here = start, start
+        before = start
+        here = start
         out = []
         for shape in shapes:
             tried = []
@@ -321,7 +326,10 @@ class _Film:
         self, chain: Floats, shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> _Solution:
         """Fit all frames of a stretch at once, tied to each other and to the good frames."""
-        values, best, kept, damp = chain, np.inf, chain, 1e-2
+        values = chain
+        best = np.inf
+        kept = chain
+        damp = 1e-2
         held: tuple[list[Normal], Floats] | None = None
         for _ in range(_ROUNDS):
             normals = [
@@ -331,7 +339,10 @@ class _Film:
             cost = sum(one.cost for one in normals) + float(self._ties(values, ends).sum())
             if cost < best:
                 done = best - cost < 1e-4 * cost
-                best, kept, held, damp = cost, values, (normals, values), 0.3 * damp
+                best = cost
+                kept = values
+                held = (normals, values)
+                damp = 0.3 * damp
                 if done:
                     break
             else:
@@ -374,7 +385,8 @@ class _Film:
             push[n + 1] = push[n + 1] - off
         before = self._eliminated(own, push)
         after = self._eliminated(own[::-1], push[::-1])[::-1]
-        steps, covariance = [], []
+        steps = []
+        covariance = []
         for n in range(count):
             full = own[n] + before[n][0] + after[n][0]
             inverse = np.linalg.inv(full)

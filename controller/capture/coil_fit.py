@@ -29,7 +29,8 @@ _DISCS = 60
 _MARGIN_PX = 14  # working px around a silhouette
 _HALF = 127.5  # of a packed silhouette: its boundary
 _HOLE = 0.1  # squares of the width: a smaller hole is a light spot
-_COARSE, _FINE = (1.5, 0.3), (0.4, 0.2)  # of the width: largest distance outside and inside
+_COARSE = (1.5, 0.3)
+_FINE = (0.4, 0.2)  # of the width: largest distance outside and inside
 _ROUNDS = 12
 _SETTLED = 1e-3  # of the cost
 _TOGETHER = 9.0  # neighbouring pixels with nearly the same residual
@@ -201,7 +202,9 @@ def _draw_discs(
     """Write the greatest depth in any disc (h, w), and its disc, up to ``reach`` outside."""
     rows, columns = depth.shape
     for k in range(len(line)):
-        x, y, wide = line[k, 0], line[k, 1], half_width[k]
+        x = line[k, 0]
+        y = line[k, 1]
+        wide = half_width[k]
         far = wide + reach
         top, bottom = max(0, int(np.ceil(y - far))), min(rows - 1, int(np.floor(y + far)))
         left, right = max(0, int(np.ceil(x - far))), min(columns - 1, int(np.floor(x + far)))
@@ -284,7 +287,8 @@ def fit_coil(
     kept = start
     normal = normal_of(start, body, shape, squares, coarse=coarse)
     for far in (True, False) if coarse else (False,):
-        damp, best = 1e-2, np.inf
+        damp = 1e-2
+        best = np.inf
         values = kept
         for _ in range(_ROUNDS):
             here = normal_of(values, body, shape, squares, coarse=far)
@@ -294,12 +298,16 @@ def fit_coil(
                 cost += float(off @ prior[1] @ off)
             if cost < best:
                 done = best - cost < _SETTLED * cost
-                best, kept, normal, damp = cost, values, here, 0.3 * damp
+                best = cost
+                kept = values
+                normal = here
+                damp = 0.3 * damp
                 if done:
                     break
             else:
                 damp *= 8.0
-            information, push = normal.information, normal.push
+            information = normal.information
+            push = normal.push
             if prior is not None:
                 information = information + prior[1]
                 push = push + prior[1] @ (prior[0] - kept)

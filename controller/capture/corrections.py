@@ -100,7 +100,8 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
         raise InputError(f"{name}: redrawn: a frame stands there twice")
     usual_px = float(np.nanmedian(captured.length_px))
     usual_radius = np.nanmedian(captured.radius_px, axis=0)
-    flipped, left_out = set(corrections.flipped), set(corrections.left_out)
+    flipped = set(corrections.flipped)
+    left_out = set(corrections.left_out)
     expected = captured.expected_px.copy()
     skeletons: list[Skeleton] = []
     for k, status in enumerate(captured.status):

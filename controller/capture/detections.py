@@ -69,7 +69,8 @@ class Detections:
     def add(self, frame: DeepImage, detection: Detection) -> None:
         """Add the next frame (H, W[, C]); crops of small bodies are kept for their fit."""
         number = len(self.skeletons)
-        body, silhouette = detection.skeleton, detection.silhouette
+        body = detection.skeleton
+        silhouette = detection.silhouette
         self.skeletons.append(body)
         self.area_px.append(silhouette.area_px)
         self.contrast.append(silhouette.threshold)
@@ -96,7 +97,8 @@ class Detections:
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         self._keep(number, frame, detection)
         if body.length_px <= LONGEST_PX and not detection.faint_parts:
-            self._last, self._points = number, body.points_px
+            self._last = number
+            self._points = body.points_px
             self.crops.put(number, frame, detection.background, self._points)
         elif body.status is FrameStatus.GOOD:
             expected = axis_px

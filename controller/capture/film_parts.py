@@ -158,7 +158,8 @@ def joined(
 
 def _signs(parts: Sequence[FinishedPart]) -> list[int]:
     """-1 for parts that have the other end first than the first part with a body."""
-    out, sign = [], 1
+    out = []
+    sign = 1
     before: Skeleton | None = None
     for one in parts:
         if one.first is not None and before is not None and margin_of(one.first, before) < 0.0:

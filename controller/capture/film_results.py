@@ -43,7 +43,8 @@ def write_overlay_and_review(
         scale: of the page's pictures: ``picture_scale``.
 
     """
-    footage, region = film.footage, film.region
+    footage = film.footage
+    region = film.region
     if options.overlay is not None:
         bar.update(0, footage.count, description="overlay film")
         captures = [one.captured for one in animals]

@@ -66,7 +66,8 @@ class FinishedPart:
 
 def _skeleton(part: Capture, k: int) -> Skeleton:
     """Return the body of a frame, independent of the part's arrays."""
-    points, radius = part.points_px[k].copy(), part.radius_px[k].copy()
+    points = part.points_px[k].copy()
+    radius = part.radius_px[k].copy()
     return Skeleton(points, radius, float(part.length_px[k]), part.status[k])
 
 

@@ -106,8 +106,10 @@ def examine(
         InputError: recording, robot or world cannot be used.
 
     """
-    robot, friction = load_robot(robot_name), load_world(world_name).friction
-    track, states = load_track(name_or_path, rate_hz, least_score, choice), StatesConfig()
+    robot = load_robot(robot_name)
+    friction = load_world(world_name).friction
+    track = load_track(name_or_path, rate_hz, least_score, choice)
+    states = StatesConfig()
     wave = measure_wave(track)
     shapes = to_angles(to_states(track.angles_rad))
     refused: dict[str, int] = {}

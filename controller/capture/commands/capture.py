@@ -196,7 +196,8 @@ def _show_several(facts: AnimalsFacts, as_json: bool) -> None:
         if one.capture is None:
             table.add_row(str(one.animal), "-", "0", "-", "-", unsure)
             continue
-        used, length = one.capture.frames_used, f"{one.capture.length_px:g}"
+        used = one.capture.frames_used
+        length = f"{one.capture.length_px:g}"
         merged = str(one.frames_merged)
         table.add_row(str(one.animal), one.capture.track, str(used), merged, length, unsure)
     console.print(table)

@@ -31,7 +31,9 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 
     """
     check_picture(file)
-    track, pulse, unknown = found.track, found.pulse, found.pulse_unknown_reason
+    track = found.track
+    pulse = found.pulse
+    unknown = found.pulse_unknown_reason
     scale = track.rate_hz / track.angles_rad.shape[1]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 8.4), layout="constrained", dpi=110)
@@ -100,7 +102,8 @@ def _tracks(axes: Axes, found: Analysis) -> None:
 
 def _error_by_slope(axes: Axes, found: Analysis) -> None:
     """Draw the absolute error against the slope along the body, in bins of equal counts."""
-    error, slope = np.abs(found.pulse.body_error_rad), found.slope_rad
+    error = np.abs(found.pulse.body_error_rad)
+    slope = found.slope_rad
     seen = np.isfinite(error)
     order = np.argsort(slope[seen])
     parts = [np.array_split(values[seen][order], _BINS) for values in (slope, error)]

@@ -17,10 +17,14 @@ from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.video import in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_BODY, _HEAD, _TEXT, _BAD = (60, 200, 255), (80, 255, 80), (255, 255, 255), (80, 80, 255)
+_BODY = (60, 200, 255)
+_HEAD = (80, 255, 80)
+_TEXT = (255, 255, 255)
+_BAD = (80, 80, 255)
 _BACK = 32
 _TILE_PX = 200
-_LINE_PX, _LETTERS = 14, 32  # of the text on a tile
+_LINE_PX = 14
+_LETTERS = 32  # of the text on a tile
 _STEP_PX = 300
 _FILM_PX = 480
 """Smaller frames are enlarged to this, so that the line does not hide the animal."""
@@ -95,7 +99,9 @@ def trail_picture(
     an animal with dark and light parts it is the extreme that is farther from the mean.
     Skeletons of twelve frames are drawn on it.
     """
-    high, low, total = None, None, np.zeros(())
+    high = None
+    low = None
+    total = np.zeros(())
     for image, used in zip(frames, captured.used, strict=False):
         if used:
             plain = in_8_bits(image)
@@ -155,7 +161,8 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     high, wide = body.mask.shape
     mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
     rows, columns, points_px = _around(points_px)
-    image, mask = image[rows, columns], mask[rows, columns]
+    image = image[rows, columns]
+    mask = mask[rows, columns]
     high, wide = image.shape[:2]
     factor = _STEP_PX / max(high, wide)
     tile_px = max(round(wide * factor), 120), round(high * factor) + 18
@@ -163,7 +170,8 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     bare = drawn(image, nothing, FrameStatus.NOTHING, *tile_px)
     shape = drawn(mask, nothing, FrameStatus.NOTHING, *tile_px)
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
-    axis, chords = shape.copy(), shape.copy()
+    axis = shape.copy()
+    chords = shape.copy()
     cv2.polylines(axis, [line], False, _BODY, 2, cv2.LINE_AA, 4)
     for number, (u, v) in enumerate(line.tolist()):
         size = 4 if number % 10 == 0 else 2

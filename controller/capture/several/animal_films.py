@@ -26,7 +26,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _DIRT = 0.05  # of the usual area: smaller objects are not mentioned
 _AROUND = 0.4  # of the body's length, around its blob
 _LEAST_AROUND_PX = 24
-_UNSEEN, _MERGED = -1, -2
+_UNSEEN = -1
+_MERGED = -2
 _MISSING = {_UNSEEN: FrameStatus.NOTHING, _MERGED: FrameStatus.MERGED}
 
 
@@ -78,13 +79,15 @@ def find_animals(
 
     """
     seen = [blobs_of(one, detector.ground_of(one), detector) for one in some]
-    usual, sample = usual_area(seen), [one.area_px for one in seen]
+    usual = usual_area(seen)
+    sample = [one.area_px for one in seen]
     if usual <= 0.0:
         raise InputError(
             f"{name}: no contrast or no motion: nothing stands out from the background; give "
             "--background, or better light"
         )
-    builder, count = TrackletBuilder(usual), 0
+    builder = TrackletBuilder(usual)
+    count = 0
     for frame in frames:
         builder.add(blobs_of(frame, detector.ground_of(frame), detector, usual))
         count += 1
@@ -202,7 +205,8 @@ def _plan(identity: Identity, count: int) -> SignedInts:
         touched = touched or (one is not first and one.begins_in is not None)
         if touched:
             out[at : one.frames[0]] = _MERGED
-        at, touched = one.frames[-1] + 1, one.ends_in is not None
+        at = one.frames[-1] + 1
+        touched = one.ends_in is not None
         out[one.frames[0] : at] = one.blobs
     return out
 

@@ -92,7 +92,9 @@ def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
     for first in range(len(tracklets)):
         if first in later:
             continue
-        chain, unsure, k = [tracklets[first]], [], first
+        chain = [tracklets[first]]
+        unsure = []
+        k = first
         while k in after:
             link = after[k]
             if link.margin < SURE:
@@ -152,7 +154,8 @@ def _groups(cost: _Costs) -> list[tuple[list[int], list[int]]]:
     for end, starts in cost.items():
         for start in starts:
             ends_of.setdefault(start, []).append(end)
-    out, free = [], set(cost)
+    out = []
+    free = set(cost)
     while free:
         ends: set[int] = set()
         starts_seen: set[int] = set()
@@ -251,7 +254,8 @@ def _shapes(
 def _shape_along(
     tracklets: Sequence[Tracklet], k: int, following: dict[int, int]
 ) -> tuple[Floats, int]:
-    shapes, number = [tracklets[k].shapes], len(tracklets[k].frames)
+    shapes = [tracklets[k].shapes]
+    number = len(tracklets[k].frames)
     while k in following and number < _ENOUGH:
         k = following[k]
         shapes.append(tracklets[k].shapes)

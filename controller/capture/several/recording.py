@@ -185,7 +185,8 @@ def _facts(
     files = track_files(options, len(held))
     listed = []
     for number, (one, file) in enumerate(zip(animals, held, strict=True), start=1):
-        facts, merged = None, 0
+        facts = None
+        merged = 0
         if file is not None:
             track = files[min(number, len(files)) - 1]
             captured = file.captured

@@ -123,7 +123,8 @@ class TrackletBuilder:
         """All tracklets, in order of their first frames; crossings have their final numbers."""
         kept = []
         for one in self.tracklets:
-            begins, ends = one.begins_in, one.ends_in
+            begins = one.begins_in
+            ends = one.ends_in
             short = len(one.frames) < _FEWEST
             if short and begins is not None and ends is not None:
                 self._joined([begins, ends])
@@ -149,7 +150,8 @@ class TrackletBuilder:
                 near = part > _SAME
                 links[old] &= near[old] | (np.arange(links.shape[1]) == new)
                 links[:, new] &= near[:, new] | (np.arange(links.shape[0]) == old)
-        lost, fresh = np.asarray(~links.any(axis=1)), np.asarray(~links.any(axis=0))
+        lost = np.asarray(~links.any(axis=1))
+        fresh = np.asarray(~links.any(axis=0))
         if lost.any() and fresh.any():
             moved = before.middle_px[:, None] - blobs.middle_px[None]
             apart = np.hypot(moved[..., 0], moved[..., 1])
@@ -166,7 +168,8 @@ class TrackletBuilder:
         """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""
         before = [self._nodes[old] for old in olds]
         if len(olds) == len(news) == 1:
-            node, new = before[0], int(news[0])
+            node = before[0]
+            new = int(news[0])
             area = float(blobs.area_px[new])
             if isinstance(node, Tracklet):
                 if area < _ALONE[1] * max(node.area_px, 1.0) or area < _ALONE[1] * self.usual_px:
@@ -236,7 +239,8 @@ def _shared_pixels(
 
 def _components(links: Bools) -> list[tuple[Ints, Ints]]:
     """Groups of linked blobs of two frames (n, m), each with at least one of both."""
-    out, free = [], set(np.flatnonzero(links.any(axis=1)).tolist())
+    out = []
+    free = set(np.flatnonzero(links.any(axis=1)).tolist())
     while free:
         olds: set[int] = {free.pop()}
         news: set[int] = set()

@@ -120,11 +120,16 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
     """Fit one frame; damped least squares from ``start`` (FRAME,)."""
     ribbon = Ribbon(body.grid)
     prior, target = _frame_prior(body.contrast)
-    shape, use = patch.picture.shape, patch.use.ravel()
+    shape = patch.picture.shape
+    use = patch.use.ravel()
     seen = max(float(use.sum()), 1.0)
     noise2 = 0.0
-    values, kept, best, damp = start, start, np.inf, 1e-3
-    normal, push = np.eye(FRAME), np.zeros(FRAME)
+    values = start
+    kept = start
+    best = np.inf
+    damp = 1e-3
+    normal = np.eye(FRAME)
+    push = np.zeros(FRAME)
     for turn in range(rounds):
         shown, slopes = ribbon.picture(values, body.values, shape, shared=False)
         rest = (patch.picture - shown).ravel() * use
@@ -138,7 +143,9 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
             if turn < _LEARNING:  # the residual is noise only near the end
                 noise2 = max(squares / seen, _LEAST_NOISE2)
                 cost = squares / noise2 + float(soft @ soft)
-            best, kept, damp = cost, values, 0.3 * damp
+            best = cost
+            kept = values
+            damp = 0.3 * damp
             products = gram(np.vstack([slopes.reshape(FRAME, -1) * use, rest])) / noise2
             normal = _solvable(products[:-1, :-1] + prior.T @ prior)
             push = products[:-1, -1] + prior.T @ soft
@@ -183,9 +190,12 @@ def film_body(
     body = kept_body = start
     frames = kept = [one.copy() for one in starts]
     contrast = float(np.median([one[2 + BENDS] for one in starts]))
-    best, damp, noise2 = np.inf, 1e-2, 0.0
+    best = np.inf
+    damp = 1e-2
+    noise2 = 0.0
     blocks: list[tuple[Floats, Floats, Floats]] = []
-    hss, gs = np.eye(size), np.zeros(size)
+    hss = np.eye(size)
+    gs = np.zeros(size)
     raised = 1.0
     seen = sum(float(patch.use.sum()) for patch in patches)
     for turn in range(_ROUNDS):
@@ -203,8 +213,12 @@ def film_body(
             if turn < 2 * _LEARNING:
                 noise2 = max(squares / seen, _LEAST_NOISE2)
                 cost = squares / noise2 + softness
-            best, kept_body, kept, damp = cost, body, frames, 0.3 * damp
-            hss, gs = body_rows.T @ body_rows, body_rows.T @ soft_body
+            best = cost
+            kept_body = body
+            kept = frames
+            damp = 0.3 * damp
+            hss = body_rows.T @ body_rows
+            gs = body_rows.T @ soft_body
             blocks = []
             for row, soft in zip(rows, softs, strict=True):
                 products = gram(row) / noise2
@@ -261,7 +275,8 @@ def _eliminated(
     solved = []
     for hff, hfs, gf in blocks:
         factor = cho_factor(hff + damp * np.diag(np.diag(hff)))
-        by, own = cho_solve(factor, hfs), cho_solve(factor, gf)
+        by = cho_solve(factor, hfs)
+        own = cho_solve(factor, gf)
         normal = normal - hfs.T @ by
         push = push - hfs.T @ own
         solved.append((by, own))
@@ -290,7 +305,10 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
         for away in _AWAY
         for angle in np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     ]
-    gain, norm, squares, count = np.zeros(len(tried)), np.zeros(len(tried)), 0.0, 0.0
+    gain = np.zeros(len(tried))
+    norm = np.zeros(len(tried))
+    squares = 0.0
+    count = 0.0
     every = max(1, len(frames) // _LOOKED_AT)
     for frame, patch in zip(frames[::every], patches[::every], strict=True):
         shape = patch.picture.shape
@@ -307,7 +325,8 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
         others = products[known:, known:] - products[known:, :known] @ np.linalg.solve(
             own, products[:known, known:]
         )
-        squares, count = squares + float(others[0, 0]), count + float(patch.use.sum())
+        squares = squares + float(others[0, 0])
+        count = count + float(patch.use.sum())
         gain += others[0, 1:]
         norm += np.diag(others)[1:]
     strength = gain / np.maximum(norm, 1e-9)

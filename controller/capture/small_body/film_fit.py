@@ -37,12 +37,14 @@ from snakewalk.controller.track.frame_status import FrameStatus
 ROUGH = 0.01
 """Share of the length: a frame of larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
-_FEWEST, _MOST = 8, 40
+_FEWEST = 8
+_MOST = 40
 _PASSES = 2
 _FORM = 0.004  # of the length: possible error of the model of the tips
 _UNLIKE = 10.0  # times misfit and blur: error of the shared parameters; measured on rendered films
 _SHARP = 62.0  # times the blur: the medial axis of a longer body is as good
-_LONG, _WIDE = 50.0, 2.4  # times the blur: as is that of a wide body, by length and half width
+_LONG = 50.0
+_WIDE = 2.4  # times the blur: as is that of a wide body, by length and half width
 _BY_BLUR = 0.6  # of the blur of all of the body, the blur at its edges: ``edge_blur_px``
 _LOST = 2.0  # times the median noise: the picture shows something else
 _FOUND = 1.5  # the same for a frame that had no skeleton
@@ -117,7 +119,8 @@ def fit_film(
             for k, fit in fits.items():
                 beside = 0.0 if ground is None else ground.visible(views[k], fit, body)
                 patches[k] = Patch(views[k].picture - beside, views[k].use)
-        start, starts = body.values, {k: fit.frame for k, fit in fits.items()}
+        start = body.values
+        starts = {k: fit.frame for k, fit in fits.items()}
     out = list(skeletons)
     expected = expected_px.copy()
     usual = float(np.median([fit.noise for fit in fits.values()]))
@@ -155,7 +158,8 @@ def _with_status(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
 
 def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> FittedFilm:
     """The film with lower bounds on the expected errors of some frames."""
-    expected, out = film.expected_px.copy(), list(film.skeletons)
+    expected = film.expected_px.copy()
+    out = list(film.skeletons)
     for k, least in least_px.items():
         if np.isfinite(expected[k]):
             expected[k] = max(float(expected[k]), least)
@@ -177,7 +181,8 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
         solved: (T,) frames of coils, whose error is known.
 
     """
-    expected, out = film.expected_px.copy(), list(film.skeletons)
+    expected = film.expected_px.copy()
+    out = list(film.skeletons)
     known = [
         k
         for k, ends in enumerate(ends_px)
@@ -192,7 +197,8 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
     usual = np.median(beyond, axis=0)
     share = 1.0
     if film.body is None:
-        share, tips = _WITHOUT_TIPS, tips_error_px(usual)
+        share = _WITHOUT_TIPS
+        tips = tips_error_px(usual)
     else:
         tips = tips_error_px(np.maximum(usual, 0.0))
     for k in known:
@@ -205,7 +211,8 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
     """Expected error of a point, mean along the body, working pixels."""
     length = float(body.values[0])
     slopes = curve_slopes(fit.frame, length)
-    own, size = slopes[:, :, :-1], 2 + BENDS
+    own = slopes[:, :, :-1]
+    size = 2 + BENDS
     shared = np.einsum("kij,jm->kim", own, fit.by_body[:size])
     shared[:, :, 0] += slopes[:, :, -1]
     square = np.einsum("kij,jl,kil->k", own, fit.inverse[:size, :size], own)
@@ -223,7 +230,8 @@ def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
     found = []
     for fit in fits:
         cover = ribbon.cover(fit.frame, body.values, fit.residual.shape)
-        near, beside = cover > _FREE, (cover < _FREE / 3.0) & (fit.residual != 0.0)
+        near = cover > _FREE
+        beside = (cover < _FREE / 3.0) & (fit.residual != 0.0)
         if near.any() and beside.any():
             squares = fit.residual**2
             more = float(squares[near].mean() - squares[beside].mean())

@@ -47,7 +47,8 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
     on = _seen(image, line[:, None] + (inner * half[:, None])[..., None] * side[:, None]).mean(1)
     first = 1.5 * half + _BESIDE_PX
     reach = first[:, None] + np.linspace(0.0, 1.0, _ACROSS) * np.maximum(half, 2.0)[:, None]
-    grounds, noise = [], []
+    grounds = []
+    noise = []
     for sign in (1.0, -1.0):
         places = line[:, None] + sign * reach[..., None] * side[:, None]
         seen = _seen(image, places)
