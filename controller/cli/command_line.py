@@ -33,8 +33,21 @@ _COMMON: Final = ("robot", "world", "run", "motion", "port", "seconds")
 _PANELS: Final = {
     "Display": ("view", "view_at", "ros", "observe"),
     "Results": (
-        *("out", "output", "robot_out", "film", "look", "fine", "picture", "overlay", "sheet"),
-        *("record", "truth", "folders", "accept_dead_reckoning", "as_json", "force"),
+        "out",
+        "output",
+        "robot_out",
+        "film",
+        "look",
+        "fine",
+        "picture",
+        "overlay",
+        "sheet",
+        "record",
+        "truth",
+        "folders",
+        "accept_dead_reckoning",
+        "as_json",
+        "force",
     ),
 }
 """Options by their group in the help of a command; the others are in its first group."""
@@ -207,7 +220,8 @@ def _family(path: str, commands: list[Plugin]) -> Any:
     panel = None if " " in path else _panel(commands[0])
     family.callback(no_args_is_help=True, help=about, rich_help_panel=panel)(_nothing)
     made = typer.main.get_group(family)
-    made.name, made.rich_help_panel = path.rsplit(maxsplit=1)[-1], panel
+    made.name = path.rsplit(maxsplit=1)[-1]
+    made.rich_help_panel = panel
     return made
 
 

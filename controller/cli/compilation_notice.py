@@ -13,7 +13,8 @@ class CompilationNotice:
 
     def __init__(self, print_line: Callable[[str], None]) -> None:
         self._print_line, self._clock = print_line, WallClock()
-        self._count, self._next_s = 0, 0.0
+        self._count = 0
+        self._next_s = 0.0
 
     def __call__(self, loop: str) -> None:
         """Count ``loop``, a dotted name."""
