@@ -13,7 +13,9 @@ from typing import Self
 from snakewalk.config.errors import InputError
 
 _EVENT = struct.Struct("<IhBB")
-_BUTTON, _AXIS, _AT_START = 1, 2, 0x80
+_BUTTON = 1
+_AXIS = 2
+_AT_START = 0x80
 _HALF = 16384
 _READS_MAX = 8
 """Reads of 64 events in a call (ours): a device that never ends must not hold a cycle up."""

@@ -14,10 +14,20 @@ except ImportError:  # Windows
     termios = tty = None  # type: ignore[assignment]
 
 _NAMES = {
-    "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
-    "\x1bOA": "up", "\x1bOB": "down", "\x1bOC": "right", "\x1bOD": "left",
-    " ": "space", "k": "up", "j": "down", "l": "right", "h": "left",
-}  # fmt: skip
+    "\x1b[A": "up",
+    "\x1b[B": "down",
+    "\x1b[C": "right",
+    "\x1b[D": "left",
+    "\x1bOA": "up",
+    "\x1bOB": "down",
+    "\x1bOC": "right",
+    "\x1bOD": "left",
+    " ": "space",
+    "k": "up",
+    "j": "down",
+    "l": "right",
+    "h": "left",
+}
 
 _READS_MAX = 16
 """Reads of 256 characters in a call (ours): pasted text must not hold a cycle up."""

@@ -146,7 +146,10 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
         words = shlex.join(["snakewalk", *sys.argv[1:]])
         LOGGER.debug(
             "%s; version %s, Python %s, %s",
-            *(words, version("snakewalk"), platform.python_version(), platform.platform()),
+            words,
+            version("snakewalk"),
+            platform.python_version(),
+            platform.platform(),
         )
         for text in fallbacks_in_use():  # reported at the import of modules, before this
             LOGGER.warning(text)

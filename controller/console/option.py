@@ -116,7 +116,8 @@ def _typer_info(name: str, field: FieldInfo, kind: Any) -> ParameterInfo:
     ready = next((each for each in field.metadata if isinstance(each, ParameterInfo)), None)
     if ready is not None:  # an option that plain signatures share
         return ready
-    flag, bounds = _flag(field), bounds_of(field)
+    flag = _flag(field)
+    bounds = bounds_of(field)
     facts: dict[str, Any] = {
         "help": description_of(field),
         "metavar": flag.metavar,

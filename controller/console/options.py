@@ -197,8 +197,10 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
 
     beside = None
     if run is not None and run.endswith(".toml"):
-        beside, given = Path(run).parent, load_run(run)
-        robot, world = robot or given.robot, world or given.world
+        beside = Path(run).parent
+        given = load_run(run)
+        robot = robot or given.robot
+        world = world or given.world
         if given.pose is not None:
             require("pose", given.pose.partition(":")[0], place_of(Path(run), "pose"))
     if robot is not None and robot.endswith(".toml"):

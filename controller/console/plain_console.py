@@ -50,7 +50,8 @@ def _fitted(table: Table, console: Console) -> RenderableType:
     unlimited = console.options.update(width=_UNLIMITED)
     if not table.columns or Measurement.get(console, unlimited, table).maximum <= console.width:
         return table
-    table.padding, table.pad_edge = (0, 1, 0, 0), False
+    table.padding = (0, 1, 0, 0)
+    table.pad_edge = False
     total = Measurement.get(console, unlimited, table).maximum
     for sentence in _SENTENCE:
         columns = [_widths(column, console, sentence) for column in table.columns]

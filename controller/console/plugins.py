@@ -22,8 +22,17 @@ from snakewalk.controller.console.import_speed import without_collections
 ENTRY_POINTS: Final = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
 KINDS: Final = (
-    *("command", "run", "motion", "joints", "pose", "map", "observer", "look", "planner"),
-    *("results", "backend"),
+    "command",
+    "run",
+    "motion",
+    "joints",
+    "pose",
+    "map",
+    "observer",
+    "look",
+    "planner",
+    "results",
+    "backend",
 )
 """Kinds of plug-ins."""
 OWN: Final = "snakewalk"

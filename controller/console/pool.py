@@ -79,7 +79,8 @@ def each(
     if dask is not None:
         yield from _on_cluster(work, items, dask)
         return
-    upcoming, suspects = iter(range(len(items))), deque[int]()
+    upcoming = iter(range(len(items)))
+    suspects = deque[int]()
     deaths: Counter[int] = Counter()
     while True:
         done = yield from _on_one_pool(work, items, workers, upcoming, suspects, deaths)
@@ -150,7 +151,8 @@ def _on_cluster(work: Callable[[A], B], items: Sequence[A], address: str) -> Ite
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(f"--dask {address}: no scheduler answers there ({error})") from None
     with client:
-        upcoming, waiting = iter(range(len(items))), dict[str, int]()
+        upcoming = iter(range(len(items)))
+        waiting = dict[str, int]()
         finished = distributed.as_completed()
 
         def submit(number: int) -> None:
