@@ -40,13 +40,18 @@ def body_frames(record: RunRecord) -> BodyFrames:
 
     Joint angles between two cycles are interpolated; a joint that was never read is straight.
     """
-    robot, pose, cycle = record.header.robot, record.pose, record.cycle
+    robot = record.header.robot
+    pose = record.pose
+    cycle = record.cycle
     known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
     if known.any():
-        time_s, head_m, turn = pose.time_s[known], pose.head_m[known], pose.rotation[known]
+        time_s = pose.time_s[known]
+        head_m = pose.head_m[known]
+        turn = pose.rotation[known]
     else:
         time_s = cycle.time_s
-        head_m, turn = np.zeros((len(time_s), 3)), np.tile(np.eye(3), (len(time_s), 1, 1))
+        head_m = np.zeros((len(time_s), 3))
+        turn = np.tile(np.eye(3), (len(time_s), 1, 1))
     count = robot.joint_count + 1
     translation = np.zeros((len(time_s), count, 3))
     quaternion = np.zeros((len(time_s), count, 4))
@@ -70,7 +75,8 @@ def _joints(robot: RobotConfig) -> Iterator[tuple[Floats, Floats]]:
         axis = (0.0, 0.0, -1.0) if letter == "y" else (0.0, 1.0, 0.0)
         yield np.array([-long_m, 0.0, 0.0]), np.array(axis)
     for joint in robot.limb_joints:
-        pair, side = robot.limbs[joint.pair], joint.outward
+        pair = robot.limbs[joint.pair]
+        side = joint.outward
         if joint.place:
             at_m = (0.0, side * pair.segments_m[joint.place - 1], 0.0)
         else:

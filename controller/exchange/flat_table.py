@@ -136,12 +136,14 @@ def _evidence(evidence: PoseEvidence, rows: int) -> dict[str, Cells]:
 def cell_names(name: str, column: Column, width: int, joints: Sequence[str]) -> list[str]:
     """Names of the ``width`` numbers in a row of an array; the unit is the end of each name."""
     unit = unit_of(name)
-    stem, end = name.removesuffix(f"_{unit}"), f"_{unit}" if unit else ""
+    stem = name.removesuffix(f"_{unit}")
+    end = f"_{unit}" if unit else ""
     match column.shape:
         case (shape,) if shape == JOINT:
             parts = [f"_{joint}" for joint in joints]
         case (shape, 3) if shape == LINK:
-            stem, parts = "link", [f"{k // 3}_{_XYZ[k % 3]}" for k in range(width)]
+            stem = "link"
+            parts = [f"{k // 3}_{_XYZ[k % 3]}" for k in range(width)]
         case (3, 3):
             parts = [f"_{k // 3}{k % 3}" for k in range(9)]
         case (3,):

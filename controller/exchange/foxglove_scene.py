@@ -103,7 +103,8 @@ def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:
                 schema = encode(foxglove_schema(name)).encode()
             else:
                 of_log = next(table.topic for table in TABLES if table.topic.name == topic)
-                name, schema = of_log.schema_name, of_log.schema
+                name = of_log.schema_name
+                schema = of_log.schema
             schema_id = writer.register_schema(name, "jsonschema", schema)
             return int(writer.register_channel(topic, "json", schema_id))
 
@@ -153,7 +154,8 @@ def _others(record: RunRecord) -> Iterator[Row]:
 
 def _frames(record: RunRecord) -> Iterator[Row]:
     frames = body_frames(record)
-    translations, turns = floats(frames.translation_m), floats(frames.quaternion)
+    translations = floats(frames.translation_m)
+    turns = floats(frames.quaternion)
     for time_s, ats, rotations in zip(frames.time_s.tolist(), translations, turns, strict=True):
         now = _time(time_s)
         transforms = [
@@ -189,7 +191,8 @@ def _imu(record: RunRecord) -> Iterator[Row]:
 
 
 def _joints(record: RunRecord) -> Iterator[Row]:
-    rows, names = record.cycle, record.header.robot.joint_names
+    rows = record.cycle
+    names = record.header.robot.joint_names
     effort_n_m = rows.current_a * record.header.torque_constant_n_m_a
     measured = np.stack([rows.measured_rad, rows.velocity_rad_s, effort_n_m], axis=2)
     for time_s, states, goals in zip(
@@ -236,7 +239,8 @@ def _body(record: RunRecord) -> Iterator[Json]:
         }
         yield _entity(f"link{link}", 0.0, frame=f"link{link}", locked=True, cylinders=[cylinder])
     for link, joint in enumerate(robot.limb_joints, robot.link_count):
-        pair, side = robot.limbs[joint.pair], joint.outward
+        pair = robot.limbs[joint.pair]
+        side = joint.outward
         length_m, width_m = pair.segments_m[joint.place], 2.0 * pair.foot_radius_m
         cylinder = {
             "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _ACROSS),
@@ -269,7 +273,8 @@ def _water(record: RunRecord) -> Iterator[Json]:
     surface_m = water_surface_m(record.header.world, record.header.ground)
     if surface_m is not None:
         middle_m, size_m = surface_m
-        pose, size = _pose(middle_m.tolist(), _UPRIGHT), _xyz([*size_m.tolist(), 0.002])
+        pose = _pose(middle_m.tolist(), _UPRIGHT)
+        size = _xyz([*size_m.tolist(), 0.002])
         cube = {"pose": pose, "size": size, "color": _color(_WATER)}
         yield _entity("water", 0.0, cubes=[cube])
 
@@ -279,7 +284,8 @@ def _obstacle(record: RunRecord) -> Iterator[Json]:
     thing = record.header.world.obstacle
     if thing is None:
         return
-    cubes, cylinders = [], []
+    cubes = []
+    cylinders = []
     for part in solids(thing):
         turn = Rotation.from_matrix(part.axes).as_quat().tolist()
         drawn = {"pose": _pose(part.centre_m.tolist(), turn), "color": _color(part.colour)}

@@ -23,7 +23,8 @@ def foxglove_schema(name: str) -> Schema:
 
 def _message(descriptor: Any) -> Schema:
     if descriptor.full_name in {"google.protobuf.Timestamp", "google.protobuf.Duration"}:
-        fields, title = {"sec": _WHOLE, "nsec": _WHOLE}, descriptor.name.lower()
+        fields = {"sec": _WHOLE, "nsec": _WHOLE}
+        title = descriptor.name.lower()
         return {"title": title, "type": "object", "properties": fields, "required": [*fields]}
     return {
         "title": descriptor.full_name,

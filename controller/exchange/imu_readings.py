@@ -31,11 +31,14 @@ class ImuReadings:
 
 def imu_readings(record: RunRecord) -> ImuReadings:
     """Readings of a log; one that was held while the device was silent counts once."""
-    table, config, pose = record.imu, record.header.robot.imu, record.pose
+    table = record.imu
+    config = record.header.robot.imu
+    pose = record.pose
     link = 0 if config is None else config.link
     measured_at_s = table.time_s - table.age_s
     fresh = np.diff(measured_at_s, prepend=-np.inf) > _SAME_S
-    time_s, link_m = measured_at_s[fresh], np.zeros((int(fresh.sum()), 3))
+    time_s = measured_at_s[fresh]
+    link_m = np.zeros((int(fresh.sum()), 3))
     if len(pose.time_s):
         seen_m = pose.links_m[:, link]
         known = np.isfinite(seen_m).all(axis=1)

@@ -199,12 +199,17 @@ def _add_dc_motors(root: ET.Element, robot: RobotConfig) -> None:
     hinges = {joint.get("name"): joint for joint in root.iter("joint")}
     parent = ET.SubElement(root, "actuator")
     rows = zip(
-        *(robot.joint_names, motors_of(robot), gears_of(robot)),
-        *(robot.position_p_gains, robot.current_limits_a),
+        robot.joint_names,
+        motors_of(robot),
+        gears_of(robot),
+        robot.position_p_gains,
+        robot.current_limits_a,
         strict=True,
     )
     for name, motor, gear, gain, limit_a in rows:
-        k_t, k_e, ohm = motor.torque_constant_n_m_a, motor.back_emf_v_s, motor.resistance_ohm
+        k_t = motor.torque_constant_n_m_a
+        k_e = motor.back_emf_v_s
+        ohm = motor.resistance_ohm
         constant = math.sqrt(k_t * k_e)
         most_v = robot.servo.supply_v * k_t / constant
         stiff = float(p_gain_per_rad(gain, motor)) * robot.servo.supply_v * k_t / ohm

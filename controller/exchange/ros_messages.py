@@ -114,7 +114,10 @@ class RosMessages:
             ros_time_s: returns the stamp of a time of the run's clock.
 
         """
-        self._make, self._floats, self._byte, self._ros_time_s = new, floats, byte, ros_time_s
+        self._make = new
+        self._floats = floats
+        self._byte = byte
+        self._ros_time_s = ros_time_s
 
     def rows(self, record: RunRecord) -> Iterator[Row]:
         """All messages, topic by topic."""
@@ -131,7 +134,9 @@ class RosMessages:
     def _events(self, record: RunRecord) -> Iterator[Row]:
         for event in record.events:
             yield self._row(
-                *(event.time_s, ROSOUT, TYPES[ROSOUT]),
+                event.time_s,
+                ROSOUT,
+                TYPES[ROSOUT],
                 stamp=self._stamp(event.time_s),
                 level=_LEVELS[event.level],
                 name="snakewalk",
@@ -143,7 +148,8 @@ class RosMessages:
 
     def joints(self, record: RunRecord) -> Iterator[Row]:
         """Measured and sent values of every cycle."""
-        cycle, names = record.cycle, list(record.header.robot.joint_names)
+        cycle = record.cycle
+        names = list(record.header.robot.joint_names)
         effort_n_m = cycle.current_a * record.header.torque_constant_n_m_a
         none = np.zeros(0)
         if not np.isfinite(record.header.torque_constant_n_m_a):
@@ -163,7 +169,9 @@ class RosMessages:
         effort: Floats,
     ) -> Row:
         return self._row(
-            *(time_s, topic, TYPES[topic]),
+            time_s,
+            topic,
+            TYPES[topic],
             header=self._header(time_s, ""),
             name=names,
             position=self._floats(position),
@@ -173,7 +181,8 @@ class RosMessages:
 
     def transforms(self, record: RunRecord, *, links: bool = True) -> Iterator[Row]:
         """Return the transforms of the head alone, or of every link."""
-        frames, world = body_frames(record), pose_frame(record.header)
+        frames = body_frames(record)
+        world = pose_frame(record.header)
         for k, time_s in enumerate(frames.time_s.tolist()):
             rows = zip(
                 frames.parents,
@@ -202,9 +211,11 @@ class RosMessages:
         """Where the head was."""
         if not len(record.pose.time_s):
             return
-        frames, world = body_frames(record), pose_frame(record.header)
+        frames = body_frames(record)
+        world = pose_frame(record.header)
         for k, time_s in enumerate(frames.time_s.tolist()):
-            at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
+            at = frames.translation_m[k, 0]
+            turn = frames.quaternion[k, 0]
             pose = self._pose(time_s, world, at.tolist(), turn.tolist())
             yield Row(time_s, HEAD_POSE, TYPES[HEAD_POSE], pose)
 
@@ -221,12 +232,14 @@ class RosMessages:
         """
         if not len(record.pose.time_s):
             return
-        frames, world = body_frames(record), pose_frame(record.header)
+        frames = body_frames(record)
+        world = pose_frame(record.header)
         unknown = self._floats(np.diag([UNKNOWN_VARIANCE] * 6).ravel())
         variance = [_variance(position_sd_m)] * 3 + [_variance(heading_sd_rad)] * 3
         nothing = self._xyz("Vector3", [0.0, 0.0, 0.0])
         for k, time_s in enumerate(frames.time_s.tolist()):
-            at, turn = frames.translation_m[k, 0], frames.quaternion[k, 0]
+            at = frames.translation_m[k, 0]
+            turn = frames.quaternion[k, 0]
             pose = self._new(
                 "geometry_msgs/msg/PoseWithCovariance",
                 pose=self._bare_pose(at.tolist(), turn.tolist()),
@@ -238,7 +251,9 @@ class RosMessages:
                 covariance=unknown,
             )
             yield self._row(
-                *(time_s, ODOMETRY, TYPES[ODOMETRY]),
+                time_s,
+                ODOMETRY,
+                TYPES[ODOMETRY],
                 header=self._header(time_s, world),
                 child_frame_id=frames.names[0],
                 pose=pose,
@@ -248,7 +263,8 @@ class RosMessages:
     def imu(self, record: RunRecord) -> Iterator[Row]:
         """Attitude and rate of a robot's IMU."""
         readings = imu_readings(record)
-        unknown, absent = np.zeros(9), np.array([-1.0, *[0.0] * 8])  # as the message defines them
+        unknown = np.zeros(9)
+        absent = np.array([-1.0, *[0.0] * 8])  # as the message defines them
         rows = zip(
             readings.time_s.tolist(),
             readings.quaternion.tolist(),
@@ -257,7 +273,9 @@ class RosMessages:
         )
         for time_s, turn, rate in rows:
             yield self._row(
-                *(time_s, IMU, TYPES[IMU]),
+                time_s,
+                IMU,
+                TYPES[IMU],
                 header=self._header(time_s, readings.frame),
                 orientation=self._quaternion(turn),
                 orientation_covariance=unknown,
@@ -280,12 +298,14 @@ class RosMessages:
 
     def _others(self, record: RunRecord) -> Iterator[Row]:
         """Fields that no message above contains: each has a topic of its own."""
-        name, frame = ConfigTable.topic.name, pose_frame(record.header)
+        name = ConfigTable.topic.name
+        frame = pose_frame(record.header)
         yield self._row(0.0, name, _TEXT, data=encode(record.header.row()))
         for table, columns in remaining_fields(record, SHOWN):
             for name, column in columns.items():
                 topic = table.topic.name
-                times_s, values = table.time_s.tolist(), getattr(table, name)
+                times_s = table.time_s.tolist()
+                values = getattr(table, name)
                 for time_s, value in zip(times_s, values, strict=True):
                     yield self._value(time_s, f"{topic}/{name}", frame, column, value)
 
@@ -297,12 +317,14 @@ class RosMessages:
         if not column.shape:
             return self._row(time_s, topic, "std_msgs/msg/Float64", data=float(value))
         numbers = np.asarray(value, dtype=float).ravel()
-        label, size = topic.rpartition("/")[2], len(numbers)
+        label = topic.rpartition("/")[2]
+        size = len(numbers)
         dimension = self._new(
             "std_msgs/msg/MultiArrayDimension", label=label, size=size, stride=size
         )
         layout = self._new("std_msgs/msg/MultiArrayLayout", dim=[dimension], data_offset=0)
-        kind, data = "std_msgs/msg/Float64MultiArray", self._floats(numbers)
+        kind = "std_msgs/msg/Float64MultiArray"
+        data = self._floats(numbers)
         return self._row(time_s, topic, kind, layout=layout, data=data)
 
     def _diagnostics(self, record: RunRecord) -> Iterator[Row]:
@@ -318,7 +340,8 @@ class RosMessages:
 
     def servos(self, record: RunRecord, k: int) -> list[Any]:
         """Return the status of every servo in a row of ``/slow``."""
-        slow, robot = record.slow, record.header.robot
+        slow = record.slow
+        robot = record.header.robot
         return [
             self.status(
                 robot.joint_names[joint],

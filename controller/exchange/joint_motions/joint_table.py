@@ -58,7 +58,8 @@ class JointTable:
                 rows = [row for row in csv.reader(stream, delimiter=separator) if any(row)]
         except (UnicodeDecodeError, csv.Error) as error:
             raise InputError(f"{path}: is not a CSV in UTF-8: {error}") from None
-        names, units = [], set[str]()
+        names = []
+        units = set[str]()
         for cell in cells[1:]:
             matched = _UNIT.match(cell)
             names.append((matched[1] if matched else cell).strip() or cell)

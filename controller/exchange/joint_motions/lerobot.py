@@ -41,7 +41,8 @@ class LeRobotEpisode:
         try:
             about = parse_json((path / "meta" / "info.json").read_text(encoding="utf-8"))
             features = about["features"]
-            rate_hz, episodes = float(about["fps"]), int(about["total_episodes"])
+            rate_hz = float(about["fps"])
+            episodes = int(about["total_episodes"])
             version = str(about.get("codebase_version", "not stated"))
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(f"{path}: meta/info.json is not one of LeRobot: {error}") from None
@@ -88,10 +89,12 @@ def _names(feature: Any) -> list[str] | None:
 
 def _rows(path: Path, feature: str, episode: int) -> tuple[Floats, Floats]:
     """Times (T,) and values (T, K) of an episode."""
-    parquet, arrow_fault = import_module("pyarrow.parquet"), import_module("pyarrow").ArrowException
+    parquet = import_module("pyarrow.parquet")
+    arrow_fault = import_module("pyarrow").ArrowException
     files = sorted((path / "data").glob(f"*/episode_{episode:06d}.parquet"))
     files = files or sorted((path / "data").glob("*/file-*.parquet"))
-    times, rows = [], []
+    times = []
+    rows = []
     for file in files:
         try:
             about = parquet.read_metadata(file)

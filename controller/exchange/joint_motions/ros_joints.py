@@ -102,7 +102,11 @@ def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
 
 def _motion(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
     names: tuple[str, ...] = ()
-    times, angles, others, unlike, cells = [], [], 0, set[str](), 0
+    times = []
+    angles = []
+    others = 0
+    unlike = set[str]()
+    cells = 0
     for time_s, row_names, positions in rows:
         names = names or row_names
         held = dict(zip(row_names, np.asarray(positions, float).tolist(), strict=False))

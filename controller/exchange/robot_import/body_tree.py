@@ -250,7 +250,10 @@ def _is_pair(children: list[MovingBody]) -> bool:
 
 
 def _with_branches(path: list[MovingBody], wheels: list[list[int]]) -> BodyTree:
-    groups, names, hinges, number = [path[0].bodies], [path[0].name], [], {id(path[0]): 0}
+    groups = [path[0].bodies]
+    names = [path[0].name]
+    hinges = []
+    number = {id(path[0]): 0}
     for before, body in pairwise(path):
         for k, hinge in enumerate(body.hinges):
             hinges.append(hinge)

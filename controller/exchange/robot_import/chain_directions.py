@@ -66,7 +66,8 @@ def chain_directions(
         forward = np.cross(first, across)
         forward *= math.copysign(1.0, float(forward @ chord))
     else:
-        across, forward = None, chord - (chord @ first) * first
+        across = None
+        forward = chord - (chord @ first) * first
     size = float(np.linalg.norm(forward))
     if size < 1e-9 or abs(float(forward / size @ chord)) < 1e-9:
         raise InputError(
@@ -84,7 +85,8 @@ def chain_directions(
 
 def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
     """Whether each axis is at a right angle to the first, by its neighbours' directions."""
-    kinds, across = [False], None
+    kinds = [False]
+    across = None
     off_neighbour, off_first = 0.0, 0.0
     for before, hinge in pairwise(hinges):
         off = math.acos(min(abs(float(before.axis @ hinge.axis)), 1.0))

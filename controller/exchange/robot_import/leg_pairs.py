@@ -86,10 +86,12 @@ def _leg(
     middle_m: float,
     tree: BodyTree,
 ) -> _Leg:
-    hinges, outward = branch.hinges, side * directions.left
+    hinges = branch.hinges
+    outward = side * directions.left
     if not 1 <= len(hinges) <= _MOST_JOINTS:
         raise InputError(f"leg {branch.name}: has {len(hinges)} joints; a leg has 1 to 4")
-    axes, signs = "", []
+    axes = ""
+    signs = []
     for hinge in hinges:
         swings = float(hinge.axis @ directions.up)
         lifts = float(hinge.axis @ directions.forward)
@@ -101,11 +103,14 @@ def _leg(
         axes += "y" if abs(swings) > abs(lifts) else "r"
         side_sign = -swings if axes[-1] == "y" else lifts
         signs.append(int(math.copysign(1.0, side * side_sign)))
-    spine_left = np.median([float(h.anchor_m @ directions.left) for h in tree.hinges
-                            if directions.is_yaw(h.axis)] or [0.0])  # fmt: skip
-    spine_up = np.median([float(h.anchor_m @ directions.up) for h in tree.hinges
-                          if not directions.is_yaw(h.axis)] or
-                         [float(hinges[0].anchor_m @ directions.up)])  # fmt: skip
+    spine_left = np.median(
+        [float(h.anchor_m @ directions.left) for h in tree.hinges if directions.is_yaw(h.axis)]
+        or [0.0]
+    )
+    spine_up = np.median(
+        [float(h.anchor_m @ directions.up) for h in tree.hinges if not directions.is_yaw(h.axis)]
+        or [float(hinges[0].anchor_m @ directions.up)]
+    )
     out_m = [float(h.anchor_m @ outward) - side * float(spine_left) for h in hinges]
     foot_m, radius_m, friction = _foot(model, data, branch, outward)
     ends_m = [*out_m, foot_m - side * float(spine_left)]
@@ -118,8 +123,10 @@ def _leg(
         )
     limits = []
     for hinge in hinges:
-        low, high = (float(v - model.qpos0[model.jnt_qposadr[hinge.joint]])
-                     for v in model.jnt_range[hinge.joint])  # fmt: skip
+        low, high = (
+            float(v - model.qpos0[model.jnt_qposadr[hinge.joint]])
+            for v in model.jnt_range[hinge.joint]
+        )
         limited = bool(model.jnt_limited[hinge.joint])
         limits.append(min(-low, high, _MOST_RAD) if limited else _MOST_RAD)
         if limits[-1] <= 0.05:
@@ -134,8 +141,9 @@ def _leg(
         if axis == "y"
     ]
     ahead_m = float(np.mean(swings_m or [middle_m]))
-    return _Leg(axes, out_m[0], segments_m, masses, radius_m, friction, signs, limits,
-                ahead_m - middle_m)  # fmt: skip
+    return _Leg(
+        axes, out_m[0], segments_m, masses, radius_m, friction, signs, limits, ahead_m - middle_m
+    )
 
 
 def _check_straight(
@@ -165,12 +173,18 @@ def _foot(
 ) -> tuple[float, float, float]:
     last = branch.groups[-1]
     geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] in last]
-    balls = [g for g in geoms if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE
-             and model.geom_size[g, 0] > 1e-3]  # fmt: skip
+    balls = [
+        g
+        for g in geoms
+        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE and model.geom_size[g, 0] > 1e-3
+    ]
     if balls:
         foot = max(balls, key=lambda g: float(data.geom_xpos[g] @ outward))
-        return (float(data.geom_xpos[foot] @ outward), float(model.geom_size[foot, 0]),
-                float(model.geom_friction[foot, 0]))  # fmt: skip
+        return (
+            float(data.geom_xpos[foot] @ outward),
+            float(model.geom_size[foot, 0]),
+            float(model.geom_friction[foot, 0]),
+        )
     hip_m = float(branch.hinges[-1].anchor_m @ outward)
     masses = model.body_mass[last]
     if masses.sum() > 0.0:

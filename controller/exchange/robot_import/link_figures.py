@@ -25,7 +25,8 @@ _SPREAD: Final = 0.2
 """Difference of an inertia that is reported (ours)."""
 _POINT: Final = 1e-3
 """Below this, the inertia is that of a point, which stands for a missing shape (ours)."""
-_THINNEST, _THICKEST = 0.05, 1.0
+_THINNEST = 0.05
+_THICKEST = 1.0
 """Radius over length of a mean link: an inertia that asks for another is a placeholder (ours)."""
 _ASSUMED_RADIUS: Final = 0.4
 """The same of links of which nothing states a thickness (ours)."""
@@ -64,7 +65,10 @@ class ChainFigures:
         source: ModelSource,
         assumed: Assumptions,
     ) -> None:
-        self._model, self._data, self._tree, self._directions = model, data, tree, directions
+        self._model = model
+        self._data = data
+        self._tree = tree
+        self._directions = directions
         self._assumed = assumed
         self.notes: list[str] = []
         wheels = {body for group in tree.wheels for body in group}
@@ -97,7 +101,8 @@ class ChainFigures:
             InputError: at zero angles they are not on one line, in their order.
 
         """
-        directions, hinges = self._directions, self._tree.hinges
+        directions = self._directions
+        hinges = self._tree.hinges
         at_m = [float(hinge.anchor_m @ directions.forward) for hinge in hinges]
         span_m = at_m[0] - at_m[-1]
         worst_m = 0.0
@@ -183,16 +188,19 @@ class ChainFigures:
         if centre_m > _SHORTEST_M:
             return centre_m, "twice the distance of its centre of mass from its joint"
         length_m = self._assumed.number(
-            key, _SHORTEST_M, 100.0,
+            key,
+            _SHORTEST_M,
+            100.0,
             f"link {name}: states no length: it has no shape, no neighbour with a length, and its "
             "centre of mass is at its joint",
             likely=0.07,
-        )  # fmt: skip
+        )
         return length_m, "by option"
 
     def _even_m(self, k: int, sign: float, joint_m: float) -> float | None:
         """Length of an even cylinder, if mass centre and inertia state the same one."""
-        mass, directions = self._masses[k], self._directions
+        mass = self._masses[k]
+        directions = self._directions
         if mass.kg <= 0.0:
             return None
         length_m = 2.0 * sign * (float(mass.centre @ directions.forward) - joint_m)
@@ -218,9 +226,10 @@ class ChainFigures:
         found = [
             g
             for g in range(model.ngeom)
-            if model.geom_bodyid[g] in group and model.geom_type[g] not in flat
+            if model.geom_bodyid[g] in group
+            and model.geom_type[g] not in flat
             and float(model.geom_rbound[g]) > 2e-4
-        ]  # fmt: skip
+        ]
         solid = [g for g in found if model.geom(g).name not in source.massless_geoms]
         return solid or found
 
@@ -231,7 +240,9 @@ class ChainFigures:
             InputError: nothing states it (the question).
 
         """
-        model, group, name = self._model, self._tree.groups[k], self._tree.names[k]
+        model = self._model
+        group = self._tree.groups[k]
+        name = self._tree.names[k]
         if not group:
             return _Mass(0.0, np.zeros(3), np.zeros((3, 3)))
         masses = model.body_mass[group]
@@ -288,7 +299,9 @@ class ChainFigures:
     def _radius_m(self, k: int, mean_m: float) -> float | None:
         if not self._tree.groups[k]:
             return None
-        directions, geoms, mass = self._directions, self._solid[k], self._masses[k]
+        directions = self._directions
+        geoms = self._solid[k]
+        mass = self._masses[k]
         if geoms:
             widths = [
                 sum(
@@ -305,7 +318,8 @@ class ChainFigures:
         return radius_m if _THINNEST * mean_m <= radius_m <= _THICKEST * mean_m else None
 
     def _link(self, k: int, length_m: float, radius_m: float) -> LinkFigures:
-        mass, directions = self._masses[k], self._directions
+        mass = self._masses[k]
+        directions = self._directions
         if mass.kg <= 0.0 or length_m <= 0.0:
             return LinkFigures(length_m, mass.kg, radius_m, 0.0, 1.0)
         front_m = self.joints_m[k - 1] if k else self.joints_m[0] + length_m
@@ -343,8 +357,10 @@ def data_centre(data: mujoco.MjData, group: list[int]) -> Floats:
 
 
 def _support(model: mujoco.MjModel, data: mujoco.MjData, geom: int, ahead: Floats) -> float:
-    kind, size = model.geom_type[geom], model.geom_size[geom]
-    centre, turned = float(data.geom_xpos[geom] @ ahead), ahead @ data.geom_xmat[geom].reshape(3, 3)
+    kind = model.geom_type[geom]
+    size = model.geom_size[geom]
+    centre = float(data.geom_xpos[geom] @ ahead)
+    turned = ahead @ data.geom_xmat[geom].reshape(3, 3)
     along = abs(float(turned[2]))
     if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
         return centre + float(size[0])
@@ -356,6 +372,7 @@ def _support(model: mujoco.MjModel, data: mujoco.MjData, geom: int, ahead: Float
         return centre + float(np.linalg.norm(size * turned))
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = model.geom_dataid[geom]
-        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        first = model.mesh_vertadr[mesh]
+        count = model.mesh_vertnum[mesh]
         return centre + float((model.mesh_vert[first : first + count] @ turned).max())
     return centre + float(size @ np.abs(turned))

@@ -18,9 +18,25 @@ from snakewalk.controller.exchange.robot_import.model_source import (
 )
 
 _NOT_READ: Final = frozenset(
-    {"option", "size", "visual", "statistic", "sensor", "keyframe", "custom", "contact", "actuator",
-     "light", "camera", "texture", "material", "hfield", "skin", "extension"}
-)  # fmt: skip
+    {
+        "option",
+        "size",
+        "visual",
+        "statistic",
+        "sensor",
+        "keyframe",
+        "custom",
+        "contact",
+        "actuator",
+        "light",
+        "camera",
+        "texture",
+        "material",
+        "hfield",
+        "skin",
+        "extension",
+    }
+)
 _SILENT: Final = frozenset({"option", "size", "visual", "statistic"})
 """Elements that do not describe the robot."""
 _OLD: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
@@ -146,7 +162,8 @@ def _geoms(root: LineElement) -> Iterator[tuple[LineElement, LineElement, str]]:
 def _resolve_meshes(
     source: ModelSource, path: Path, defaults: _Defaults, assumed: Assumptions
 ) -> None:
-    root, missing = source.root, {}
+    root = source.root
+    missing = {}
     compiler = root.find("compiler")
     settings = {} if compiler is None else compiler.attrib
     folder = path.parent / settings.get("meshdir", settings.get("assetdir", "."))
@@ -192,17 +209,20 @@ def _resolve_meshes(
 def _replace(
     parent: LineElement, geom: LineElement, mass: str | None, mesh: str, assumed: Assumptions
 ) -> None:
-    is_static, has_inertia = parent.tag == "worldbody", parent.find("inertial") is not None
+    is_static = parent.tag == "worldbody"
+    has_inertia = parent.find("inertial") is not None
     if is_static or has_inertia:
         mass = "0"
     if mass is None:
         body = parent.get("name", "")
         value = assumed.number(
-            f"{mesh}.mass_kg", 1e-4, 1e3,
+            f"{mesh}.mass_kg",
+            1e-4,
+            1e3,
             f"body {body}, {geom.where}: the mesh {mesh} is missing, and the model does not state "
             "its mass",
             likely=0.1,
-        )  # fmt: skip
+        )
         mass = repr(value)
     keys = ("name", "pos", "friction")
     kept: dict[str, str] = {key: geom.attrib[key] for key in keys if key in geom.attrib}

@@ -20,7 +20,8 @@ from snakewalk.controller.exchange.robot_import.model_source import (
 )
 from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 
-_MOST_MEMORY_BYTES, _MOST_CPU_S = 2_000_000_000, 10
+_MOST_MEMORY_BYTES = 2_000_000_000
+_MOST_CPU_S = 10
 """Limits of MuJoCo's compiler and of xacro: memory and CPU time (ours)."""
 _SAID: Final = 3
 _LIMITS: Final = """
@@ -87,7 +88,8 @@ def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelS
 
 def _copied(element: LineElement) -> LineElement:
     copy = LineElement(element.tag, dict(element.attrib))
-    copy.file, copy.line = element.file, element.line
+    copy.file = element.file
+    copy.line = element.line
     for child in element:
         assert isinstance(child, LineElement)
         copy.append(_copied(child))
@@ -128,7 +130,8 @@ def _compiled(source: ModelSource) -> tuple[mujoco.MjModel | None, str]:
     """Compiled model, or None and MuJoCo's message with the user's lines."""
     text, places = source.text()
     with TemporaryDirectory() as folder:
-        copy, made = Path(folder) / f"model.{source.root.tag}", Path(folder) / "model.mjb"
+        copy = Path(folder) / f"model.{source.root.tag}"
+        made = Path(folder) / "model.mjb"
         copy.write_text(text, encoding="utf-8")
         said = compile_model(copy, made)
         if said is not None:

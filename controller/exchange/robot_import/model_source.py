@@ -95,14 +95,16 @@ def parse(path: Path, name: str = "", text: str | None = None) -> tuple[LineElem
             raise InputError(f"{path}: line {parser.CurrentLineNumber}: nested too deeply")
         element = builder.start(tag, attributes)
         assert isinstance(element, LineElement)
-        element.file, element.line = name, parser.CurrentLineNumber
+        element.file = name
+        element.line = parser.CurrentLineNumber
 
     def end(tag: str) -> None:
         nonlocal depth
         depth -= 1
         builder.end(tag)
 
-    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
     parser.CharacterDataHandler = builder.data
     try:
         parser.Parse(raw, True)

@@ -45,11 +45,14 @@ _MOST_RAD: Final = 3.05
 _NEXT_TO_NOTHING_KG: Final = 2e-4
 """Mass of a link between two hinges of one body (ours): physics needs a mass."""
 _POSES: Final = 20
-_TORQUE_N_M, _SPEED_RAD_S = (0.1, 100.0), (0.1, 20.0)
+_TORQUE_N_M = (0.1, 100.0)
+_SPEED_RAD_S = (0.1, 20.0)
 """Beyond these, a stated limit is a placeholder (ours)."""
 _HELD_SHARE: Final = 2.0 / 2.3
 """Share of a servo's stall torque, up to which a run goes on: as for its current (ours)."""
-_LENGTH_M, _MASS_KG, _RADIUS_M = (0.0, 1.0), (0.0001, 20.0), (0.002, 0.5)
+_LENGTH_M = (0.0, 1.0)
+_MASS_KG = (0.0001, 20.0)
+_RADIUS_M = (0.002, 0.5)
 """Range that a robot file accepts for a link."""
 
 
@@ -120,7 +123,8 @@ def _read(
     way_m = centre_m(model, data, tree.groups[-1]) - centre_m(model, data, tree.groups[0])
     directions = chain_directions(tree.hinges, way_m, reverse, notes)
     if reverse:
-        tree, directions = _reversed(tree), replace(directions, yaws=directions.yaws[::-1])
+        tree = _reversed(tree)
+        directions = replace(directions, yaws=directions.yaws[::-1])
     figures = ChainFigures(model, data, tree, directions, source, assumed)
     notes += [
         *figures.notes,
@@ -173,7 +177,8 @@ def _check_size(links: list[LinkFigures], names: list[str], scale: float) -> Non
 
     """
     for link, name in zip(links, names, strict=True):
-        length_m, mass_kg = scale * link.length_m, scale**3 * link.mass_kg
+        length_m = scale * link.length_m
+        mass_kg = scale**3 * link.mass_kg
         for what, value, (low, high), unit in (
             ("length", length_m, _LENGTH_M, "m"),
             ("mass", mass_kg, _MASS_KG, "kg"),
@@ -332,7 +337,8 @@ def _kinematics_error_m(
     reverse: bool,
 ) -> float:
     """Largest distance of the axes of the spine's joints from the model's, over random poses."""
-    rng, data = np.random.default_rng(0), mujoco.MjData(model)
+    rng = np.random.default_rng(0)
+    data = mujoco.MjData(model)
     signs = np.array(
         [_sign(h, yaw, directions, reverse) for h, yaw in zip(hinges, directions.yaws, strict=True)]
     )
@@ -356,7 +362,8 @@ def _kinematics_error_m(
         anchors = np.array([data.xanchor[hinge.joint] for hinge in hinges])
         axes = np.array([data.xaxis[hinge.joint] for hinge in hinges])
         origin = _on_line_m(hinges, directions, fixed)
-        theirs, axes = scale * (anchors - origin) @ turn, axes @ turn
+        theirs = scale * (anchors - origin) @ turn
+        axes = axes @ turn
         away = ours - theirs
         # along its axis it may lie anywhere
         away -= (away * axes).sum(axis=1, keepdims=True) * axes

@@ -17,13 +17,22 @@ from snakewalk.controller.exchange.robot_import.model_source import (
 )
 
 _ONCE: Final = {
-    "joint": ("origin", "parent", "child", "axis", "limit", "dynamics", "calibration", "mimic",
-              "safety_controller"),
+    "joint": (
+        "origin",
+        "parent",
+        "child",
+        "axis",
+        "limit",
+        "dynamics",
+        "calibration",
+        "mimic",
+        "safety_controller",
+    ),
     "link": ("inertial",),
     "inertial": ("origin", "mass", "inertia"),
     "visual": ("origin", "geometry"),
     "collision": ("origin", "geometry"),
-}  # fmt: skip
+}
 """Elements that urdfdom reads once: the first counts."""
 _NOT_READ: Final = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
 _MESHES: Final = (".stl", ".obj")
@@ -156,7 +165,8 @@ def _first_link(source: ModelSource, path: Path) -> str:
         raise InputError(f"{path}: link world holds {held}; one robot is read at a time")
     root.remove(holding[0])
     root.remove(next(link for link in root.findall("link") if link.get("name") == here))
-    name_held, kind = _end(holding[0], "child"), holding[0].get("type")
+    name_held = _end(holding[0], "child")
+    kind = holding[0].get("type")
     source.notes.append(
         f"link world is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
     )
@@ -274,7 +284,8 @@ def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, st
         own = name = str(link.get("name"))
         steps = 0
         while name in parent and steps < len(parent):
-            name, steps = parent[name], steps + 1
+            name = parent[name]
+            steps = steps + 1
         stated = link.find("inertial/mass")
         value = numbers(None if stated is None else stated.get("value"), 1) or [0.0]
         masses[name] = masses.get(name, 0.0) + value[0]
@@ -290,9 +301,15 @@ def _float(root: LineElement, first: str) -> None:
     options = added(root, "mujoco")
     sliver = repr(_SLIVER_KG)
     added(
-        options, "compiler", fusestatic="true", discardvisual="false", strippath="false",
-        balanceinertia="true", boundmass=sliver, boundinertia=sliver,
-    )  # fmt: skip
+        options,
+        "compiler",
+        fusestatic="true",
+        discardvisual="false",
+        strippath="false",
+        balanceinertia="true",
+        boundmass=sliver,
+        boundinertia=sliver,
+    )
     added(root, "link", name=ground)
     floating = added(root, "joint", name=f"{ground}_floats", type="floating")
     added(floating, "parent", link=ground)
