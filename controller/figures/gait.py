@@ -40,14 +40,16 @@ def bodies_m(gait: Gait, robot: RobotConfig, phases: int = PHASES) -> Bodies:
     pose = BodyPose(0.0, np.zeros(3), np.eye(3))
     joints = gait.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, 12 * phases, endpoint=False))
     frame: Frame | None = None
-    shown, backs = [], []
+    shown = []
+    backs = []
     for k, row in enumerate(joints):
         body = body_in_world(robot, pose, row)
         frame = virtual_chassis(body.link_m, np.array([0.0, 0.0, 1.0]), frame)
         if k % 12 == 0:
             shown.append(frame.to_local_m(body.link_m))
             backs.append(body.rotation[:, :, 2] @ frame.rotation)
-    bodies, back = np.array(shown), np.array(backs)
+    bodies = np.array(shown)
+    back = np.array(backs)
     reach = np.abs(joints).max(axis=0)
     sideways, upwards = (reach[list(j)].max(initial=0.0) for j in (yaw, robot.pitch_joints))
     # the chassis lies in the plane of the strongest bends: stand it up where these lift

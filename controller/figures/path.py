@@ -52,7 +52,8 @@ def path_figure(record: RunRecord) -> Figure | None:
 
 
 def _extent(record: RunRecord) -> tuple[Floats, Floats]:
-    plan, pose = record.header.plan, record.pose
+    plan = record.header.plan
+    pose = record.pose
     links = pose.links_m[..., :2].reshape(-1, 2)
     around = [plan.waypoints_m - plan.waypoint_radius_m, plan.waypoints_m + plan.waypoint_radius_m]
     parts = [plan.path_m[:, :2], *around, pose.head_m[:, :2], links]
@@ -130,15 +131,25 @@ def _plan(axes: Axes, record: RunRecord) -> None:
             )
         )
         axes.annotate(
-            str(number + 1), point, ha="center", va="center", fontsize=9, fontweight="bold",
-            color="white" if measured else colour, zorder=6,
-            bbox={"boxstyle": "circle,pad=0.25", "facecolor": colour if measured else "white",
-                  "edgecolor": "white" if measured else colour},
-        )  # fmt: skip
+            str(number + 1),
+            point,
+            ha="center",
+            va="center",
+            fontsize=9,
+            fontweight="bold",
+            color="white" if measured else colour,
+            zorder=6,
+            bbox={
+                "boxstyle": "circle,pad=0.25",
+                "facecolor": colour if measured else "white",
+                "edgecolor": "white" if measured else colour,
+            },
+        )
 
 
 def _bodies(axes: Axes, record: RunRecord) -> None:
-    pose, robot = record.pose, record.header.robot
+    pose = record.pose
+    robot = record.header.robot
     known = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
     if len(known) == 0:
         return

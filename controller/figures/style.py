@@ -94,7 +94,8 @@ def thin(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, least, mean and largest of every few samples; short series (n,) as they are."""
     known = np.isfinite(values)
-    time_s, values = time_s[known], values[known]
+    time_s = time_s[known]
+    values = values[known]
     size = -(-len(time_s) // points)
     if size < 3:
         return time_s, values, values, values
@@ -111,9 +112,13 @@ def thin(
 def legend_above(axes: Axes, columns: int = 6) -> None:
     """Place the legend over the right end of the panel, where it never covers a curve."""
     axes.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1,
-        handlelength=1.6, columnspacing=1.4,
-    )  # fmt: skip
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        handlelength=1.6,
+        columnspacing=1.4,
+    )
 
 
 def colour_bar(figure: Figure, image: ScalarMappable, axes: Axes, label: str) -> None:
@@ -153,9 +158,16 @@ def mark_waypoints(panels: list[Axes], times_s: Floats, *, measured: bool) -> No
                 linestyle="-" if measured else (0, (3, 3)),
             )
         panels[0].annotate(
-            str(number), (time, 1.0), (3, -3), xycoords=("data", "axes fraction"),
-            textcoords="offset points", va="top", color=GREEN, fontsize=9, fontweight="bold",
-        )  # fmt: skip
+            str(number),
+            (time, 1.0),
+            (3, -3),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            va="top",
+            color=GREEN,
+            fontsize=9,
+            fontweight="bold",
+        )
 
 
 def save_picture(figure: Figure, path: Path, dpi: float | None = None) -> None:
