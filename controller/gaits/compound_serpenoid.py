@@ -41,7 +41,9 @@ class CompoundSerpenoid(Gait):
     model = CompoundSerpenoidParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
-        p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
+        p = self.params
+        yaw = robot.yaw_joints
+        pitch = robot.pitch_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         lateral = travelling(robot, yaw, phase_rad, p.lateral_waves, 0.0)
         dorsal = travelling(robot, pitch, p.dorsal_rate * phase_rad, p.dorsal_waves, p.lead_rad)

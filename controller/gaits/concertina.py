@@ -39,7 +39,8 @@ class Concertina(Gait):
     model = ConcertinaParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
-        p, yaw = self.params, robot.yaw_joints
+        p = self.params
+        yaw = robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         at = group_places(robot, yaw)
         half = 0.5 * p.share

@@ -43,7 +43,8 @@ class ErectGait(LegGait):
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         joints = np.zeros((len(phase_rad), robot.joint_count))
-        p, first = self.params, robot.link_count - 1
+        p = self.params
+        first = robot.link_count - 1
         for k, joint in enumerate(robot.limb_joints):
             pair = robot.limbs[joint.pair]
             if joint.place > 0:

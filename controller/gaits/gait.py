@@ -147,7 +147,8 @@ class Gait(ABC):
                 f"gait {self.name}: turn_rad {turn_rad:g} needs yaw joints; robot {robot.name} has "
                 f"none (joint_axes {robot.joint_axes})"
             )
-        reach, limit = np.abs(joints).max(axis=0), np.array(robot.limit_rad)
+        reach = np.abs(joints).max(axis=0)
+        limit = np.array(robot.limit_rad)
         beyond = np.flatnonzero(reach > limit + 1e-9)
         if len(beyond):
             worst = int(beyond[np.argmax((reach - limit)[beyond])])

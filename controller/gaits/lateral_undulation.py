@@ -40,7 +40,8 @@ class LateralUndulation(Gait):
     model = LateralUndulationParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
-        p, yaw = self.params, robot.yaw_joints
+        p = self.params
+        yaw = robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         amplitude = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
         wave = travelling(robot, yaw, -phase_rad if p.backward else phase_rad, p.waves, 0.0)

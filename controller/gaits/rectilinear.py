@@ -37,7 +37,9 @@ class Rectilinear(Gait):
     model = RectilinearParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
-        p, pitch, yaw = self.params, robot.pitch_joints, robot.yaw_joints
+        p = self.params
+        pitch = robot.pitch_joints
+        yaw = robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)
         joints[:, pitch] = lift * travelling(robot, pitch, -phase_rad, p.waves, 0.0)

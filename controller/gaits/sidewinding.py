@@ -38,7 +38,9 @@ class Sidewinding(Gait):
     model = SidewindingParameters
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
-        p, yaw, pitch = self.params, robot.yaw_joints, robot.pitch_joints
+        p = self.params
+        yaw = robot.yaw_joints
+        pitch = robot.pitch_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
         plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
         lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)

@@ -13,20 +13,25 @@ def write_headings(
     u: Floats, shapes: Floats, cosine: Floats, sine: Floats, shares: Floats, headings: Floats
 ) -> None:
     """Write headings (T, n), towards the head, of the chords between ``shares``."""
-    run, side = np.zeros(len(u)), np.empty(len(u))
+    run = np.zeros(len(u))
+    side = np.empty(len(u))
     for t in range(len(cosine)):
         for i in range(len(u)):
             side[i] = shapes[0, i] * cosine[t] + shapes[1, i] * sine[t]
         for i in range(1, len(u)):
             du, dy = u[i] - u[i - 1], side[i] - side[i - 1]
             run[i] = run[i - 1] + np.sqrt(du * du + dy * dy)
-        i, back, left = 0, u[0], side[0]
+        i = 0
+        back = u[0]
+        left = side[0]
         for k in range(len(shares)):
             at = shares[k] * run[-1]
             while i < len(u) - 2 and run[i + 1] < at:
                 i += 1
             part = (at - run[i]) / (run[i + 1] - run[i])
-            here, aside = u[i] + part * (u[i + 1] - u[i]), side[i] + part * (side[i + 1] - side[i])
+            here = u[i] + part * (u[i + 1] - u[i])
+            aside = side[i] + part * (side[i + 1] - side[i])
             if k > 0:
                 headings[t, k - 1] = np.arctan2(left - aside, here - back)
-            back, left = here, aside
+            back = here
+            left = aside

@@ -76,7 +76,9 @@ class LegGait(Gait, ABC):
         At phase 0 of its offset the left front leg is foremost: the front girdle is turned right by
         half of the bend, the hind one left.
         """
-        p, hind, front = self.params, robot.limbs[0].link, robot.limbs[-1].link
+        p = self.params
+        hind = robot.limbs[0].link
+        front = robot.limbs[-1].link
         turned = 0.5 * p.bend_rad * np.cos(phase_rad - TURN * self.offsets[2])
         trunk = np.arange(front, hind)
         joints[:, trunk] = -2.0 * turned[:, None] / max(len(trunk), 1)

@@ -157,7 +157,8 @@ class Cpg:
         self, t_s: Floats
     ) -> tuple[Floats, Floats, Floats, Floats, Floats, float, Floats, Floats]:
         """First arguments of the loops in ``trajectory``."""
-        slow, turn = self._slow, self._clock
+        slow = self._slow
+        turn = self._clock
         clock = np.array(
             [self._phase_rad, turn.goal[0], turn.left[0], turn.slope[0], 0.5 * turn.gain]
         )

@@ -42,12 +42,17 @@ def _evaluate(
     Many short loops over joints: the processor handles several joints at a time in each.
     """
     harmonics = (len(goal) - 2) // 2
-    phase, wanted, missing, ramp, slowing = clock[0], clock[1], clock[2], clock[3], clock[4]
+    phase = clock[0]
+    wanted = clock[1]
+    missing = clock[2]
+    ramp = clock[3]
+    slowing = clock[4]
     left_s = np.exp(-slowing * t)
     fallen = (1.0 - left_s) / slowing
     omega = wanted + (missing + ramp * t) * left_s
     phase += wanted * t + missing * fallen + ramp * (fallen - t * left_s) / slowing
-    value, rate = state[0], state[1]
+    value = state[0]
+    rate = state[1]
     fading = np.exp(-h * t)
     for i in range(2 + 2 * count):
         row = i if i < 2 + count else i - count + harmonics
@@ -55,7 +60,11 @@ def _evaluate(
             line = left[row, j] + slope[row, j] * t
             value[row, j] = goal[row, j] + line * fading
             rate[row, j] = (slope[row, j] - h * line) * fading
-    c, s, c_one, s_one, turning = work[0], work[1], work[2], work[3], work[4]
+    c = work[0]
+    s = work[1]
+    c_one = work[2]
+    s_one = work[3]
+    turning = work[4]
     for j in range(len(angle)):
         theta = phase + value[0, j] + phase_error[j]
         c_one[j], s_one[j] = np.cos(theta), np.sin(theta)
@@ -107,12 +116,24 @@ def trajectory(
 
     """
     harmonics = (len(goal) - 2) // 2
-    state, work = np.empty((2, *goal.shape)), np.empty((5, len(phase_error)))
+    state = np.empty((2, *goal.shape))
+    work = np.empty((5, len(phase_error)))
     for i in range(len(t_s)):
         _evaluate(
-            t_s[i], harmonics, clock, goal, left, slope, h, phase_error, coupling,
-            state, work, angle[i], speed[i],
-        )  # fmt: skip
+            t_s[i],
+            harmonics,
+            clock,
+            goal,
+            left,
+            slope,
+            h,
+            phase_error,
+            coupling,
+            state,
+            work,
+            angle[i],
+            speed[i],
+        )
 
 
 @compiled(f"int64({_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, float64)")
@@ -163,16 +184,30 @@ def peak_share(
     harmonics = _relevant_harmonics(
         clock, goal, left, slope, h, NEGLIGIBLE * acceleration_limit.min()
     )
-    state, work = np.empty((2, *goal.shape)), np.empty((5, count))
-    rows, angle = np.zeros((2, count)), np.empty(count)
+    state = np.empty((2, *goal.shape))
+    work = np.empty((5, count))
+    rows = np.zeros((2, count))
+    angle = np.empty(count)
     step = t_s[1] - t_s[0]
     over = 0.0
     for i in range(len(t_s)):
-        speed, before = rows[i % 2], rows[1 - i % 2]
+        speed = rows[i % 2]
+        before = rows[1 - i % 2]
         _evaluate(
-            t_s[i], harmonics, clock, goal, left, slope, h, phase_error, coupling,
-            state, work, angle, speed,
-        )  # fmt: skip
+            t_s[i],
+            harmonics,
+            clock,
+            goal,
+            left,
+            slope,
+            h,
+            phase_error,
+            coupling,
+            state,
+            work,
+            angle,
+            speed,
+        )
         for j in range(count):
             fast[j] = max(fast[j], abs(speed[j]))
             over = max(over, fast[j] / speed_limit[j])
