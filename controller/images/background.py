@@ -108,7 +108,8 @@ def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity | Non
     if strongest < _CLEAR * 1.4826 * float(np.median(size[::every, ::every])):
         return None
     edge = 0.5 * strongest
-    dark, light = np.count_nonzero(smooth < -edge), np.count_nonzero(smooth > edge)
+    dark = np.count_nonzero(smooth < -edge)
+    light = np.count_nonzero(smooth > edge)
     if max(dark, light) < 4 * min(dark, light):
         return Polarity.BOTH
     return Polarity.DARK if dark > light else Polarity.LIGHT

@@ -107,13 +107,16 @@ def follow_places(
 
     """
     count = steps.shape[1]
-    at, piece = np.zeros(_KEPT), np.zeros(_KEPT, dtype=np.int64)
+    at = np.zeros(_KEPT)
+    piece = np.zeros(_KEPT, dtype=np.int64)
     parent = np.zeros((count, _KEPT), dtype=np.int64)
     taken = np.zeros((count, _KEPT), dtype=np.int8)
-    places, kept = _KEPT * _MOST_CROSSINGS, 1
+    places = _KEPT * _MOST_CROSSINGS
+    kept = 1
     new_at, new_piece = np.empty(places), np.empty(places, dtype=np.int64)
     new_parent, new_taken = np.empty(places, dtype=np.int64), np.empty(places, dtype=np.int8)
-    ahead, pieces = np.empty(_MOST_CROSSINGS), np.zeros(_MOST_CROSSINGS, dtype=np.int64)
+    ahead = np.empty(_MOST_CROSSINGS)
+    pieces = np.zeros(_MOST_CROSSINGS, dtype=np.int64)
     for step in range(count):
         number = 0
         for k in range(kept):

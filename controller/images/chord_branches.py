@@ -154,7 +154,8 @@ def crossings_ahead(
     share = (here - arc[first]) / (arc[first + 1] - arc[first])
     px = line[first, 0] + share * (line[first + 1, 0] - line[first, 0])
     py = line[first, 1] + share * (line[first + 1, 1] - line[first, 1])
-    count, j = 0, first
+    count = 0
+    j = first
     while j + 1 < len(line) and count + 1 < len(at) and arc[j] <= end:
         ax, ay, start = (px, py, here) if j == first else (line[j, 0], line[j, 1], arc[j])
         dx, dy = line[j + 1, 0] - ax, line[j + 1, 1] - ay
@@ -193,13 +194,14 @@ def count_branches(
 
     """
     count = steps.shape[1]
-    at, piece = (
-        np.empty((count, _MOST_CROSSINGS)),
-        np.zeros((count, _MOST_CROSSINGS), dtype=np.int64),
-    )
+    at = np.empty((count, _MOST_CROSSINGS))
+    piece = np.zeros((count, _MOST_CROSSINGS), dtype=np.int64)
     number = np.zeros(count, dtype=np.int64)
     turn = np.zeros(count, dtype=np.int64)
-    sign_sum, branches, places, level = 0, 0, 1, 0
+    sign_sum = 0
+    branches = 0
+    places = 1
+    level = 0
     number[0] = crossings_ahead(line, arc, chord, limits[0], at[0], piece[0], 0.0)
     while level >= 0 and places <= _MOST_PLACES:
         k = turn[level]

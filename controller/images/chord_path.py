@@ -35,7 +35,8 @@ def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) ->
 
     """
     at = np.append(np.arange(1.0, segments + 1.0), 1.0) * (0.5 * arc[1] / segments)
-    curve, arc = np.ascontiguousarray(curve), np.ascontiguousarray(arc)
+    curve = np.ascontiguousarray(curve)
+    arc = np.ascontiguousarray(arc)
     piece: Ints = np.zeros(segments, dtype=np.int64)
     if not follow(curve, arc, at, piece, most_steps):
         return None
@@ -85,7 +86,10 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
     count = len(gap)
     grow = np.empty(count)
     turn = np.empty((count, 2))  # shares of the direction: of the new place, and the remainder
-    before, old, chord, free = 0.0, 0.0, 0.0, 1.0  # entries of the last place and of the chord
+    before = 0.0
+    old = 0.0
+    chord = 0.0
+    free = 1.0  # entries of the last place and of the chord
     for i in range(count):
         a, s = slopes[i, 0] * before - free, slopes[i, 1]
         size = max(np.hypot(a, s), 1e-300)
@@ -93,9 +97,11 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
         grow[i] = (-gap[i] - slopes[i, 0] * old + chord) / size
         chord += grow[i] * a * free
         free *= s
-        before, old = -a, grow[i] * s
+        before = -a
+        old = grow[i] * s
         turn[i, 0], turn[i, 1] = a, s
-    later, remains = 0.0, 1.0  # sum of later growths, product of later shares
+    later = 0.0
+    remains = 1.0  # sum of later growths, product of later shares
     for i in range(count - 1, -1, -1):
         a, s = turn[i]
         step[i] = grow[i] * s - a * later
@@ -108,23 +114,31 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
 @compiled(f"boolean({_CURVE}, float64[::1], int64[::1], int64)")
 def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int) -> bool:
     """Move ``at`` (N + 1,) along the path until the last place is the end of the curve."""
-    count, length = len(piece), arc[-1]
-    gap, slopes, step, along = (
-        np.empty(count), np.empty((count, 2)), np.empty(count + 1), np.empty(count + 1),
-    )  # fmt: skip
+    count = len(piece)
+    length = arc[-1]
+    gap = np.empty(count)
+    slopes = np.empty((count, 2))
+    step = np.empty(count + 1)
+    along = np.empty(count + 1)
     tangent = at / np.sqrt((at * at).sum())
-    there, least, reach = np.empty(count + 1), np.diff(arc).min(), 0.05 * length
+    there = np.empty(count + 1)
+    least = np.diff(arc).min()
+    reach = 0.05 * length
     for _ in range(most_steps):
         if reach < _SMALLEST * length:
             return False
-        share, place = np.inf, 0
+        share = np.inf
+        place = 0
         for i in range(count):  # distance along the tangent at which a place first reaches a vertex
             if abs(tangent[i]) > 1e-14:
                 far = (arc[piece[i] + (1 if tangent[i] > 0.0 else 0)] - at[i]) / tangent[i]
                 if far < share:
-                    share, place = far, i
+                    share = far
+                    place = i
         share = max(share, 0.0)
-        meets, size, ahead = share <= reach, min(share, reach), tangent[place] > 0.0
+        meets = share <= reach
+        size = min(share, reach)
+        ahead = tangent[place] > 0.0
         vertex = arc[piece[place] + (1 if ahead else 0)]
         value = vertex if meets else (tangent * at).sum() + size
         there[:] = at + size * tangent

@@ -35,7 +35,8 @@ _SHIFTS: Final = tuple((k, (7 * k + off) % 16) for k in range(16) for off in (0,
 _CLEAN: Final = 16.0  # quality below which poses are less accurate than the sections show (ours)
 _LEAST: Final = 18  # quality below which no pose is used (ours)
 _USUAL: Final = 20  # quality from which most poses are used (ours)
-_SIGMA, _SIGMA_BELOW = 0.22, 0.15  # radii: largest standard deviation from it on, below it (ours)
+_SIGMA = 0.22
+_SIGMA_BELOW = 0.15  # radii: largest standard deviation from it on, below it (ours)
 _SIGMA_UNKNOWN: Final = 0.25  # radii: the same if the quality is not known (ours)
 
 
@@ -113,7 +114,8 @@ def _quality(image: Image) -> int | None:
     value = _coefficients(_grey(image).astype(np.float32))
     value = value[np.abs(value).max(axis=1) > _NOT_ZERO]
     value = value[:: max(1, len(value) // _MOST_BLOCKS)]
-    best, found = _REGULAR, None
+    best = _REGULAR
+    found = None
     for quality in _QUALITIES:
         scale = 5000 // quality if quality < 50 else 200 - 2 * quality
         step = np.clip((_LUMA * scale + 50) // 100, 1, 255).ravel()[1:].astype(np.float32)
@@ -123,7 +125,8 @@ def _quality(image: Image) -> int | None:
             continue
         regular = float(np.cos(2.0 * np.pi * some).mean())
         if regular > best:
-            best, found = regular, quality
+            best = regular
+            found = quality
     return found
 
 

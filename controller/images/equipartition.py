@@ -85,13 +85,15 @@ class _Curve:
 
     def solution(self, chord: float, method: str, crossing: Ints | None = None) -> Equipartition:
         self.residual(chord, crossing)
-        points, at = self.points.copy(), self.at.copy()
+        points = self.points.copy()
+        at = self.at.copy()
         points[-1], at[-1] = self.curve[-1], self.length
         return Equipartition(points, at, chord, method, 1, self.distance(points, at))
 
     def distance(self, points: Floats, at: Floats) -> float:
         of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
-        chord, away = points[of + 1] - points[of], self.curve - points[of]
+        chord = points[of + 1] - points[of]
+        away = self.curve - points[of]
         share = (away * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)
         apart = np.hypot(*(away - np.clip(share, 0.0, 1.0)[:, None] * chord).T)
         return float(np.trapezoid(apart, self.arc)) / self.length
@@ -135,7 +137,8 @@ def _fits(found: Equipartition) -> bool:
 
 def _halves(given: _Curve) -> Equipartition:
     """Two chords meet where the curve crosses the perpendicular bisector of AB."""
-    curve, arc = given.curve, given.arc
+    curve = given.curve
+    arc = given.arc
     side = ((curve - curve[0]) ** 2 - (curve - curve[-1]) ** 2).sum(axis=1)
     if given.least <= TOLERANCE * given.length:
         side = arc - 0.5 * given.length  # A is B: every point is valid, use the middle
@@ -153,7 +156,9 @@ def _halves(given: _Curve) -> Equipartition:
 def _descend(given: _Curve) -> Equipartition | None:
     """[PT] Algorithm 1: correct the chord by the mean arc error; bisect if it cycles."""
     tolerance = TOLERANCE * given.length
-    low, high, chord = 0.0, np.inf, given.most
+    low = 0.0
+    high = np.inf
+    chord = given.most
     for _ in range(_DESCENTS):
         error = given.residual(chord)
         if abs(error) <= tolerance:
@@ -234,7 +239,7 @@ def _by_sample(given: _Curve) -> list[Equipartition]:
 
     chords = max(given.least * (1.0 - 1e-12), 1e-6 * given.most), given.most
     for chord, crossing in sampled_solutions(
-        *(given.line, given.line_arc, given.length, given.segments, chords, given.residual, root)
+        given.line, given.line_arc, given.length, given.segments, chords, given.residual, root
     ):
         return [given.solution(chord, "sample", crossing)]
     return []
@@ -285,7 +290,8 @@ def _thirds(given: _Curve) -> list[Equipartition]:
 
 def _newton(given: _Curve, at: Floats) -> Floats:
     """Newton's method from starts (K, 2); return the solutions."""
-    length, ends = given.length, given.curve[[0, -1]]
+    length = given.length
+    ends = given.curve[[0, -1]]
     slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
     for _ in range(_NEWTON_STEPS):
         piece = np.clip(np.searchsorted(given.arc, at, side="right") - 1, 0, len(slope) - 1)
@@ -354,7 +360,9 @@ def march(
         N, or fewer steps if a crossing does not exist.
 
     """
-    px, py, here = line[0, 0], line[0, 1], 0.0
+    px = line[0, 0]
+    py = line[0, 1]
+    here = 0.0
     points[0, 0], points[0, 1], at[0] = px, py, 0.0
     piece = 0
     square = chord * chord

@@ -74,7 +74,8 @@ def skeleton_of(mask: Bools) -> Skeleton:
     rows, columns = np.flatnonzero(shape.any(axis=1)), np.flatnonzero(shape.any(axis=0))
     if not rows.size:
         return no_skeleton(FrameStatus.NOTHING)
-    top, left = int(rows[0]), int(columns[0])
+    top = int(rows[0])
+    left = int(columns[0])
     body = shape[top : rows[-1] + 1, left : columns[-1] + 1]
     level = cv2.copyMakeBorder(body, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
     return skeleton_of_level(
@@ -224,7 +225,9 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
     ahead = end[-1] - end[0]
     ahead = ahead / np.hypot(*ahead)
     across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
-    here, found, last = end[-1], [], threshold
+    here = end[-1]
+    found = []
+    last = threshold
     for _ in range(round(4.0 * WORKING_WIDTH)):
         there = here + ahead
         side = np.array([-ahead[1], ahead[0]])
@@ -287,7 +290,8 @@ def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
     place[flat] = np.arange(len(flat))
 
     def paths_from(start: Sequence[int]) -> tuple[Floats, Ints]:
-        length, before = np.full(len(flat), -1.0), np.full(len(flat), -1)
+        length = np.full(len(flat), -1.0)
+        before = np.full(len(flat), -1)
         walk_line(place, flat, wide, np.asarray(start), length, before)
         return length, before
 

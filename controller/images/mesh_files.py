@@ -23,9 +23,11 @@ _ITEM_BYTES: Final = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTH: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """glTF's kinds of numbers (bytes) and of items (numbers)."""
 MESH_ENDINGS: Final = (".obj", ".glb")
-_AXES: Final = {f"{sign}{axis}": (k, factor)
-                for sign, factor in (("", 1.0), ("+", 1.0), ("-", -1.0))
-                for k, axis in enumerate("xyz")}  # fmt: skip
+_AXES: Final = {
+    f"{sign}{axis}": (k, factor)
+    for sign, factor in (("", 1.0), ("+", 1.0), ("-", -1.0))
+    for k, axis in enumerate("xyz")
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,8 @@ def check_residual(
     left, top = (int(v) for v in silhouette.origin_px)
     low_x, low_y = max(0, left - around), max(0, top - around)
     window = (slice(low_y, top + rows + around), slice(low_x, left + columns + around))
-    seen, ground = image[window], background[window]
+    seen = image[window]
+    ground = background[window]
     body = np.zeros(seen.shape[:2], dtype=bool)
     body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
     same = _soft(contrast(seen, ground, polarity))

@@ -143,7 +143,8 @@ def _threshold_of_body(
     strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
     inside = label > 0
     squares = np.bincount(label[inside], weights=strength[inside] ** 2, minlength=len(stats))
-    best, most = least, -1.0
+    best = least
+    most = -1.0
     for part in np.argsort(squares)[: -_CANDIDATES - 1 : -1]:
         if squares[part] <= 0.0:
             break
@@ -158,7 +159,8 @@ def _threshold_of_body(
         threshold = max(middle + 0.5 * level, least)
         mass = float(own[own > threshold - middle].sum())
         if mass > most:
-            best, most = threshold, mass
+            best = threshold
+            most = mass
     return best
 
 

@@ -71,7 +71,8 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
     spot = max(0.4 * width, 1.0)
     weights = np.full(_STATIONS, picture.sum() / _SPOTS)
     values = np.concatenate([controls.T.ravel(), weights, [spot]])
-    damp, worst = 1e-3, np.inf
+    damp = 1e-3
+    worst = np.inf
     kept = values
     scale = np.concatenate([np.ones(2 * _CONTROLS), np.full(_STATIONS, weights[0]), [1.0]])
     strong = float(np.abs(picture).max())
@@ -81,7 +82,8 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
         _EVEN / weights[0] * np.diff(np.eye(_STATIONS), axis=0),
         np.zeros((1, 1)),
     )
-    normal, push = np.eye(len(values)), np.zeros(len(values))
+    normal = np.eye(len(values))
+    push = np.zeros(len(values))
     for _ in range(_ROUNDS):
         shown, slopes = _picture(values, picture.shape)
         rest = (picture - shown).ravel()
@@ -89,7 +91,9 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
         cost = float(rest @ rest + soft @ soft)
         if cost < worst:
             done = worst - cost < 1e-4 * cost
-            worst, kept, damp = cost, values, 0.3 * damp
+            worst = cost
+            kept = values
+            damp = 0.3 * damp
             slopes = slopes * scale
             stiffness = stiff * scale
             normal = slopes.T @ slopes + stiffness.T @ stiffness
@@ -117,8 +121,10 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
 
 def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
-    weights, spot = _HATS @ values[2 * _CONTROLS : -1], float(values[-1])
-    shown, by = np.zeros(shape), np.zeros((len(values), *shape))
+    weights = _HATS @ values[2 * _CONTROLS : -1]
+    spot = float(values[-1])
+    shown = np.zeros(shape)
+    by = np.zeros((len(values), *shape))
     x_by, y_by, weights_by = _BY_VALUES
     draw_spots(x, y, weights, x_by, y_by, weights_by, spot, shown, by)
     by[-1] /= spot
@@ -159,7 +165,9 @@ def draw_spots(
     """
     high, wide = cover.shape
     share = 1.0 / (np.sqrt(2.0 * np.pi) * spot)
-    across, moved, spread = np.empty(wide), np.empty(wide), np.empty(wide)
+    across = np.empty(wide)
+    moved = np.empty(wide)
+    spread = np.empty(wide)
     for k in range(len(x)):
         left = max(0, int(np.ceil(x[k] - _FAR * spot)))
         right = min(wide, int(np.floor(x[k] + _FAR * spot)) + 1)

@@ -209,7 +209,8 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
     film = cv2.VideoCapture(str(path))
     try:
         first, _ = film.read()
-        count, stated = film.get(cv2.CAP_PROP_FRAME_COUNT), film.get(cv2.CAP_PROP_FPS)
+        count = film.get(cv2.CAP_PROP_FRAME_COUNT)
+        stated = film.get(cv2.CAP_PROP_FPS)
     finally:
         film.release()
     by_av = None if first else _av_facts(path)
