@@ -17,11 +17,13 @@ def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Flo
 
     """
     found = np.empty((len(robot.limb_joints), 2, 3))
-    turn, end_m = np.eye(3), np.zeros(3)
+    turn = np.eye(3)
+    end_m = np.zeros(3)
     for k, (joint, angle) in enumerate(
         zip(robot.limb_joints, joint_rad[robot.link_count - 1 :], strict=True)
     ):
-        pair, side = robot.limbs[joint.pair], joint.outward
+        pair = robot.limbs[joint.pair]
+        side = joint.outward
         if joint.place == 0:
             turn = body.rotation[pair.link]
             end_m = body.link_m[pair.link] + side * pair.hip_m * turn[:, 1]

@@ -71,10 +71,17 @@ class SpineLinks(NamedTuple):
         """See ``body_in_world``."""
         yaws, half_m, weight = self
         links = len(half_m)
-        rotation, centres = np.empty((links, 3, 3)), np.empty((links + 1, 3))
+        rotation = np.empty((links, 3, 3))
+        centres = np.empty((links + 1, 3))
         _forward(
-            *(yaws, pose.rotation, pose.head_in_world_m, joint_rad[: links - 1]),
-            *(half_m, weight, rotation, centres),
+            yaws,
+            pose.rotation,
+            pose.head_in_world_m,
+            joint_rad[: links - 1],
+            half_m,
+            weight,
+            rotation,
+            centres,
         )
         return BodyView(centres[:-1], rotation, centres[-1])
 
@@ -92,7 +99,8 @@ def chain_angles_rad(robot: RobotConfig, body: BodyView) -> Floats:
     """(J,) angles of the spine's joints, in (-pi, pi]: the inverse of ``body_in_world``."""
     ahead, behind = body.rotation[:-1], body.forward[1:]
     side = np.where(SpineLinks.of(robot).yaws[:, None], ahead[:, :, 1], ahead[:, :, 2])
-    sine, cosine = (behind * side).sum(axis=1), (behind * ahead[:, :, 0]).sum(axis=1)
+    sine = (behind * side).sum(axis=1)
+    cosine = (behind * ahead[:, :, 0]).sum(axis=1)
     return np.asarray(np.arctan2(-sine, cosine))
 
 
@@ -174,7 +182,8 @@ def _forward(
     sum_x, sum_y, sum_z = whole * x, whole * y, whole * z
     centres[0, 0], centres[0, 1], centres[0, 2] = x, y, z
     for k in range(1, links):
-        before, here = rotation[k - 1], rotation[k]
+        before = rotation[k - 1]
+        here = rotation[k]
         half = half_m[k - 1]
         x -= half * before[0, 0]
         y -= half * before[1, 0]

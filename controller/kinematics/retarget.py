@@ -71,7 +71,9 @@ def _mean_angles(rows_rad: Floats, edges: Floats, means: Floats) -> None:
     """Write means (S, G) of angles (S, N) between ``edges`` (G + 1,), in samples."""
     points = rows_rad.shape[1]
     for row in range(len(rows_rad)):
-        area, before, at = 0.0, 0.0, 0
+        area = 0.0
+        before = 0.0
+        at = 0
         for g in range(len(edges)):
             low = min(int(edges[g]), points - 1)
             while at < low:

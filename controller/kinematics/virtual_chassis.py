@@ -25,7 +25,8 @@ def virtual_chassis(link_m: Floats, up: Floats, last: Frame | None = None) -> Fr
     """
     centre = link_m.mean(axis=0)
     _, spread, axes = np.linalg.svd(link_m - centre)
-    forward, thin = axes[0], axes[2]
+    forward = axes[0]
+    thin = axes[2]
     guide = link_m[0] - link_m[-1] if last is None else last.rotation[:, 0]
     forward = forward if forward @ guide >= 0.0 else -forward
     guide = up if last is None else last.rotation[:, 2]
