@@ -105,9 +105,11 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
         self.single_action_space = self._rows[0].action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._most_steps, self._period_s = max_episode_steps, self._rows[0].period_s
+        self._most_steps = max_episode_steps
+        self._period_s = self._rows[0].period_s
         self._steps, self._ended = np.zeros(num_envs, int), np.zeros(num_envs, bool)
-        self._begin_s, self._cycles = 0.0, 0
+        self._begin_s = 0.0
+        self._cycles = 0
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -119,7 +121,8 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
             if not isinstance(seed, list)
             else seed
         )
-        self._begin_s, self._cycles = self._batch.time_s, 0
+        self._begin_s = self._batch.time_s
+        self._cycles = 0
         self._steps[:], self._ended[:] = 0, False
         found = [
             row.reset(seed=own, options=options) for row, own in zip(self._rows, seeds, strict=True)
@@ -144,7 +147,8 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
                 row.send(action)
         self._cycles += 1
         self._batch.advance(self._begin_s + self._cycles * self._period_s)
-        observations, infos = [], []
+        observations = []
+        infos = []
         rewards = np.zeros(self.num_envs)
         terminated, truncated = np.zeros((2, self.num_envs), bool)
         for k, row in enumerate(self._rows):

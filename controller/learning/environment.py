@@ -142,7 +142,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         }
         run = checked(RunConfig, fields, "SnakeEnvironment")
         self._prepared = PathlessRun(run, body, load_world(world))
-        self._energy_weight_m_j, self._trip_penalty_m = energy_weight_m_j, trip_penalty_m
+        self._energy_weight_m_j = energy_weight_m_j
+        self._trip_penalty_m = trip_penalty_m
         self._spread_rad = (start_joint_rad, start_heading_rad)
         if min(self._spread_rad) < 0.0 or start_joint_rad > min(body.limit_rad):
             raise InputError(
@@ -162,11 +163,13 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._limits = SafetyLimits.from_config(body, run.safety)
         self._backend: SimulatedRobot | None = None
         self._link: SafeLink | None = None
-        self._due_s, self._taken_j = 0.0, 0.0
+        self._due_s = 0.0
+        self._taken_j = 0.0
         self._view: BodyView | None = None
         self._sent_rad: Floats = np.zeros(body.joint_count)
         self._screen: ChaseView | ChaseWindow | None = None
-        self._clock, self._shown_s = WallClock(), 0.0
+        self._clock = WallClock()
+        self._shown_s = 0.0
 
     @property
     def robot(self) -> RobotConfig:
@@ -209,7 +212,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         backend = self._open(initial)
         link = SafeLink(backend.chain, self._limits, backend.clock)
         state = link.enable()
-        self._backend, self._link = backend, link
+        self._backend = backend
+        self._link = link
         self._due_s, self._taken_j = backend.clock.now_s(), backend.energy().electrical_j
         self._sent_rad = state.position_rad
         self._view = None
@@ -238,7 +242,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _send(self, action: NDArray[np.floating[Any]]) -> None:
         """Send the goals of a step; ``_result`` needs the time at its end."""
-        backend, link = self._backend, self._link
+        backend = self._backend
+        link = self._link
         if backend is None or link is None or link.tripped:
             raise gymnasium.error.ResetNeeded("call reset before step")
         goal_rad = checked_action(action, self.robot.joint_names) * self.limit_rad
@@ -253,7 +258,8 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Read all servos at the end of a step, and return what ``step`` returns."""
-        backend, link = self._backend, self._link
+        backend = self._backend
+        link = self._link
         assert backend is not None
         assert link is not None
         observation, progress_m = self._observe(backend, link.read())
@@ -311,8 +317,14 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._view = view
         values = np.empty_like(self._end)
         _fill(
-            *(values, self._end, state.position_rad, state.velocity_rad_s, state.current_a),
-            *(self._sent_rad, view.rotation, moved_m * self._prepared.run.cycle_hz),
+            values,
+            self._end,
+            state.position_rad,
+            state.velocity_rad_s,
+            state.current_a,
+            self._sent_rad,
+            view.rotation,
+            moved_m * self._prepared.run.cycle_hz,
         )
         return values, float(moved_m[0])
 

@@ -103,7 +103,9 @@ def _is_set(motion: str) -> bool:
 
 
 def _measured(result: RunResult, seconds: float) -> PolicyTrialResult:
-    record, source, outcome = result.record, result.source, result.outcome
+    record = result.record
+    source = result.source
+    outcome = result.outcome
     assert isinstance(source, GaitMotion | PolicyMotion)
     pose_of = (result.summary.pose_evidence, result.summary.pose_source)
     if outcome.tripped is not None:

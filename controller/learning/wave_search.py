@@ -76,8 +76,12 @@ def search_wave(
 
     """
     start = PolicyWave().vector()
-    robot, world, seed, steps = progress.robot, progress.world, progress.seed, progress.steps
-    population, software = progress.population, progress.software
+    robot = progress.robot
+    world = progress.world
+    seed = progress.seed
+    steps = progress.steps
+    population = progress.population
+    software = progress.software
     options = {"popsize": population, "seed": seed + 1, "verbose": -9}  # 0 is the time of day
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(start)), _SIGMA, options)
 

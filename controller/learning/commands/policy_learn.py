@@ -106,7 +106,8 @@ def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))
         raise InputError(f"{file}: {place}: {fault['msg']}; start again with --force") from None
-    before, now = found.model_dump(), asked.model_dump()
+    before = found.model_dump()
+    now = asked.model_dump()
     other = [
         f"{file}: its search has {key} {before[key]}, asked for {now[key]}; give the same, or "
         "start again with --force"

@@ -34,6 +34,6 @@ def list_policies(as_json: Json = False) -> None:
         hz = "changing" if policy.network else f"{policy.wave.frequency_hz:.2f}"
         numbers = (str(origin.seed), str(origin.steps), hz)
         table.add_row(
-            *(policy.name, policy.robot, origin.world, origin.method, *numbers, origin.software)
+            policy.name, policy.robot, origin.world, origin.method, *numbers, origin.software
         )
     console.print(table)
