@@ -203,8 +203,11 @@ def _on_planes(
                 if n < least_share * whole:
                     break
                 mx, my, mz = sx / n, sy / n, sz / n
-                vxx, vxy, vyy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
-                vxz, vyz = sxz / n - mx * mz, syz / n - my * mz
+                vxx = sxx / n - mx * mx
+                vxy = sxy / n - mx * my
+                vyy = syy / n - my * my
+                vxz = sxz / n - mx * mz
+                vyz = syz / n - my * mz
                 det = vxx * vyy - vxy * vxy
                 if det < 1e-6:
                     break

@@ -137,7 +137,8 @@ def _read(file: Path, options: MapOptions) -> FileMap:
 
 
 def _of_raster(file: Path, raster: Raster, options: MapOptions) -> FileMap:
-    scale, rise = options.scale, options.rise
+    scale = options.scale
+    rise = options.rise
     dx_m, dy_m = raster.dx_m * scale, raster.dy_m * scale
     spacing_m = min(dx_m, dy_m) if options.spacing_m is None else options.spacing_m
     rows, columns = raster.z_m.shape
@@ -155,7 +156,8 @@ def _check_heights(file: Path, z_m: Floats, per_value_m: float, options: MapOpti
 
 
 def _solid(file: Path, options: MapOptions) -> FileMap:
-    ending, faces = file.suffix.lower(), None
+    ending = file.suffix.lower()
+    faces = None
     notes: list[str] = []
     if ending in LASERS:
         return _of_laser(file, options)
@@ -178,7 +180,8 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         from snakewalk.controller.images.mesh_files import read_mesh  # noqa: PLC0415  an extra
 
         mesh = read_mesh(file, "+x", "+z").mesh
-        points, faces = mesh.vertices, mesh.faces
+        points = mesh.vertices
+        faces = mesh.faces
     return _of_points(file, _upright(file, points, options), faces, options, notes)
 
 
@@ -231,7 +234,8 @@ def _of_points(
             )
     if faces is None:
         low, high = placed[:, :2].min(axis=0), placed[:, :2].max(axis=0)
-    size, kind = high - low, "points" if faces is None else "triangles"
+    size = high - low
+    kind = "points" if faces is None else "triangles"
     spacing_m = options.spacing_m
     if spacing_m is None:
         per_cell = math.sqrt(_POINTS_A_CELL * float(size.prod()) / len(placed))
@@ -265,7 +269,8 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
     _, cell = np.unique(place, axis=0, return_inverse=True)
     cell = cell.ravel()
     count = np.bincount(cell)
-    lowest, highest = np.full(len(count), np.inf), np.full(len(count), -np.inf)
+    lowest = np.full(len(count), np.inf)
+    highest = np.full(len(count), -np.inf)
     np.minimum.at(lowest, cell, points_m[:, 2])
     np.maximum.at(highest, cell, points_m[:, 2])
     relief_m = float(np.ptp(points_m[:, 2]))

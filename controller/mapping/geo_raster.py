@@ -149,7 +149,10 @@ class _Strips:
     """Reads a part of a band strip by strip; missing cells are NaN, rows in the file's order."""
 
     def __init__(self, opened: Any, rows: slice, columns: slice, no_data: float | None) -> None:
-        self._opened, self._rows, self._columns, self._no_data = opened, rows, columns, no_data
+        self._opened = opened
+        self._rows = rows
+        self._columns = columns
+        self._no_data = no_data
         self._width = columns.stop - columns.start
         self.cells = self._width * (rows.stop - rows.start)
 
@@ -174,9 +177,11 @@ class _Strips:
                 f"{MOST_SAMPLES}; use a --spacing of {enough_m:.3g} m of the file or more, or "
                 "--crop a part"
             )
-        out, absent = np.full(samples, np.nan), 0
+        out = np.full(samples, np.nan)
+        absent = 0
         ends = [*(np.flatnonzero(np.diff(row_of)) + 1).tolist(), count]
-        most, begin = max(1, _STRIP_CELLS // self._width), 0
+        most = max(1, _STRIP_CELLS // self._width)
+        begin = 0
         for k, end in enumerate(ends):
             if k + 1 < len(ends) and ends[k + 1] - begin <= most:
                 continue  # the next group of rows fits into the same strip
@@ -223,7 +228,8 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
         InputError: the system is missing, and the cells may be degrees.
 
     """
-    crs, turn = opened.crs, opened.transform
+    crs = opened.crs
+    turn = opened.transform
     if crs is not None:
         if crs.is_geographic:
             return DEGREE
@@ -231,8 +237,10 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
             return unit_name(float(crs.linear_units_factor[1]))
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{file}: its system states no unit ({error}): --unit") from None
-    west, north = turn.c, turn.f
-    east, south = west + turn.a * opened.width, north + turn.e * opened.height
+    west = turn.c
+    north = turn.f
+    east = west + turn.a * opened.width
+    south = north + turn.e * opened.height
     cell = max(abs(turn.a), abs(turn.e))
     within = min(west, east) >= -180.0 and max(west, east) <= 360.0
     within &= min(south, north) >= -90.0 and max(south, north) <= 90.0
@@ -293,7 +301,8 @@ def _height_unit(
 
 def _band_scale(opened: Any, units: RasterUnits) -> tuple[float, float, list[str]]:
     """Factor and offset of the band's values; --height-step replaces them."""
-    scale, offset = float(opened.scales[0]), float(opened.offsets[0])
+    scale = float(opened.scales[0])
+    offset = float(opened.offsets[0])
     if units.height_step is not None:
         stated = (scale, offset) != (1.0, 0.0)
         words = [f"the band's scale {scale:g} and offset {offset:g} are left out for --height-step"]
@@ -321,8 +330,11 @@ def _cells(
     if opened.crs is not None and not opened.crs.is_geographic:
         edge_y = [turn.f + turn.e * row for row in (rows.start, rows.stop)]
         edge_x = [turn.c + turn.a * column for column in (columns.start, columns.stop)]
-        places = [(middle_x, middle_y), *((middle_x, y) for y in edge_y),
-                  *((x, middle_y) for x in edge_x)]  # fmt: skip
+        places = [
+            (middle_x, middle_y),
+            *((middle_x, y) for y in edge_y),
+            *((x, middle_y) for x in edge_x),
+        ]
         try:
             scale_x, scale_y, notes = ground_lengths(opened.crs, per_unit_m, places, cell)
         except InputError as error:

@@ -58,7 +58,8 @@ def _check_gap(values: Floats, low: float, per_value_m: float) -> None:
     others = values[values > low]
     if count < _MANY or not len(others):
         return
-    gap, relief = float(others.min()) - low, float(np.ptp(others))
+    gap = float(others.min()) - low
+    relief = float(np.ptp(others))
     if gap > max(_GAP_M, relief):
         sign = 1.0 if per_value_m > 0.0 else -1.0
         side, key = ("below", "lowest_m") if sign > 0.0 else ("above", "highest_m")

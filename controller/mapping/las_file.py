@@ -35,21 +35,34 @@ _GROUND: Final = (2, 8)
 _NOISE: Final = (7, 18)
 """Low and high noise."""
 _NAMES: Final = {
-    0: "never classified", 1: "unclassified", 2: "ground", 3: "low vegetation",
-    4: "medium vegetation", 5: "high vegetation", 6: "building", 7: "low noise",
-    8: "model key point", 9: "water", 10: "rail", 11: "road", 17: "bridge", 18: "high noise",
-}  # fmt: skip
+    0: "never classified",
+    1: "unclassified",
+    2: "ground",
+    3: "low vegetation",
+    4: "medium vegetation",
+    5: "high vegetation",
+    6: "building",
+    7: "low noise",
+    8: "model key point",
+    9: "water",
+    10: "rail",
+    11: "road",
+    17: "bridge",
+    18: "high noise",
+}
 _MODEL_TYPE, _GEOGRAPHIC_TYPE, _PROJECTED_TYPE = 1024, 2048, 3072
 _LINEAR_UNITS, _VERTICAL_UNITS = 3076, 4099
 """Keys of GeoTIFF, as records 34735 have them."""
-_USER_DEFINED, _WKT_RECORD = 32767, 2112
+_USER_DEFINED = 32767
+_WKT_RECORD = 2112
 _VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
 _PROJECTED_PART: Final = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
 _KEY_UNITS: Final = {9001: "m", 9002: "ft", 9003: "us-ft"}
 _WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 
 
-_MOST_MEMORY_BYTES, _MOST_CPU_S = 3_000_000_000, 600
+_MOST_MEMORY_BYTES = 3_000_000_000
+_MOST_CPU_S = 600
 """Limits of the process that reads a file: memory and CPU time (ours)."""
 _CHILD: Final = """
 import sys
@@ -117,9 +130,13 @@ def read_las(
         points = np.load(out)
     system = said["system"]
     return LasPoints(
-        points, said["unit"], said["height_unit"], None if system is None else _system(system),
-        said["notes"], said["cropped"],
-    )  # fmt: skip
+        points,
+        said["unit"],
+        said["height_unit"],
+        None if system is None else _system(system),
+        said["notes"],
+        said["cropped"],
+    )
 
 
 def run_child(words: str) -> dict[str, Any]:
@@ -157,10 +174,13 @@ def child(words: str) -> str:
     np.save(out, points)
     return json.dumps(
         {
-            "unit": stated, "height_unit": height_unit, "system": system, "notes": notes,
+            "unit": stated,
+            "height_unit": height_unit,
+            "system": system,
+            "notes": notes,
             "cropped": window is not None,
         }
-    )  # fmt: skip
+    )
 
 
 def _read(
@@ -171,11 +191,16 @@ def _read(
     if count > _MOST_READ:
         raise InputError(f"states {count} points; the most is {_MOST_READ}")
     corner = np.asarray(header.mins[:2], dtype=float)
-    low, high = (np.full(2, -np.inf), np.full(2, np.inf)) if window is None else (
-        corner + np.array(window[:2]), corner + np.array(window[2:])
-    )  # fmt: skip
+    low, high = (
+        (np.full(2, -np.inf), np.full(2, np.inf))
+        if window is None
+        else (corner + np.array(window[:2]), corner + np.array(window[2:]))
+    )
     seen: dict[int, int] = {}
-    withheld, kept, total, held = 0, [], 0, 0
+    withheld = 0
+    kept = []
+    total = 0
+    held = 0
     ground: list[Floats] = []
     for chunk in reader.chunk_iterator(_CHUNK):
         points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
@@ -210,9 +235,11 @@ def _read(
 def _class_notes(
     seen: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
 ) -> list[str]:
-    used = set(classes) if classes is not None else set(
-        _GROUND if by_ground else (kind for kind in seen if kind not in _NOISE)
-    )  # fmt: skip
+    used = (
+        set(classes)
+        if classes is not None
+        else set(_GROUND if by_ground else (kind for kind in seen if kind not in _NOISE))
+    )
     dropped = {kind: number for kind, number in seen.items() if kind not in used}
     notes = [f"{kept} points of {sum(seen.values())} are used"]
     if classes is None:
@@ -227,7 +254,8 @@ def _class_notes(
 
 
 def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
-    wkt, keys = "", {}
+    wkt = ""
+    keys = {}
     for record in [*header.vlrs, *(header.evlrs or [])]:
         text = getattr(record, "string", None)
         if isinstance(text, str) and record.record_id == _WKT_RECORD:
@@ -301,7 +329,8 @@ def in_metres(
     x_m = y_m = unit_m(plane)
     if held.crs is not None and unit is None and len(points):
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1.0)
+        middle = 0.5 * (low + high)
+        half = np.maximum(0.5 * (high - low), 1.0)
         corners = [tuple(middle + half * side) for side in ((0, 0), (0, -1), (0, 1), (1, 0))]
         try:
             x_m, y_m, words = ground_lengths(held.crs, x_m, corners, (1.0, 1.0))

@@ -10,8 +10,13 @@ from snakewalk.config.errors import InputError
 FOOT_M: Final = 0.3048
 US_FOOT_M: Final = 1200.0 / 3937.0
 UNITS_M: Final = {
-    "m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": FOOT_M, "us-ft": US_FOOT_M,
-}  # fmt: skip
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "km": 1000.0,
+    "ft": FOOT_M,
+    "us-ft": US_FOOT_M,
+}
 """Metres per unit of length, by the names that options accept."""
 DEGREE: Final = "deg"
 _SPELLINGS: Final = {
@@ -21,10 +26,20 @@ _SPELLINGS: Final = {
     "km": ("km", "kilometre", "kilometer", "kilometres", "kilometers"),
     "ft": ("ft", "foot", "feet", "international foot", "international feet", "foot international"),
     "us-ft": (
-        "us-ft", "us survey foot", "us survey feet", "foot us", "ftus", "us foot", "sft",
-        "foot us survey", "survey foot", "u s survey foot", "us survey ft", "usft",
+        "us-ft",
+        "us survey foot",
+        "us survey feet",
+        "foot us",
+        "ftus",
+        "us foot",
+        "sft",
+        "foot us survey",
+        "survey foot",
+        "u s survey foot",
+        "us survey ft",
+        "usft",
     ),
-}  # fmt: skip
+}
 _VERTICAL: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
 _UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 _TRUE: Final = 0.005
@@ -57,7 +72,8 @@ def vertical_unit(wkt: str) -> str | None:
     found = _VERTICAL.search(wkt)
     if found is None:
         return None
-    depth, end = 1, found.end()
+    depth = 1
+    end = found.end()
     while end < len(wkt) and depth:
         depth += {"[": 1, "]": -1}.get(wkt[end], 0)
         end += 1
@@ -67,7 +83,9 @@ def vertical_unit(wkt: str) -> str | None:
 
 def degree_cell_m(dx: float, dy: float, latitude: float) -> tuple[float, float]:
     """Metres of degrees of longitude and latitude, on WGS 84."""
-    a_m, e2, angle = 6378137.0, 0.00669437999014, math.radians(latitude)
+    a_m = 6378137.0
+    e2 = 0.00669437999014
+    angle = math.radians(latitude)
     w = 1.0 - e2 * math.sin(angle) ** 2
     north = a_m * (1.0 - e2) / w**1.5
     return math.radians(dx) * a_m / math.sqrt(w) * math.cos(angle), math.radians(dy) * north
@@ -128,9 +146,14 @@ def ground_lengths(
     ]
     others = [true_scale(crs, place, step) for place in places[1:]]
     change = max(
-        (abs(other[k] / middle[k] - 1.0) for other in others for k in (0, 1)
-         if not math.isnan(other[k])), default=0.0,
-    )  # fmt: skip
+        (
+            abs(other[k] / middle[k] - 1.0)
+            for other in others
+            for k in (0, 1)
+            if not math.isnan(other[k])
+        ),
+        default=0.0,
+    )
     if change > _MOST_VARIATION:
         raise InputError(
             f"its projection's scale changes by {100.0 * change:.0f} % over the part that is read; "

@@ -101,7 +101,8 @@ def _pcd(file: Path, data: bytes) -> Floats:
     plain = np.zeros(unpacked, np.uint8)
     if _expand(np.frombuffer(body[8 : 8 + packed], np.uint8), plain) != unpacked:
         raise ValueError("its compressed data are damaged")
-    columns, at = [], 0
+    columns = []
+    at = 0
     for name, kind, count in zip(names, kinds, counts, strict=True):
         width = np.dtype(kind).itemsize * count * total
         if name in "xyz":
@@ -140,7 +141,8 @@ def _expand(packed: Bytes, plain: Bytes) -> int:
     A control byte below 32 precedes that many and one plain bytes. Any other is a back reference:
     three high bits are the length, five low ones the high bits of the distance.
     """
-    at, out = 0, 0
+    at = 0
+    out = 0
     while at < len(packed):
         control = int(packed[at])
         at += 1

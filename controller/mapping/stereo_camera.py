@@ -177,7 +177,8 @@ def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalib
     ]
     if faults:
         raise InputError(faults)
-    rotation, translation = values["rotation"], values["translation"]
+    rotation = values["rotation"]
+    translation = values["translation"]
     for key in ("k_left", "k_right"):
         if min(values[key][0, 0], values[key][1, 1]) <= 0.0:
             raise InputError(f"{file}: {_NAMES[key][0]} has no focal length above 0")
@@ -190,9 +191,13 @@ def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalib
             "(x below 0, in OpenCV's order); if it stands to the left, exchange the cameras"
         )
     return StereoCalibration(
-        values["k_left"], values["distortion_left"], values["k_right"],
-        values["distortion_right"], rotation, translation,
-    )  # fmt: skip
+        values["k_left"],
+        values["distortion_left"],
+        values["k_right"],
+        values["distortion_right"],
+        rotation,
+        translation,
+    )
 
 
 def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:
@@ -224,9 +229,16 @@ def rectify(calibration: StereoCalibration, left: Image, right: Image) -> Rectif
         return RectifiedPair(left, right, seen, focal_px, centre, offset_px, baseline_m, np.eye(3))
     size = (columns, rows)
     turn_left, turn_right, p_left, p_right, *_ = cv2.stereoRectify(
-        c.k_left, c.distortion_left, c.k_right, c.distortion_right, size,
-        c.rotation, c.translation_m[:, None], flags=cv2.CALIB_ZERO_DISPARITY, alpha=0,
-    )  # fmt: skip
+        c.k_left,
+        c.distortion_left,
+        c.k_right,
+        c.distortion_right,
+        size,
+        c.rotation,
+        c.translation_m[:, None],
+        flags=cv2.CALIB_ZERO_DISPARITY,
+        alpha=0,
+    )
     warped = []
     for picture, k, distortion, turn, p in (
         (left, c.k_left, c.distortion_left, turn_left, p_left),

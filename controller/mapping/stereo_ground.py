@@ -168,8 +168,10 @@ def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
     """
     rng = np.random.default_rng(0)
     some = rng.permutation(len(points_m))[:_SAMPLE]
-    points, reach = points_m[some], 3.0 * error_m[some] + 1e-4
-    best, most = np.zeros(4), 0
+    points = points_m[some]
+    reach = 3.0 * error_m[some] + 1e-4
+    best = np.zeros(4)
+    most = 0
     for _ in range(_TRIALS):
         a, b, c = points[rng.integers(len(points), size=3)]
         normal = np.cross(b - a, c - a)
@@ -181,7 +183,8 @@ def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
             continue
         held = int((np.abs(points @ normal - normal @ a) <= reach).sum())
         if held > most:
-            best, most = np.array([*normal, normal @ a]), held
+            best = np.array([*normal, normal @ a])
+            most = held
     if most < _LEAST_GROUND * len(points):
         raise InputError(
             "stereo: no ground is seen: no plane below the camera holds a fifth of the points; "

@@ -70,7 +70,9 @@ class StereoHead:
             baseline_m=config.baseline_m,
             seed=run.seed,
         )
-        self._robot, self._qpos, self._map = robot, qpos, ground_map
+        self._robot = robot
+        self._qpos = qpos
+        self._map = ground_map
         self._random = np.random.default_rng([run.seed, 1])
         self._coming: deque[_Seen] = deque()
         self._next_s = -np.inf
@@ -168,7 +170,8 @@ class StereoHead:
         reach_m = self._robot.body_radius_m + _BODY_MARGIN_M
         low, high = chain_m.min(axis=0) - reach_m, chain_m.max(axis=0) + reach_m
         near = ((points_m[:, :2] > low) & (points_m[:, :2] < high)).all(axis=1)
-        close_m, hit = points_m[near, :2], np.zeros(int(near.sum()), bool)
+        close_m = points_m[near, :2]
+        hit = np.zeros(int(near.sum()), bool)
         for one, other in pairwise(chain_m):
             along = other - one
             share = (close_m - one) @ along / max(float(along @ along), 1e-12)

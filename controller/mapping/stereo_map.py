@@ -20,7 +20,8 @@ class StereoMap:
 
     def faults(self, prepared: PreparedRun, *, on_port: bool) -> list[str]:
         """Return why the head cannot map the ground here, one line per fault."""
-        run, robot = prepared.run, prepared.robot
+        run = prepared.run
+        robot = prepared.robot
         faults = []
         if robot.stereo_head is None:
             faults.append(
@@ -48,17 +49,23 @@ class StereoMap:
             OffscreenError: no off-screen OpenGL.
 
         """
-        prepared, backend = context.prepared, context.backend
-        measure, folder, on_event = context.measure, context.folder, context.on_event
+        prepared = context.prepared
+        backend = context.backend
+        measure = context.measure
+        folder = context.folder
+        on_event = context.on_event
         provider = MapProvider(measure)
         if not isinstance(prepared, WalkRun) or prepared.ground_map is None:
             yield provider
             return
-        ground, clock, ground_map = prepared.ground, backend.clock, prepared.ground_map
+        ground = prepared.ground
+        clock = backend.clock
+        ground_map = prepared.ground_map
         assert ground is not None
         assert backend.qpos is not None
         assert backend.pose is not None
-        provider.ground_map, provider.true_ground = ground_map, ground
+        provider.ground_map = ground_map
+        provider.true_ground = ground
         ground_map.clear()
         made = StereoHead(
             prepared.run, prepared.robot, prepared.world, ground, backend.qpos, ground_map

@@ -113,10 +113,13 @@ def elevation(
     """Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown."""
     faults = not_positive(
         {
-            "--scale": scale, "--vertical-scale": vertical_scale, "--spacing": spacing,
-            "--cell": cell, "--height-step": height_step,
+            "--scale": scale,
+            "--vertical-scale": vertical_scale,
+            "--spacing": spacing,
+            "--cell": cell,
+            "--height-step": height_step,
         }
-    )  # fmt: skip
+    )
     check_fill(fill, faults)
     chosen = {"--unit": (unit, (*_UNITS, "deg")), "--height-unit": (height_unit, _UNITS)}
     chosen |= {"--point": (point, _POINTS), "--up": (up, _AXES)}
@@ -139,9 +142,14 @@ def elevation(
 
 
 def _head(
-    file: Path, read: "FileMap", options: "MapOptions", crop: str | None, spacing_m: float,
-    fill: float, notes: list[str],
-) -> list[str]:  # fmt: skip
+    file: Path,
+    read: "FileMap",
+    options: "MapOptions",
+    crop: str | None,
+    spacing_m: float,
+    fill: float,
+    notes: list[str],
+) -> list[str]:
     wide, deep = read.size_m
     return [
         f"From {file.name}, {read.kind}: {wide:.5g} m by {deep:.5g} m,",

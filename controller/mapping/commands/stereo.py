@@ -124,14 +124,22 @@ def stereo(
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))
     made = stereo_ground.stereo_ground(
-        pair, disparities, spacing / scale, error, stand, math.inf if far is None else far,
+        pair,
+        disparities,
+        spacing / scale,
+        error,
+        stand,
+        math.inf if far is None else far,
         is_level=level_ground,
-    )  # fmt: skip
+    )
     seen = made.elevation
     placed = replace(
-        seen, z_m=scale * seen.z_m, spacing_m=spacing, x0_m=scale * seen.x0_m,
+        seen,
+        z_m=scale * seen.z_m,
+        spacing_m=spacing,
+        x0_m=scale * seen.x0_m,
         y0_m=scale * seen.y0_m,
-    )  # fmt: skip
+    )
     world = MapWorld.of(out, placed.height_field(fill))
     world.write(
         [

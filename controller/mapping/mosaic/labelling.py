@@ -56,7 +56,8 @@ def _aggregate(
     least = np.zeros((2, columns), np.float32)
     for i in range(rows):
         row = i if down >= 0 else rows - 1 - i
-        now, before = i % 2, (i + 1) % 2
+        now = i % 2
+        before = (i + 1) % 2
         for j in range(columns):
             column = j if right >= 0 else columns - 1 - j
             r, c = row - down, column - right
@@ -100,7 +101,8 @@ def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints)
                 if now < 0:
                     continue
                 # Without an equal neighbour the label of least cost is best.
-                best, lowest = now, np.inf
+                best = now
+                lowest = np.inf
                 for s in range(scales):
                     for y in range(high):
                         for x in range(wide):
@@ -120,7 +122,8 @@ def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints)
                                 if other // window != s or v != y or u != x:
                                     value += penalty
                             if value < lowest - 1e-9:
-                                best, lowest = s * window + y * wide + x, value
+                                best = s * window + y * wide + x
+                                lowest = value
                 if best != now:
                     labels[row, column] = best
                     changed += 1
@@ -130,7 +133,8 @@ def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints)
 
 def energy(costs: Costs, base: Ints, penalty: float, labels: Ints) -> float:
     """``E(f)``: data terms of all labels, and Potts terms of neighbours."""
-    window, wide = costs.shape[3] * costs.shape[4], costs.shape[4]
+    window = costs.shape[3] * costs.shape[4]
+    wide = costs.shape[4]
     has = labels >= 0
     flat = costs.reshape(*costs.shape[:2], -1)
     data = np.take_along_axis(flat, np.maximum(labels, 0)[..., None], axis=2)[..., 0]
@@ -147,6 +151,7 @@ def energy(costs: Costs, base: Ints, penalty: float, labels: Ints) -> float:
 
 def flow_of(costs: Costs, base: Ints, labels: Ints) -> tuple[Floats, Ints]:
     """Flow (rows, columns, 2), NaN without a label, and scale index of labels."""
-    window, wide = costs.shape[3] * costs.shape[4], costs.shape[4]
+    window = costs.shape[3] * costs.shape[4]
+    wide = costs.shape[4]
     place = np.stack([labels % wide, labels % window // wide], axis=-1) + base
     return np.where(labels[..., None] >= 0, place, np.nan), labels // window

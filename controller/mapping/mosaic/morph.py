@@ -48,10 +48,14 @@ def sampled(image: Floats, places_px: Floats) -> Floats:
     at = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
     return np.asarray(
         cv2.remap(
-            image, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT,
+            image,
+            at[..., 0],
+            at[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
             borderValue=(np.nan,) * 4,
         )
-    )  # fmt: skip
+    )
 
 
 def dense_flow(

@@ -45,7 +45,8 @@ def mosaic(views: Sequence[LocalModel], rectified: bool = True) -> Mosaic:
     turns = _rotations(views)
     camera, size = _common_plane(views, turns)
     placed = [_on_plane(view, turn, camera, size) for view, turn in zip(views, turns, strict=True)]
-    points, image = placed[0].points_m, placed[0].image
+    points = placed[0].points_m
+    image = placed[0].image
     domains = [placed[0].valid]
     for view in placed[1:]:
         known = np.isfinite(points[..., 2])
@@ -104,7 +105,8 @@ def _relative(first: LocalModel, second: LocalModel) -> Floats | None:
 
 def _rays(camera: Floats, places_px: Floats) -> Floats:
     """(..., 3) unit directions of pixels (..., 2)."""
-    middle, focal = camera[:2, 2], np.array([camera[0, 0], camera[1, 1]])
+    middle = camera[:2, 2]
+    focal = np.array([camera[0, 0], camera[1, 1]])
     flat = (places_px - middle) / focal
     rays = np.concatenate([flat, np.ones((*flat.shape[:-1], 1))], axis=-1)
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
@@ -138,8 +140,12 @@ def _on_plane(view: LocalModel, turn: Floats, camera: Floats, size: tuple[int, i
     to_view = view.camera @ turn.T @ np.linalg.inv(camera)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     points = cv2.warpPerspective(
-        view.points_m @ turn.T, to_view, size, flags=flags, borderMode=cv2.BORDER_CONSTANT,
+        view.points_m @ turn.T,
+        to_view,
+        size,
+        flags=flags,
+        borderMode=cv2.BORDER_CONSTANT,
         borderValue=(np.nan,) * 4,
-    )  # fmt: skip
+    )
     image = cv2.warpPerspective(view.image, to_view, size, flags=flags)
     return LocalModel(np.asarray(points, dtype=float), np.asarray(image), camera, view.baseline_m)

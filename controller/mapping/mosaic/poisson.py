@@ -31,7 +31,8 @@ def continued(values: Floats, given: Bools, shape: Floats) -> Floats:
     if count == 0 or not given.any():
         return out
     offset = np.where(given[..., None], values - shape, 0.0)
-    weight, right = np.zeros(count), np.zeros((count, shape.shape[-1]))
+    weight = np.zeros(count)
+    right = np.zeros((count, shape.shape[-1]))
     pairs = []
     for axis in (0, 1):
         parts = (slice(None, -1), slice(1, None))

@@ -97,12 +97,19 @@ def draw(
 
     """
     if other is None or counterpart_px is None:
-        other, counterpart_px = own, np.full((*points_m.shape[:2], 2), np.nan)
+        other = own
+        counterpart_px = np.full((*points_m.shape[:2], 2), np.nan)
     _draw(
-        np.ascontiguousarray(points_m), np.ascontiguousarray(camera), drawn,
-        np.ascontiguousarray(own), np.ascontiguousarray(other),
-        np.ascontiguousarray(counterpart_px), share, canvas.colour, canvas.depth_m,
-    )  # fmt: skip
+        np.ascontiguousarray(points_m),
+        np.ascontiguousarray(camera),
+        drawn,
+        np.ascontiguousarray(own),
+        np.ascontiguousarray(other),
+        np.ascontiguousarray(counterpart_px),
+        share,
+        canvas.colour,
+        canvas.depth_m,
+    )
 
 
 @compiled(f"float64({_PICTURE}, float64, float64, int64)")
@@ -134,9 +141,16 @@ def _place(points: Floats, camera: Floats, corner: Ints, screen: Floats, inverse
     " uint8[:, :, ::1], int64, int64)"
 )
 def _shade(
-    own: Image, other: Image, counterpart: Floats, share: float, corner: Ints, parts: Floats,
-    colour: Image, y: int, x: int,
-) -> None:  # fmt: skip
+    own: Image,
+    other: Image,
+    counterpart: Floats,
+    share: float,
+    corner: Ints,
+    parts: Floats,
+    colour: Image,
+    y: int,
+    x: int,
+) -> None:
     """Write the colour at barycentric ``parts`` of a triangle, both textures mixed."""
     row = column = there_u = there_v = size = 0.0
     for k in range(3):
@@ -161,14 +175,25 @@ def _shade(
     " uint8[:, :, ::1], float64[:, ::1])"
 )
 def _draw(
-    points: Floats, camera: Floats, drawn: Bools, own: Image, other: Image, counterpart: Floats,
-    share: float, colour: Image, depth: Floats,
-) -> None:  # fmt: skip
+    points: Floats,
+    camera: Floats,
+    drawn: Bools,
+    own: Image,
+    other: Image,
+    counterpart: Floats,
+    share: float,
+    colour: Image,
+    depth: Floats,
+) -> None:
     tall, wide = depth.shape
     corner = np.empty((3, 2), np.int64)
-    screen, inverse, parts = np.empty((3, 2)), np.empty(3), np.empty(3)
+    screen = np.empty((3, 2))
+    inverse = np.empty(3)
+    parts = np.empty(3)
     for cell in range(2 * drawn.size):
-        row, column, half = cell // 2 // drawn.shape[1], cell // 2 % drawn.shape[1], cell % 2
+        row = cell // 2 // drawn.shape[1]
+        column = cell // 2 % drawn.shape[1]
+        half = cell % 2
         if not drawn[row, column]:
             continue
         corner[0, 0], corner[0, 1] = row + half, column

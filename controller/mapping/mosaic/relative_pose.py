@@ -54,9 +54,15 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
     if count >= LEAST_INLIERS:
         cv2.setRNGSeed(0)
         ok, turn, shift, chosen = cv2.solvePnPRansac(
-            points_m, matches.second_px, second.camera, None, iterationsCount=2000,
-            reprojectionError=2.0 * _TOLERANCE_PX, confidence=0.9999, flags=cv2.SOLVEPNP_SQPNP,
-        )  # fmt: skip
+            points_m,
+            matches.second_px,
+            second.camera,
+            None,
+            iterationsCount=2000,
+            reprojectionError=2.0 * _TOLERANCE_PX,
+            confidence=0.9999,
+            flags=cv2.SOLVEPNP_SQPNP,
+        )
         if ok and chosen is not None and len(chosen) >= LEAST_INLIERS:
             kept[chosen.ravel()] = True
     for _ in range(3):
@@ -68,7 +74,8 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
         turn, shift = cv2.solvePnPRefineLM(
             points_m[kept], matches.second_px[kept], second.camera, None, turn, shift
         )
-        rotation, translation_m = cv2.Rodrigues(turn)[0], np.asarray(shift, float).ravel()
+        rotation = cv2.Rodrigues(turn)[0]
+        translation_m = np.asarray(shift, float).ravel()
         seen = project(second.camera, points_m @ rotation.T + translation_m)
         off_px = np.linalg.norm(seen - matches.second_px, axis=1)
         kept = off_px <= _TOLERANCE_PX * np.sqrt(matches.scale)

@@ -88,9 +88,15 @@ def render(
         points = (morph.points_m(view.share) - view.place_m) @ view.rotation.T
         shown = cells(morph.first.points_m) & cells(morph.destination_m)
         draw(
-            canvas, points, camera, shown, morph.first.image, morph.second.image,
-            morph.counterpart_px, view.share,
-        )  # fmt: skip
+            canvas,
+            points,
+            camera,
+            shown,
+            morph.first.image,
+            morph.second.image,
+            morph.counterpart_px,
+            view.share,
+        )
     else:
         _draw_model(canvas, walk, 0, view, camera)
     if not alone:
@@ -105,7 +111,9 @@ def render(
 def _draw_model(
     canvas: Canvas, walk: StereoWalk, number: int, view: RouteView, camera: Floats
 ) -> None:
-    model, pose, base = walk.models[number], walk.poses[number], walk.poses[view.step]
+    model = walk.models[number]
+    pose = walk.poses[number]
+    base = walk.poses[view.step]
     points = (model.points_m @ pose[:, :3].T + pose[:, 3] - base[:, 3]) @ base[:, :3]
     points = (points - view.place_m) @ view.rotation.T
     draw(canvas, points, camera, cells(model.points_m), model.image)
@@ -128,7 +136,8 @@ def film(
     """
     views = list(views_along(walk, per_step))
     camera = picture_camera(walk, size_px)
-    took, holes = [], []
+    took = []
+    holes = []
     with MovieFile(file, fps, size_px) as movie:
         for k, view in enumerate(views):
             begin = perf_counter()

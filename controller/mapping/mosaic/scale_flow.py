@@ -88,12 +88,21 @@ def flow_problem(
     lines = _epipolar_lines(second.camera, pose, points_m)
     size = 2 * search_px + 1
     costs = np.full((len(rows), len(columns), len(scales), size, size), np.inf, np.float32)
-    one, two = grey(first.image), grey(second.image)
+    one = grey(first.image)
+    two = grey(second.image)
     for k, scale in enumerate(scales):
         _data_terms(
-            one, reduced(two, scale), scale, second.valid, pixel, base, lines,
-            PATCH_PX, ZONE_PX, costs[:, :, k],
-        )  # fmt: skip
+            one,
+            reduced(two, scale),
+            scale,
+            second.valid,
+            pixel,
+            base,
+            lines,
+            PATCH_PX,
+            ZONE_PX,
+            costs[:, :, k],
+        )
     return FlowProblem(rows, columns, costs, base - pixel, expected, scales)
 
 
@@ -139,11 +148,14 @@ def _fractions(costs: Costs, labels: Ints) -> Floats:
         inside = (np.minimum(y - down, x - right) >= 0) & (y + down < high) & (x + right < wide)
         below, above = (
             costs[
-                row, column, scale,
-                np.clip(y + sign * down, 0, high - 1), np.clip(x + sign * right, 0, wide - 1),
+                row,
+                column,
+                scale,
+                np.clip(y + sign * down, 0, high - 1),
+                np.clip(x + sign * right, 0, wide - 1),
             ].astype(float)
             for sign in (-1, 1)
-        )  # fmt: skip
+        )
         with np.errstate(invalid="ignore", divide="ignore"):
             curve = below - 2.0 * middle + above
             offset = 0.5 * (below - above) / curve
@@ -168,9 +180,17 @@ def _epipolar_lines(camera: Floats, pose: RelativePose, points_m: Floats) -> Flo
     " int64, float64, float32[:, :, :, :])"
 )
 def _data_terms(
-    one: Picture, two: Picture, scale: float, valid: Bools, pixel: Ints, base: Ints,
-    lines: Floats, radius: int, zone_px: float, costs: Costs,
-) -> None:  # fmt: skip
+    one: Picture,
+    two: Picture,
+    scale: float,
+    valid: Bools,
+    pixel: Ints,
+    base: Ints,
+    lines: Floats,
+    radius: int,
+    zone_px: float,
+    costs: Costs,
+) -> None:
     """Write ``1 - corr`` of the patches at each place of each window at one scale."""
     rows, columns, high, wide = costs.shape
     count = (2 * radius + 1) ** 2
@@ -182,7 +202,8 @@ def _data_terms(
                 radius <= v < one.shape[0] - radius and radius <= u < one.shape[1] - radius
             ) or np.isnan(lines[row, column, 0]):
                 continue
-            n, mean = 0, 0.0
+            n = 0
+            mean = 0.0
             for y in range(-radius, radius + 1):
                 for x in range(-radius, radius + 1):
                     patch[n] = one[v + y, u + x]
@@ -201,18 +222,20 @@ def _data_terms(
                     if not (0 <= q_v < valid.shape[0] and 0 <= q_u < valid.shape[1]):
                         continue
                     off = (
-                        lines[row, column, 0] * q_u + lines[row, column, 1] * q_v
+                        lines[row, column, 0] * q_u
+                        + lines[row, column, 1] * q_v
                         + lines[row, column, 2]
-                    )  # fmt: skip
+                    )
                     if not valid[q_v, q_u] or abs(off) > zone_px:
                         continue
                     s_u, s_v = q_u / scale, q_v / scale
                     i, j = int(s_v) - radius, int(s_u) - radius
                     if (
-                        i < 0 or j < 0
+                        i < 0
+                        or j < 0
                         or i + 2 * radius + 1 >= two.shape[0]
                         or j + 2 * radius + 1 >= two.shape[1]
-                    ):  # fmt: skip
+                    ):
                         continue
                     f_v, f_u = s_v - int(s_v), s_u - int(s_u)
                     a, b = (1 - f_v) * (1 - f_u), (1 - f_v) * f_u
@@ -222,9 +245,11 @@ def _data_terms(
                     for y in range(i, i + 2 * radius + 1):
                         for x in range(j, j + 2 * radius + 1):
                             value = (
-                                a * two[y, x] + b * two[y, x + 1]
-                                + c * two[y + 1, x] + d * two[y + 1, x + 1]
-                            )  # fmt: skip
+                                a * two[y, x]
+                                + b * two[y, x + 1]
+                                + c * two[y + 1, x]
+                                + d * two[y + 1, x + 1]
+                            )
                             total += value
                             square += value * value
                             product += value * patch[k]

@@ -78,7 +78,8 @@ def match_over_scale(
         wide: half the width of a search region without it, in picture widths.
 
     """
-    one, two = grey(first.image), grey(second.image)
+    one = grey(first.image)
+    two = grey(second.image)
     pyramid = [(scale, reduced(two, scale)) for scale in scales]
     inside = np.zeros(one.shape, np.uint8)
     edge = _RADIUS_PX + 1
@@ -86,10 +87,12 @@ def match_over_scale(
     corners = cv2.goodFeaturesToTrack(one, _MOST_POINTS, 0.002, 8, mask=inside)
     places = np.zeros((0, 2)) if corners is None else np.asarray(corners, float).reshape(-1, 2)
     columns, rows = np.rint(places).astype(int).T if len(places) else np.zeros((2, 0), int)
-    centres, half = places, wide
+    centres = places
+    half = wide
     if distance_m is not None:
         ahead = first.points_m[rows, columns] - [0.0, 0.0, distance_m]
-        centres, half = project(second.camera, ahead), _NARROW
+        centres = project(second.camera, ahead)
+        half = _NARROW
     kept = []
     for k, (column, row) in enumerate(zip(columns, rows, strict=True)):
         if not np.isfinite(centres[k]).all():

@@ -74,13 +74,16 @@ def read_walk(
         with _at(f"{file}: position {k + 1}"):
             models.append(_model(file.parent, position, calibration, config.disparities))
         on_step(k + 1, total)
-    morphs, steps, poses = [], [], [np.eye(3, 4)]
+    morphs = []
+    steps = []
+    poses = [np.eye(3, 4)]
     for k in range(count - 1):
         with _at(f"{file}: positions {k + 1} and {k + 2}"):
             morph, step = _step(models[k], models[k + 1], config.positions[k : k + 2])
         morphs.append(morph)
         steps.append(step)
-        turn, shift = morph.pose.rotation.T, morph.pose.back(np.zeros(3))
+        turn = morph.pose.rotation.T
+        shift = morph.pose.back(np.zeros(3))
         last = poses[-1]
         poses.append(np.column_stack([last[:, :3] @ turn, last[:, :3] @ shift + last[:, 3]]))
         on_step(count + k + 1, total)

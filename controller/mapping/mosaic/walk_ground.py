@@ -49,7 +49,9 @@ def walk_ground(
         InputError: no visible ground, or no point near enough for the error.
 
     """
-    points, colours, errors = [], [], []
+    points = []
+    colours = []
+    errors = []
     for model, pose in zip(walk.models, walk.poses, strict=True):
         expected = model.error_m
         with np.errstate(invalid="ignore"):
