@@ -32,7 +32,8 @@ class BodySlide:
             friction: of the ground.
 
         """
-        self._normal, self._friction = normal, friction
+        self._normal = normal
+        self._friction = friction
         self._table = link_table(len(normal))
         self._velocity, self._linear = np.zeros(3), np.zeros(3)
         self._inertia = np.zeros((3, 3))
@@ -46,8 +47,13 @@ class BodySlide:
         headings_rad = before.headings_rad
         return float(
             _fill_slide(
-                *(before.link_m, np.cos(headings_rad), np.sin(headings_rad), after.link_m),
-                *(step_s, self._normal, self._table),
+                before.link_m,
+                np.cos(headings_rad),
+                np.sin(headings_rad),
+                after.link_m,
+                step_s,
+                self._normal,
+                self._table,
             )
         )
 
@@ -55,8 +61,14 @@ class BodySlide:
         """Return (3,) the velocity as ``rigid_velocity``; the array is reused."""
         friction = self._friction
         balance(
-            *(self._table, OTHERS, len(self._normal), friction.grip),
-            *(self._linear, self._inertia, self._velocity, self._work),
+            self._table,
+            OTHERS,
+            len(self._normal),
+            friction.grip,
+            self._linear,
+            self._inertia,
+            self._velocity,
+            self._work,
         )
         return self._velocity
 

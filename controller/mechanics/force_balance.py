@@ -94,7 +94,9 @@ def _forces(
     """
     forward, across, back, code = grip
     law = int(code)
-    x, y, turn = w[0], w[1], w[2]
+    x = w[0]
+    y = w[1]
+    turn = w[2]
     power = weights = levers = 0.0
     for i in range(3):
         missing[i] = -linear[i]
@@ -108,7 +110,8 @@ def _forces(
         c, s = table[at + FORWARD_X], table[at + FORWARD_Y]
         px, py = table[at + POINT_X], table[at + POINT_Y]
         u, v = table[at + SHAPE_X] + x - turn * py, table[at + SHAPE_Y] + y + turn * px
-        ahead, aside = c * u + s * v, c * v - s * u
+        ahead = c * u + s * v
+        aside = c * v - s * u
         a2, b2 = s * px - c * py, c * px + s * py
         normal = table[at + NORMAL]
         rub, pull_a, pull_c, aa, ac, ca, cc = _of_link(
@@ -178,7 +181,10 @@ def _least_power(
     work: Floats,
 ) -> bool:
     """Newton's method on the power, from ``w`` in place; whether what is missing is ``close``."""
-    missing, step, trial, slope = work[0], work[1], work[2], work[3:]
+    missing = work[0]
+    step = work[1]
+    trial = work[2]
+    slope = work[3:]
     given = table, rows, links, grip, still, linear, quadratic
     power, lever = _forces(*given, w, missing, slope)
     for _ in range(_STEPS):
@@ -188,7 +194,8 @@ def _least_power(
             slope[i, i] += 1e-9
         _solve_any(slope, missing, step)
         fall = missing[0] * step[0] + missing[1] * step[1] + missing[2] * step[2]
-        before, scale = power, 2.0
+        before = power
+        scale = 2.0
         power = before + 1.0
         while power > before - 1e-4 * scale * fall and scale > 1e-9:
             scale *= 0.5
@@ -216,11 +223,15 @@ def _least_missing(
     work: Floats,
 ) -> bool:
     """Levenberg's and Marquardt's method on the missing forces, for a law without a power."""
-    missing, step, trial, slope = work[0], work[1], work[2], work[3:6]
+    missing = work[0]
+    step = work[1]
+    trial = work[2]
+    slope = work[3:6]
     normal = work[6:9]
     given = table, rows, links, grip, still, linear, quadratic
     _, lever = _forces(*given, w, missing, slope)
-    rest, damping = _square(missing, lever), 0.0
+    rest = _square(missing, lever)
+    damping = 0.0
     for _ in range(_STEPS):
         if rest < close or not abs(w[0]) + abs(w[1]) < _SLIDES_M_S:
             break
@@ -242,7 +253,8 @@ def _least_missing(
         _forces(*given, trial, missing, slope)
         now = _square(missing, lever)
         if now < 0.999 * rest:
-            rest, damping = now, (0.1 * damping if damping > 1e-3 else 0.0)
+            rest = now
+            damping = 0.1 * damping if damping > 1e-3 else 0.0
             for i in range(3):
                 w[i] = trial[i]
         else:

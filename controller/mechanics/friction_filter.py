@@ -125,7 +125,8 @@ class FrictionFilter:
             doubt: squared distance from which on the file is out.
 
         """
-        self._file, self._doubt = file, doubt
+        self._file = file
+        self._doubt = doubt
         self._weights = [1.0 / each**2 for each in sigma]
         self._prior = _Square(prior**2, 0.0, prior**2)
         self._u = self._v = 0.0
@@ -173,7 +174,10 @@ class FrictionFilter:
         slopes = [
             ((a - h) / STEP, (b - h) / STEP) for a, b, h in zip(by_u, by_v, here, strict=True)
         ]
-        whole, information, pull_u, pull_v = 0.0, _Square(0.0, 0.0, 0.0), 0.0, 0.0
+        whole = 0.0
+        information = _Square(0.0, 0.0, 0.0)
+        pull_u = 0.0
+        pull_v = 0.0
         for weight, g, (u, v) in zip(self._weights, gap, slopes, strict=True):
             whole += weight * g * g
             information = information.plus(_Square(u * u, u * v, v * v), weight)
@@ -186,7 +190,8 @@ class FrictionFilter:
         excess = max(1.0, (square - about.about(pull_u, pull_v)) / rows)
         span, about = self._of_span(information, excess)  # a large deviation counts less
         u, v = about.times(pull_u / excess, pull_v / excess)
-        cov, to_span = self._covariance, span.inverse
+        cov = self._covariance
+        to_span = span.inverse
         u, v = cov.times(*to_span.times(u, v))
         self._u += min(max(u, -_MOST), _MOST)
         self._v += min(max(v, -_MOST), _MOST)
@@ -219,7 +224,9 @@ class FrictionFilter:
 
     def _friction(self, u: float, v: float) -> FrictionConfig:
         """Scale the file's friction: one factor along (also backward), one across."""
-        file, along, across = self._file, math.exp(_ROOT * (u + v)), math.exp(_ROOT * (u - v))
+        file = self._file
+        along = math.exp(_ROOT * (u + v))
+        across = math.exp(_ROOT * (u - v))
         back = None if file.back is None else min(file.back * along, 5.0)
         given = {"along": min(file.along * along, 5.0), "across": min(file.across * across, 5.0)}
         return FrictionConfig(**given, back=back, law=file.law)

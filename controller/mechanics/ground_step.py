@@ -98,11 +98,20 @@ class GroundStep:
         start = np.broadcast_to(np.asarray(known_m, float), (frames, 2))
         each_m = np.broadcast_to(np.asarray(segment_m, float), (segments,))
         points = np.empty((frames, segments + 1, 3))
-        pitch, gap = np.empty((frames, segments)), np.empty((frames, segments + 1))
+        pitch = np.empty((frames, segments))
+        gap = np.empty((frames, segments + 1))
         _place(
-            *self._field, np.cos(angles), np.sin(angles), start, each_m, half,
-            known == "tail", points, pitch, gap,
-        )  # fmt: skip
+            *self._field,
+            np.cos(angles),
+            np.sin(angles),
+            start,
+            each_m,
+            half,
+            known == "tail",
+            points,
+            pitch,
+            gap,
+        )
         if np.ndim(angles_rad) == 1:
             return GroundedSkeleton(points[0], pitch[0], gap[0])
         return GroundedSkeleton(points, pitch, gap)
@@ -184,7 +193,8 @@ def _place(
                 here = there
                 continue
             dx, dy = sign * r * cosines[t, segment], sign * r * sines[t, segment]
-            level, over = z - half_m[there], miss + half_m[here] - half_m[there]
+            level = z - half_m[there]
+            over = miss + half_m[here] - half_m[there]
             low, high = -0.5 * pi, 0.5 * pi
             reachable = abs(over) < r
             rise = gx * dx + gy * dy

@@ -41,7 +41,8 @@ class PitchFitter:
 
     def __init__(self, robot: RobotConfig, ground: HeightField | None, gain: float = 1.0) -> None:
         """``gain`` scales the fitted goals."""
-        self._step, self._gain = GroundStep(ground), gain
+        self._step = GroundStep(ground)
+        self._gain = gain
         self._lengths_m = np.array(robot.link_lengths_m)
         self._link_m = robot.mean_link_length_m
         ends = (end / robot.link_count for end in robot.link_ends)
@@ -76,13 +77,15 @@ class PitchFitter:
         ends = np.zeros((self._joints + 2, 2))
         ends[1:] = -np.cumsum(self._lengths_m[:, None] * forward, axis=0)
         centres = 0.5 * (ends[1:] + ends[:-1])
-        at, along = ends[self._pitch + 1], forward[self._pitch]
+        at = ends[self._pitch + 1]
+        along = forward[self._pitch]
         ahead = (at - centres[:, None]) * along
         lever = self._behind * (ahead[..., 0] + ahead[..., 1])
         rise = np.column_stack([centres - centres.mean(axis=0), lever])
 
         mean = rise.mean(axis=0)
-        centred, target = rise - mean, height - height.mean()
+        centred = rise - mean
+        target = height - height.mean()
         tilt = least_squares(centred, target, np.full(len(mean), _REGULAR * self._link_m))
 
         goal = np.zeros(self._joints)

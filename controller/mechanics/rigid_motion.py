@@ -165,8 +165,14 @@ def _minimise(
         quadratic = np.empty((3, 3))
         add_inertia(table, OTHERS, links, step_s, linear, quadratic)
     return balance(
-        *(table, OTHERS, links, friction.grip),
-        *(linear, quadratic, velocity, np.empty((9, 3))),
+        table,
+        OTHERS,
+        links,
+        friction.grip,
+        linear,
+        quadratic,
+        velocity,
+        np.empty((9, 3)),
     )
 
 
@@ -225,7 +231,8 @@ def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
             c, s = link[FORWARD_X + j], link[FORWARD_Y + j]
             x, y = link[POINT_X + j], link[POINT_Y + j]
             u, v = link[SHAPE_X + j], link[SHAPE_Y + j]
-            ahead, aside = along * link[NORMAL + j], across * link[NORMAL + j]
+            ahead = along * link[NORMAL + j]
+            aside = across * link[NORMAL + j]
             a0, a1, a2 = c * ahead, s * ahead, (s * x - c * y) * ahead
             b0, b1, b2 = -s * aside, c * aside, (c * x + s * y) * aside
             link[_SLIDES + j], link[_SLIDES + 8 + j], link[_SLIDES + 16 + j] = a0, a1, a2
@@ -274,7 +281,9 @@ def _power(
         hessian: (3, 3) out: its lower triangle.
 
     """
-    x, y, turn = w[0], w[1], w[2]
+    x = w[0]
+    y = w[1]
+    turn = w[2]
     square = still * still
     power = rigid = 0.0
     g0, g1, g2 = -linear[0], -linear[1], -linear[2]
@@ -301,7 +310,8 @@ def _power(
             link[184 + j] = (link[96 + j] - d2 * d1) * inverse
             link[192 + j] = (link[104 + j] - d2 * d2) * inverse
         for j in range(min(LANES, links - group * LANES)):
-            rigid, power = rigid + link[112 + j], power + link[120 + j]
+            rigid = rigid + link[112 + j]
+            power = power + link[120 + j]
             g0, g1, g2 = g0 + link[128 + j], g1 + link[136 + j], g2 + link[144 + j]
             h00, h10, h11 = h00 + link[152 + j], h10 + link[160 + j], h11 + link[168 + j]
             h20, h21, h22 = h20 + link[176 + j], h21 + link[184 + j], h22 + link[192 + j]
@@ -359,7 +369,10 @@ def balance(
         return balance_forces(table, rows, links, grip, linear, quadratic, w, work)
     _set_up(table, rows, along, across)
     still = _STILL_M_S * across
-    gradient, step, trial, hessian = work[0], work[1], work[2], work[3:6]
+    gradient = work[0]
+    step = work[1]
+    trial = work[2]
+    hessian = work[3:6]
     may_slide = not quadratic.any() and (linear[0] != 0.0 or linear[1] != 0.0 or linear[2] != 0.0)
     best, _ = _power(table, rows, links, still, linear, quadratic, w, gradient, hessian)
     for _ in range(_STEPS):
@@ -374,7 +387,8 @@ def balance(
             for i in range(3):
                 w[i] -= step[i]
             break
-        now, scale = np.inf, 2.0
+        now = np.inf
+        scale = 2.0
         while now > best - 1e-4 * scale * fall and scale > 1e-9:
             scale *= 0.5
             for i in range(3):
@@ -422,7 +436,7 @@ def planar_slide(
         load = np.zeros((shapes, links, 3))
         load[:, :, 2] = 1.0
     return _slide_through(
-        *(headings_rad, points_m, step_s, heading_rad, friction.grip, load, link_table(links))
+        headings_rad, points_m, step_s, heading_rad, friction.grip, load, link_table(links)
     )
 
 
@@ -450,8 +464,12 @@ def _slide_through(
 ) -> tuple[float, float, float]:
     """``planar_slide`` with a ``link_table``, which is overwritten."""
     links = headings.shape[1]
-    linear, velocity, quadratic = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    work, x_m, y_m = np.empty((9, 3)), 0.0, 0.0
+    linear = np.zeros(3)
+    velocity = np.zeros(3)
+    quadratic = np.zeros((3, 3))
+    work = np.empty((9, 3))
+    x_m = 0.0
+    y_m = 0.0
     for n in range(len(step_s)):
         dt, c, s = step_s[n], np.cos(heading), np.sin(heading)
         linear[:] = 0.0

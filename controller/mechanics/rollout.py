@@ -135,7 +135,9 @@ class Followed:
 
     def __init__(self, path: TabulatedPath, path_at: int) -> None:
         """Start at the path's point with index ``path_at``."""
-        self._path, self._from, self._steps = path, path_at, 0
+        self._path = path
+        self._from = path_at
+        self._steps = 0
         self._state = np.zeros(STATE)
         self._state[3], self._state[10] = path_at, np.inf
 
@@ -147,7 +149,8 @@ class Followed:
 
     def rolled(self, headings_rad: Floats, points_m: Floats) -> Rolled:
         """Return the result for final headings (L,) of links at points (L, 2) about the centre."""
-        out, path = np.empty((1, COLUMNS)), self._path
+        out = np.empty((1, COLUMNS))
+        path = self._path
         body = float(headings_rad.mean()), float(points_m[0, 0]), float(points_m[0, 1])
         given = path.points_m, self._from, path.waypoint_at
         write_result(self._state, self._steps, *body, *given, out[0])
@@ -219,10 +222,15 @@ class Rollout:
 
         """
         given = (
-            *(np.array([*start.centre_m, start.offset_rad]), *self._field, self._level),
+            np.array([*start.centre_m, start.offset_rad]),
+            *self._field,
+            self._level,
             *self._links,
-            *(self._body, path.points_m, path_at),
-            *(np.array([*path.waypoint_m, path.waypoint_at]), cruise_segments_s),
+            self._body,
+            path.points_m,
+            path_at,
+            np.array([*path.waypoint_m, path.waypoint_at]),
+            cruise_segments_s,
             np.array([drift.ahead_m, drift.left_m, drift.turn_rad]),
         )
         return RolloutTree(samples_rad, head, len(self._table) // ROWS, given, room_of)
@@ -240,14 +248,17 @@ class RolloutTree:
         room_of: "RolloutTree | None" = None,
     ) -> None:
         """``given``: arguments of ``roll_pieces``; for the others see ``Rollout.begin``."""
-        self._samples, self._head, self._given = samples_rad, head, given
+        self._samples = samples_rad
+        self._head = head
+        self._given = given
         self._count = 0
         if room_of is None:
             self._pieces = np.empty((0, 0))
             self._states = np.empty((0, 0, STATE))
             self._moving = np.empty((0, 0, 2 * groups * LANES))
         else:
-            self._pieces, self._states = room_of._pieces, room_of._states
+            self._pieces = room_of._pieces
+            self._states = room_of._states
             self._moving = room_of._moving
 
     def roll(self, pieces_rad: Floats, pulse: float | None = None) -> Rolled:
@@ -266,8 +277,15 @@ class RolloutTree:
         self._pieces[before : self._count] = pieces_rad
         out = np.empty((count, COLUMNS))
         roll_pieces(
-            *(self._samples, self._pieces[: self._count], before, self._head, pulse / steps),
-            *(*self._given, self._states, self._moving, out),
+            self._samples,
+            self._pieces[: self._count],
+            before,
+            self._head,
+            pulse / steps,
+            *self._given,
+            self._states,
+            self._moving,
+            out,
         )
         return Rolled(out)
 
@@ -280,10 +298,13 @@ class RolloutTree:
         self._count += count
         if not fits or self._count > len(self._pieces):
             room = 2 * self._count
-            pieces, states = np.empty((room, length)), np.empty((room, steps + 1, STATE))
+            pieces = np.empty((room, length))
+            states = np.empty((room, steps + 1, STATE))
             moving = np.empty((room, steps + 1, self._moving.shape[2]))
             if before > 0:
                 pieces[:before], states[:before] = self._pieces[:before], self._states[:before]
                 moving[:before] = self._moving[:before]
-            self._pieces, self._states, self._moving = pieces, states, moving
+            self._pieces = pieces
+            self._states = states
+            self._moving = moving
         return before

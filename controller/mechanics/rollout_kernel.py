@@ -20,7 +20,8 @@ from snakewalk.controller.mechanics.link_table import (
 from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
-_BACK, _FORTH = 5, 40
+_BACK = 5
+_FORTH = 40
 """Points of the path among which a place is looked for after a step."""
 _AHEAD = 30
 """Points of the path from the centre to where its direction is compared."""
@@ -62,7 +63,8 @@ def _sine_cosine(x: float) -> tuple[float, float]:
     c = 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * c)
     quarter = k - 4.0 * np.floor(0.25 * k)
     back = np.floor(0.5 * quarter)
-    side, sign = quarter - 2.0 * back, 1.0 - 2.0 * back
+    side = quarter - 2.0 * back
+    sign = 1.0 - 2.0 * back
     return sign * ((1.0 - side) * s + side * c), sign * ((1.0 - side) * c - side * s)
 
 
@@ -107,10 +109,14 @@ def _lay(
     x = y = sum_x = sum_y = whole = 0.0
     for i in range(links):
         at = i // LANES * ROWS + i % LANES
-        c, s, weight = table[at + _COS], table[at + _SIN], table[at + WEIGHT]
+        c = table[at + _COS]
+        s = table[at + _SIN]
+        weight = table[at + WEIGHT]
         x, y = x - c, y - s
         table[at + _NEXT_X], table[at + _NEXT_Y] = x, y
-        sum_x, sum_y, whole = sum_x + weight * x, sum_y + weight * y, whole + weight
+        sum_x = sum_x + weight * x
+        sum_y = sum_y + weight * y
+        whole = whole + weight
         x, y = x - c, y - s
     centre_x, centre_y = sum_x / whole, sum_y / whole
     for g in range(len(table) // ROWS):
@@ -123,7 +129,8 @@ def _lay(
 @compiled("void(float64[::1], float64[::1], boolean)", makes_arrays=False)
 def _keep(table: Floats, moving: Floats, out: bool) -> None:
     for g in range(len(table) // ROWS):
-        link, kept = table[g * ROWS : (g + 1) * ROWS], moving[2 * g * LANES :]
+        link = table[g * ROWS : (g + 1) * ROWS]
+        kept = moving[2 * g * LANES :]
         for j in range(2 * LANES):
             if out:
                 kept[j] = link[MOVING_X + j]
@@ -144,12 +151,14 @@ def _stand_there(table: Floats) -> None:
 def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
     """Index on the path near ``at``, and the signed distance, positive to its left."""
     last = len(path) - 2
-    best, least = at, np.inf
+    best = at
+    least = np.inf
     for k in range(max(at - _BACK, 0), min(at + _FORTH, last) + 1):
         dx, dy = x - path[k, 0], y - path[k, 1]
         square = dx * dx + dy * dy
         if square < least:
-            least, best = square, k
+            least = square
+            best = k
     tx, ty = path[best + 1, 0] - path[best, 0], path[best + 1, 1] - path[best, 1]
     dx, dy = x - path[best, 0], y - path[best, 1]
     side = tx * dy - ty * dx
@@ -259,7 +268,9 @@ def _slide(
     if not balance(table, ROWS, links, grip, linear, quadratic, velocity, work[:9]):
         add_inertia(table, ROWS, links, step_s, linear, quadratic)
         balance(table, ROWS, links, grip, linear, quadratic, velocity, work[:9])
-    x, y, turn = velocity[0], velocity[1], velocity[2]
+    x = velocity[0]
+    y = velocity[1]
+    turn = velocity[2]
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(LANES):
@@ -288,7 +299,10 @@ def write_result(
     ``heading`` is the links' mean; the head link is at (head_x, head_y) about the centre. Both are
     in the track's frame.
     """
-    x, y, phi, place = state[0], state[1], state[2], state[3]
+    x = state[0]
+    y = state[1]
+    phi = state[2]
+    place = state[3]
     k = min(int(place) + _AHEAD, len(path) - 2)
     error = phi + heading
     error -= np.arctan2(path[k + 1, 1] - path[k, 1], path[k + 1, 0] - path[k, 0])
@@ -308,13 +322,15 @@ def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
 
     If lengths are equal, the first is returned, because its common part is known.
     """
-    best, longest = -1, -1
+    best = -1
+    longest = -1
     for other in range(piece):
         same = 0
         while same < pieces.shape[1] and pieces[other, same] == pieces[piece, same]:
             same += 1
         if same > longest:
-            best, longest = other, same
+            best = other
+            longest = same
     return best, longest
 
 
@@ -380,10 +396,16 @@ def roll_pieces(
         out: results.
 
     """
-    known, new, links, steps = len(samples), pieces.shape[1], len(group), states.shape[1] - 1
-    track, total = np.empty(known + new), np.zeros(known + new + 1)
+    known = len(samples)
+    new = pieces.shape[1]
+    links = len(group)
+    steps = states.shape[1] - 1
+    track = np.empty(known + new)
+    total = np.zeros(known + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
-    velocity, linear, work = np.empty(3), np.empty(3), np.empty((12, 3))
+    velocity = np.empty(3)
+    linear = np.empty(3)
+    work = np.empty((12, 3))
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(LANES):
@@ -393,7 +415,8 @@ def roll_pieces(
         track[known:] = pieces[c]
         for k in range(known + new):
             total[k + 1] = total[k] + track[k]
-        at, begin = head, 0
+        at = head
+        begin = 0
         like, same = _alike(pieces, c)
         if like < 0:
             states[c, 0, :3], states[c, 0, 3], states[c, 0, 4:] = start, path_at, 0.0
@@ -401,10 +424,13 @@ def roll_pieces(
             movings[c, 0] = 0.0
         else:
             while begin < steps and at + step <= known + same:
-                at, begin = at + step, begin + 1
+                at = at + step
+                begin = begin + 1
             states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
         state = states[c, begin]
-        x, y, phi = state[0], state[1], state[2]
+        x = state[0]
+        y = state[1]
+        phi = state[2]
         velocity[:] = state[7:10]
         _keep(table, movings[c, begin], False)
         _lay(total, track, at, edges, group, here_g, table)
@@ -418,7 +444,8 @@ def roll_pieces(
             if not level:
                 _pull(z_m, x0, y0, spacing, x, y, table, links, linear)
             _slide(table, links, body, linear, dt, velocity, work)
-            ahead, left = step * np.cos(mean), step * np.sin(mean)
+            ahead = step * np.cos(mean)
+            left = step * np.sin(mean)
             x += velocity[0] * dt + ahead * drift[0] - left * drift[1]
             y += velocity[1] * dt + left * drift[0] + ahead * drift[1]
             phi += velocity[2] * dt + step * drift[2]
@@ -433,6 +460,13 @@ def roll_pieces(
         for i in range(links):
             heading += table[i // LANES * ROWS + _HERE + i % LANES]
         write_result(
-            *(state, steps, heading / links, table[_HERE_X], table[_HERE_Y]),
-            *(path, path_at, waypoint[2], out[c - before]),
+            state,
+            steps,
+            heading / links,
+            table[_HERE_X],
+            table[_HERE_Y],
+            path,
+            path_at,
+            waypoint[2],
+            out[c - before],
         )

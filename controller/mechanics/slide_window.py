@@ -79,12 +79,16 @@ class SlideWindow:
 
     def track(self, friction: FrictionConfig) -> Floats:
         """Return centre and heading (K, 3) of the body at the knots, under a friction."""
-        knots, rows = self.knots, [self.start]
+        knots = self.knots
+        rows = [self.start]
         for begin, end in pairwise(knots):
             at = np.array([*range(begin, end, STRIDE), end])
             x, y, heading = planar_slide(
-                *(self.headings_rad[at], self.points_m[at], np.diff(self.time_s[at])),
-                *(float(rows[-1][2]), friction),
+                self.headings_rad[at],
+                self.points_m[at],
+                np.diff(self.time_s[at]),
+                float(rows[-1][2]),
+                friction,
                 None if self.load is None else self.load[at],
             )
             rows.append(np.array([rows[-1][0] + x, rows[-1][1] + y, heading]))
@@ -134,7 +138,8 @@ class SlideWindow:
         ]
         columns = np.column_stack([averages(off).ravel(), *slopes])
         products = columns.T @ np.linalg.solve(covariance, columns)
-        square, rows = float(products[0, 0]), len(columns) - 3
+        square = float(products[0, 0])
+        rows = len(columns) - 3
         if by_both is None:
             return ratio_evidence(float(products[1, 1]), float(products[1, 0]), square, rows)
         return slide_evidence(products[1:, 1:], products[1:, 0], square, rows)
@@ -153,8 +158,10 @@ def _model_covariance(heads: Floats, track: Floats, kept: np.ndarray) -> Floats:
     """
     effects = []
     starts = [(-1, track[0], START_M, START_RAD)]
-    steps = [(k, row, (MODEL_M2_S * BIN_S) ** 0.5, (MODEL_RAD2_S * BIN_S) ** 0.5)
-             for k, row in enumerate(track)]  # fmt: skip
+    steps = [
+        (k, row, (MODEL_M2_S * BIN_S) ** 0.5, (MODEL_RAD2_S * BIN_S) ** 0.5)
+        for k, row in enumerate(track)
+    ]
     for begin, centre, move_m, turn_rad in starts + steps:
         since = (kept >= begin).astype(float)
         arm = heads[:, :2] - centre[:2]

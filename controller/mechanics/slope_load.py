@@ -33,14 +33,20 @@ def holding_factor(
     normal: Floats,
 ) -> float:
     """Largest factor on ``tangential``, at most 1, at which friction still holds the body."""
-    still, low, high = np.zeros_like(points_m), 0.0, 1.0
+    still = np.zeros_like(points_m)
+    low = 0.0
+    high = 1.0
     for _ in range(_HALVINGS):
         factor = 0.5 * (low + high)
         try:
             rigid_velocity(
-                points_m, headings_rad, still, friction,
-                tangential=factor * tangential, normal=normal,
-            )  # fmt: skip
+                points_m,
+                headings_rad,
+                still,
+                friction,
+                tangential=factor * tangential,
+                normal=normal,
+            )
             low = factor
         except NoBalanceError:
             high = factor

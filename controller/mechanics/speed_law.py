@@ -86,7 +86,9 @@ def identify(
 
     """
     moving = speed_m_s > 1e-3 * max(float(np.max(speed_m_s, initial=0.0)), 1e-9)
-    k, turn, v = bend_rad[moving], np.abs(turn_rad_s[moving]), speed_m_s[moving]
+    k = bend_rad[moving]
+    turn = np.abs(turn_rad_s[moving])
+    v = speed_m_s[moving]
     steady = acceleration_m_s2 is None
     if len(v) < (3 if steady else 4):
         raise ValueError(f"{len(v)} moving samples are too few for the speed law")
@@ -94,7 +96,8 @@ def identify(
     if acceleration_m_s2 is None:
         wanted = viscous_1_s * v
     else:
-        columns, wanted = [-v, *columns], acceleration_m_s2[moving]
+        columns = [-v, *columns]
+        wanted = acceleration_m_s2[moving]
     start = lsq_linear(np.column_stack(columns), wanted, bounds=(0.0, np.inf)).x
 
     def missing(at: Floats) -> Floats:

@@ -35,8 +35,10 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
 
     """
     links = robot.joint_count + 1
-    weight_n, share = robot.mean_link_mass_kg * GRAVITY_M_S2, link_weights(robot)
-    joints_m, axes = chain_points_m(robot, body)[1:-1], chain_axes(robot, body)
+    weight_n = robot.mean_link_mass_kg * GRAVITY_M_S2
+    share = link_weights(robot)
+    joints_m = chain_points_m(robot, body)[1:-1]
+    axes = chain_axes(robot, body)
     pitch = np.array(robot.pitch_joints, dtype=int)
     # lever (P, L): moment about a joint's axis of an upward unit force on a link behind it
     arm_m = body.link_m[None] - joints_m[pitch, None]

@@ -28,11 +28,13 @@ def forward_speed_m_s(
         joint_rad: (T, J) joint angles.
 
     """
-    spine, slide = SpineLinks.of(robot), BodySlide(link_weights(robot), friction)
+    spine = SpineLinks.of(robot)
+    slide = BodySlide(link_weights(robot), friction)
     even_s = np.linspace(time_s[0], time_s[-1], min(len(time_s), _STEPS + 1))
     joints = np.stack([np.interp(even_s, time_s, column) for column in joint_rad.T], axis=1)
     level = pose_at(np.zeros(3), 0.0)
-    step_s, forward_m = float(even_s[1] - even_s[0]), 0.0
+    step_s = float(even_s[1] - even_s[0])
+    forward_m = 0.0
     before = spine.in_world(level, joints[0])
     for row in joints[1:]:
         after = spine.in_world(level, row)

@@ -84,11 +84,19 @@ def rigid_velocities(
         padded = np.zeros((bodies, groups * LANES))
         padded[:, :links] = values
         tables[..., row : row + LANES] = padded.reshape(bodies, groups, LANES)
-    velocities, linear, quadratic = np.zeros((bodies, 3)), np.zeros(3), np.zeros((3, 3))
+    velocities = np.zeros((bodies, 3))
+    linear = np.zeros(3)
+    quadratic = np.zeros((3, 3))
     for table, velocity in zip(tables.reshape(bodies, -1), velocities, strict=True):
         is_balanced = balance(
-            *(table, OTHERS, links, friction.grip),
-            *(linear, quadratic, velocity, np.empty((9, 3))),
+            table,
+            OTHERS,
+            links,
+            friction.grip,
+            linear,
+            quadratic,
+            velocity,
+            np.empty((9, 3)),
         )
         if not is_balanced:
             raise NoBalanceError
