@@ -58,7 +58,9 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
         InputError: the log is of another motion.
 
     """
-    config, robot, pose = record.header.run.gait, record.header.robot, record.pose
+    config = record.header.run.gait
+    robot = record.header.robot
+    pose = record.pose
     if config is None:
         raise InputError("the log is of no gait")
     gait = make_gait(config.name, config.parameters)
@@ -67,7 +69,8 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     known = np.isfinite(pose.links_m).all(axis=(1, 2))
     if not known.any() or hz <= 0.0:
         return unknown
-    time_s, links = pose.time_s[known], pose.links_m[known]
+    time_s = pose.time_s[known]
+    links = pose.links_m[known]
     up = pose.rotation[known][:, :, 2]
     first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config.duration_s)
     count = int((last_s - first_s) * hz + 1e-9)

@@ -58,12 +58,14 @@ def energy_track(record: RunRecord) -> EnergyTrack:
 
 def sampled_energy(record: RunRecord) -> EnergyTrack:
     """Return the energy from the current and speed that each cycle read, held until the next."""
-    header, cycle = record.header, record.cycle
+    header = record.header
+    cycle = record.cycle
     winding = header.winding
     if winding is None or not np.isfinite(cycle.current_a).any():
         unknown = np.full(len(cycle.time_s), np.nan)
         return EnergyTrack(cycle.time_s, unknown, unknown, "unknown")
-    current_a, speed_rad_s = np.nan_to_num(cycle.current_a), np.nan_to_num(cycle.velocity_rad_s)
+    current_a = np.nan_to_num(cycle.current_a)
+    speed_rad_s = np.nan_to_num(cycle.velocity_rad_s)
     # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
     input_w = winding.resistance_ohm * current_a**2 + winding.back_emf_v_s * speed_rad_s * current_a
     shaft_w = header.torque_constant_n_m_a * speed_rad_s * current_a
@@ -103,7 +105,8 @@ def effort(record: RunRecord, moved: Travel | None = None) -> Effort:
 
     ``moved`` is its travel, where it was computed before.
     """
-    pose, gait = record.pose, record.header.run.gait
+    pose = record.pose
+    gait = record.header.run.gait
     unknown = Effort(*(float("nan"),) * 5)
     if gait is None or len(pose.time_s) == 0:
         return unknown
@@ -142,10 +145,12 @@ def cost_of_transport(energy_j: float, carried_j: float) -> float:
 
 def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
     """Sideways distance of the lowest point of touching links, over the centre's distance."""
-    header, pose = record.header, record.pose
+    header = record.header
+    pose = record.pose
     if header.world.ground.kind != "flat" or header.world.obstacle is not None:
         return float("nan")
-    links, centre = pose.links_m[steady], pose.centre_m[steady]
+    links = pose.links_m[steady]
+    centre = pose.centre_m[steady]
     joints = record.cycle.measured_rad[np.searchsorted(record.cycle.time_s, pose.time_s[steady])]
     frames = _link_rotations(header.robot, pose.rotation[steady], joints)
     # the turn from one cycle to the next as a vector: half the skew part of R' R^T, for small turns

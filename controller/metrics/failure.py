@@ -41,7 +41,9 @@ def failure(record: RunRecord) -> Failure | None:
 
     All but trip, roll and the limit is judged over the last ``WINDOW_S`` seconds.
     """
-    plan, pose, cycle = record.header.plan, record.pose, record.cycle
+    plan = record.header.plan
+    pose = record.pose
+    cycle = record.cycle
     trip = next((event.text for event in record.events if event.kind == "trip"), None)
     if trip is not None:
         return Failure("safety", f"stopped by safety: {trip}")
@@ -56,7 +58,8 @@ def failure(record: RunRecord) -> Failure | None:
             f"rolled over after {pose.time_s[over[0]]:.0f} s, "
             f"up to {np.degrees(roll.max()):.0f} deg",
         )
-    limit_s, speed_m_s = record.header.run.time_limit_s, plan.predicted_speed_m_s
+    limit_s = record.header.run.time_limit_s
+    speed_m_s = plan.predicted_speed_m_s
     way_m = length_m(plan.path_m) - plan.waypoint_radius_m
     if way_m > speed_m_s * limit_s > 0.0:  # no body that does what was planned comes to the end
         return Failure(
@@ -78,8 +81,10 @@ def failure(record: RunRecord) -> Failure | None:
 
 def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     """Judge the rows (n,) of the pose in which the shape travels."""
-    pose, header = record.pose, record.header
-    advanced, predicted = pose.speed_m_s[rows].mean(), pose.predicted_speed_m_s[rows].mean()
+    pose = record.pose
+    header = record.header
+    advanced = pose.speed_m_s[rows].mean()
+    predicted = pose.predicted_speed_m_s[rows].mean()
     share = advanced / predicted if predicted > 0.0 else 1.0
     if share < header.run.safety.advance_fraction:
         up_rad, holds_rad = float(np.mean(_up_rad(pose.links_m[rows]))), _holds_rad(record)
@@ -118,7 +123,8 @@ def _steepest_ahead_rad(record: RunRecord, along_m: float) -> float:
 
     Between points of the path a quarter of a body length apart; 0 without a ground or a path.
     """
-    ground, length = record.header.ground, record.header.robot.length_m
+    ground = record.header.ground
+    length = record.header.robot.length_m
     if ground is None or not record.paths or not np.isfinite(along_m):
         return 0.0
     path_m = record.paths[-1][1][:, :2]

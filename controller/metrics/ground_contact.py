@@ -34,7 +34,8 @@ def ground_contact(record: RunRecord, ground: HeightField | None) -> GroundConta
         return GroundContact(float("nan"), float("nan"))
     x, y, z = np.moveaxis(pose.links_m, -1, 0)
     robot = record.header.robot
-    rest, radius_m = np.zeros_like(z), np.array(robot.link_radii_m)
+    rest = np.zeros_like(z)
+    radius_m = np.array(robot.link_radii_m)
     if ground is not None:
         gx, gy = ground.gradient(x, y)
         # a ball on a slope touches uphill of its centre
@@ -51,15 +52,19 @@ def lifted_by_current(record: RunRecord) -> float:
     It uses the pose only for the directions of the joints, and does not use the ground. NaN without
     pitch joints, torque constant or poses. ``docs/benchmarks/compliance.md`` states its accuracy.
     """
-    header, pose, cycle = record.header, record.pose, record.cycle
-    robot, k_t = header.robot, header.torque_constant_n_m_a
+    header = record.header
+    pose = record.pose
+    cycle = record.cycle
+    robot = header.robot
+    k_t = header.torque_constant_n_m_a
     known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
     rows = np.flatnonzero(known)[::EVERY]
     if not robot.pitch_joints or not np.isfinite(k_t) or not len(rows):
         return float("nan")
     at = np.searchsorted(cycle.time_s, pose.time_s[rows])
     inside = at < len(cycle.time_s)
-    rows, at = rows[inside], at[inside]
+    rows = rows[inside]
+    at = at[inside]
     read = np.isfinite(cycle.current_a[at]).all(axis=1)
     shares = []
     for row, k in zip(rows[read], at[read], strict=True):

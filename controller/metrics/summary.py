@@ -226,13 +226,18 @@ def summary(record: RunRecord, moved: Travel | None = None) -> RunSummary:
 
 
 def _summary(record: RunRecord, moved: Travel) -> RunSummary:
-    header, cycle, pose, walk = record.header, record.cycle, record.pose, record.walk
-    waypoints, times = len(header.plan.waypoints_m), waypoint_times_s(pose, header.plan)
+    header = record.header
+    cycle = record.cycle
+    pose = record.pose
+    walk = record.walk
+    waypoints = len(header.plan.waypoints_m)
+    times = waypoint_times_s(pose, header.plan)
     tripped = next((e.text for e in record.events if e.kind == "trip"), None)
     off_path = path_error_m(record)
     moving = pose.pulse_m_s > 0.0
     chosen = moving if moving.any() else np.ones(len(moving), dtype=bool)
-    predicted, pulse = _mean(pose.predicted_speed_m_s[chosen]), _mean(pose.pulse_m_s[moving])
+    predicted = _mean(pose.predicted_speed_m_s[chosen])
+    pulse = _mean(pose.pulse_m_s[moving])
     tracking = tracking_error_rad(cycle)
     current = _peak(np.abs(cycle.current_a))
     use = wire_use(record)
@@ -309,7 +314,8 @@ def _evidence(record: RunRecord) -> dict[str, Any]:
 
     The uncertainty is the one that the source states, or the median of the one it measured.
     """
-    header, measured = record.header, record.pose_source
+    header = record.header
+    measured = record.pose_source
     stated = header.pose_evidence
     position_m = _median(measured.position_sd_m) if stated.is_measured else None
     heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
@@ -332,7 +338,8 @@ def _distance_m(record: RunRecord, moved: Travel) -> float:
 
 def _assumptions(header: Header) -> dict[str, dict[str, object]]:
     """Return friction, mass and supply voltage, with the files that they are taken from."""
-    robot, world = header.robot, header.world
+    robot = header.robot
+    world = header.world
     values = {
         "friction_along": (world.friction.along, f"world {world.name}"),
         "friction_across": (world.friction.across, f"world {world.name}"),
@@ -368,7 +375,8 @@ def _battery(record: RunRecord) -> SummarizedBattery | None:
 
 
 def _friction(record: RunRecord) -> SummarizedFriction | None:
-    found, file = record.friction, record.header.world.friction
+    found = record.friction
+    file = record.header.world.friction
     if not len(found.time_s):
         return None
 

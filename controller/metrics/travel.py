@@ -43,7 +43,8 @@ def travel(record: RunRecord) -> Travel:
       climber is the vertical, that of another gait goes with the virtual chassis.
     - Other motions: along the straight line between the ends, for gaits at full rate.
     """
-    pose, gait = record.pose, record.header.run.gait
+    pose = record.pose
+    gait = record.header.run.gait
     moving = np.flatnonzero(pose.pulse_m_s > 0.0)
     rows = moving if len(moving) else np.arange(len(pose.time_s))
     if len(record.header.plan.waypoints_m):
