@@ -84,13 +84,18 @@ def _within(
     duration: float, shapes: Floats, rate: float, brake: float, joins: Floats, limits: Floats
 ) -> bool:
     """Whether the largest sum of target and error keeps the limits."""
-    error, error_speed, speed, acceleration = joins[0], joins[1], joins[2], joins[3]
+    error = joins[0]
+    error_speed = joins[1]
+    speed = joins[2]
+    acceleration = joins[3]
     for i in range(shapes.shape[1]):
         r = rate + (1.0 - rate) * shapes[1, i]
         dr = (1.0 - rate) * shapes[2, i] / duration
-        dp, ddp = shapes[3, i] / duration, shapes[4, i] / duration**2
+        dp = shapes[3, i] / duration
+        ddp = shapes[4, i] / duration**2
         y = min(shapes[0, i] * duration / brake, 1.0)
-        rest, drest = 1.0 - cubic(y), -cubic_slope(y) / brake
+        rest = 1.0 - cubic(y)
+        drest = -cubic_slope(y) / brake
         for j in range(len(error)):
             total = error[j] + 0.5 * brake * error_speed[j]
             if r * speed[j] + abs(error_speed[j] * rest - total * dp) > limits[0, j]:
@@ -174,7 +179,8 @@ def plan_join(angle_rad: Floats, speed_rad_s: Floats, target: MotionSource, limi
     """
     error = angle_rad - target.goal_rad()
     speed_rad_s = np.clip(speed_rad_s, -limit.speed_rad_s, limit.speed_rad_s)
-    velocity, pace = target.velocity_rad_s(), target.pace()
+    velocity = target.velocity_rad_s()
+    pace = target.pace()
     for rate, longest_s in zip(RATES, LONGEST_JOIN_S, strict=True):
         error_speed = speed_rad_s - rate * velocity
         if rate == 1.0 and max(np.abs(error).max(), np.abs(error_speed).max()) < 1e-9:
@@ -198,7 +204,8 @@ class Blend(MotionWrapper):
 
         """
         super().__init__(target)
-        self.target, self._limit = target, limit
+        self.target = target
+        self._limit = limit
         self.join = plan_join(angle_rad, speed_rad_s, target, limit)
         self._t_s = 0.0
 

@@ -96,7 +96,9 @@ class _Through:
     """Joints follow a spline in time."""
 
     def __init__(self, spline: PPoly, end_s: float) -> None:
-        self._spline, self._end_s, self._now_s = spline, end_s, 0.0
+        self._spline = spline
+        self._end_s = end_s
+        self._now_s = 0.0
 
     @property
     def over(self) -> bool:
@@ -151,7 +153,9 @@ class Commanded:
             gait: initial gait; None: hold.
 
         """
-        self._robot, self._commands, self._on_event = robot, commands, on_event
+        self._robot = robot
+        self._commands = commands
+        self._on_event = on_event
         self._limits = JointLimits.of(robot, joints)
         self._timeout_s = timeout_s
         self._first = gait
@@ -226,7 +230,8 @@ class Commanded:
                 self._go_to(command)
             elif isinstance(command, JointTrajectory):
                 spline, end_s = spline_through(command, self._mode.now(), self._limits)
-                self._mode, self._waiting = _Through(spline, end_s), None
+                self._mode = _Through(spline, end_s)
+                self._waiting = None
                 self._driven = None
                 points = len(command.time_s)
                 self._on_event("command", f"a trajectory of {points} points, {end_s:.2f} s")
@@ -272,7 +277,8 @@ class Commanded:
                 "before a run; use snakewalk gait run"
             )
         gait.check(self._robot)
-        self._waiting, self._driven = (lambda: GaitMotion(gait, self._robot)), None
+        self._waiting = lambda: GaitMotion(gait, self._robot)
+        self._driven = None
         if gait.follows_velocity:
             self._driven_by = gait
         self._on_event("command", f"gait {gait.name}")
@@ -287,7 +293,8 @@ class Commanded:
         self._driven_s = self._timeout_s
         if self._driven is not None:
             return
-        self._driven, self._waiting = driven, self._copy_of_driven
+        self._driven = driven
+        self._waiting = self._copy_of_driven
         self._on_event("command", f"velocities, by gait {self._driven_by.name}")
 
     def _copy_of_driven(self) -> VelocityGait:
@@ -296,14 +303,16 @@ class Commanded:
 
     def _join(self, make: Callable[[], MotionSource], view: BodyView) -> None:
         """Join a source if every joint stays in its range; else move towards its first pose."""
-        tried, most_rad = self._blend(make()), self._limits.angle_rad
+        tried = self._blend(make())
+        most_rad = self._limits.angle_rad
         first_rad = tried.target.goal_rad()
         within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_RAD).all()
         while within and not tried.over:
             within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad + _REACHED_RAD).all()
         if within:
             blend = self._blend(make())
-            self._mode, self._waiting = _BySource(blend), None
+            self._mode = _BySource(blend)
+            self._waiting = None
             if isinstance(blend.target, VelocityGait):
                 self._driven = blend.target
             return

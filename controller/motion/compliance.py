@@ -25,7 +25,8 @@ class Compliance:
         self._config = config
         self._limit_rad = np.array(robot.limit_rad)
         self._yields = _chosen(config, robot)
-        joints, windows = robot.joint_count, config.windows
+        joints = robot.joint_count
+        windows = config.windows
         self._yield_rad = np.zeros(joints)
         self._scale = np.zeros(windows or 0)
         self._window = np.arange(joints) * (windows or 0) // joints

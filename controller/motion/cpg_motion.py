@@ -68,14 +68,16 @@ def quickest_change(cpg: Cpg, pattern: Pattern, limit: Pace) -> tuple[tuple[Part
         (Part(pattern, g, g),) for g in GAINS if g >= LEAST_DIRECT
     ]
     candidates += [(Part(crawl, g, CLOCK_GAIN), Part(pattern, g, CLOCK_GAIN)) for g in GAINS]
-    enough, wider = 1.0 + TOLERANCE, WIDER
+    enough = 1.0 + TOLERANCE
+    wider = WIDER
     while True:
         for parts in candidates:
             excess, pace = _evaluate(cpg, start, parts, limit, enough)
             if excess <= enough:
                 cpg.restore(start)
                 return parts, pace
-        enough, wider = enough * (1.0 + wider), 2.0 * wider
+        enough = enough * (1.0 + wider)
+        wider = 2.0 * wider
 
 
 def _evaluate(
@@ -83,7 +85,9 @@ def _evaluate(
 ) -> tuple[float, Pace]:
     """Return the largest share of a limit, and the largest values; stop once above ``enough``."""
     cpg.restore(start)
-    over, fast, hard = 0.0, np.zeros(cpg.joints), np.zeros(cpg.joints)
+    over = 0.0
+    fast = np.zeros(cpg.joints)
+    hard = np.zeros(cpg.joints)
     for part in parts:
         step_s = max(SAMPLE_S, part.time_s / MOST_SAMPLES)
         part.begin(cpg)
@@ -92,14 +96,16 @@ def _evaluate(
             times_s, limit.speed_rad_s, limit.acceleration_rad_s2, enough
         )
         over = max(over, one)
-        fast, hard = np.maximum(fast, speed), np.maximum(hard, change)
+        fast = np.maximum(fast, speed)
+        hard = np.maximum(hard, change)
         if over > enough:
             break
         cpg.advance(part.time_s)
     return over, Pace(fast, hard)
 
 
-DONE_RAD, DONE_RAD_S = 0.01, 0.02
+DONE_RAD = 0.01
+DONE_RAD_S = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +169,9 @@ class CpgMotion:
             InputError: joints are missing, or their limits are too small; nothing changes then.
 
         """
-        twin, planned, begin_s = copy(self), [], self._now_s
+        twin = copy(self)
+        planned = []
+        begin_s = self._now_s
         twin.cpg = copy(self.cpg)
         over_s = 0.0
         for after_s, gait in changes:
@@ -176,11 +184,13 @@ class CpgMotion:
     def _plan(self, gait: Gait | None) -> GaitTransition:
         """Plan a change from the present state of the oscillators."""
         if gait is None:
-            pattern, needs = Pattern.rest(self.cpg.pattern.offset_rad), self.needs
+            pattern = Pattern.rest(self.cpg.pattern.offset_rad)
+            needs = self.needs
             settled = Pace.still(self.robot.joint_count)
         else:
             cycle = GaitCycle(gait, self.robot)
-            pattern, needs = Pattern.of(gait, self.robot, cycle.rate_rad_s), gait.needs
+            pattern = Pattern.of(gait, self.robot, cycle.rate_rad_s)
+            needs = gait.needs
             settled = cycle.pace()
         parts, under_way = quickest_change(self.cpg, pattern, self._limit)
         return GaitTransition(self._now_s, parts, needs, settled, under_way, stops=gait is None)
@@ -189,8 +199,10 @@ class CpgMotion:
         self._scheduled = ()
         change.parts[0].begin(self.cpg)
         self._next = change.parts[1:]
-        self.needs, self._stopping = change.needs, change.stops
-        self._settled, self._change = change.settled, change.under_way
+        self.needs = change.needs
+        self._stopping = change.stops
+        self._settled = change.settled
+        self._change = change.under_way
         self._part_s = change.parts[0].time_s
         self._left_s = sum(part.time_s for part in change.parts)
         return self._left_s

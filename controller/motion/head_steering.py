@@ -48,7 +48,8 @@ class HeadSteering(MotionWrapper):
         """
         super().__init__(source)
         self.needs.check(robot, "head steering")
-        self.source, self.target = source, target
+        self.source = source
+        self.target = target
         self._neck = np.array(robot.yaw_joints[:neck_joints])
         self._robot = robot
         limit_rad = np.array(robot.limit_rad)[self._neck]
@@ -77,7 +78,8 @@ class HeadSteering(MotionWrapper):
 
     def pace(self) -> Pace:
         """The source's pace, and the robot's limits in the neck."""
-        pace, limit = self.source.pace(), Pace.limit(self._robot)
+        pace = self.source.pace()
+        limit = Pace.limit(self._robot)
         return Pace(
             self._with_neck(pace.speed_rad_s, limit.speed_rad_s[self._neck]),
             self._with_neck(pace.acceleration_rad_s2, limit.acceleration_rad_s2[self._neck]),

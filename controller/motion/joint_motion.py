@@ -95,7 +95,8 @@ def joint_motion(
     lines = list(notes)
     if not whole.all():
         lines.append(f"{int((~whole).sum())} of {len(whole)} rows lack a value and are left out")
-    time_s, joint_rad = time_s[whole], joint_rad[whole]
+    time_s = time_s[whole]
+    joint_rad = joint_rad[whole]
     if len(time_s) < 2:
         raise InputError(f"{path}: {len(time_s)} whole rows of joint angles; a motion needs 2")
     step_s = np.diff(time_s)
@@ -132,7 +133,8 @@ def onto_robot(
         InputError: a joint of the robot has no counterpart.
 
     """
-    wanted, found = robot.joint_names, motion.names
+    wanted = robot.joint_names
+    found = motion.names
     for ours, theirs in asked.items():
         if ours not in wanted:
             raise InputError(f"--joint {ours}={theirs}: {robot.name} has {', '.join(wanted)}")
@@ -142,7 +144,9 @@ def onto_robot(
     lost = [name for name, theirs in pairs.items() if theirs not in (*found, REST)]
     by_order = False
     if lost and not asked and len(lost) == len(wanted) == len(found):
-        pairs, lost, by_order = dict(zip(wanted, found, strict=True)), [], True
+        pairs = dict(zip(wanted, found, strict=True))
+        lost = []
+        by_order = True
     if lost:
         raise InputError(
             f"{where}: no joint for {', '.join(lost)} of {robot.name}; it has {', '.join(found)}: "

@@ -65,12 +65,15 @@ class Operator(MotionWrapper):
         """
         super().__init__(motion)
         self.motion = motion
-        self._robot, self._keys, self._on_event = robot, keys, on_event
+        self._robot = robot
+        self._keys = keys
+        self._on_event = on_event
         self._chosen = 0
         self._halted = False
         self._refusals = Refusals(lambda why: on_event("operator", f"refused: {why}"))
         self._time_s = 0.0
-        self._held, self._was_held = held, True
+        self._held = held
+        self._was_held = True
         self._rate = 1.0
 
     @property

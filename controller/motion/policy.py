@@ -63,7 +63,8 @@ class PolicyWave(Strict):
     def of(cls, values: Floats) -> Self:
         """Return the wave of values (P,), clipped to their ranges and rounded as in a file."""
         held = np.clip(values, *WAVE_ENDS)
-        at, fields = 0, {}
+        at = 0
+        fields = {}
         for key, value in cls().model_dump().items():
             size = np.size(value)
             part = [_rounded(each) for each in held[at : at + size]]

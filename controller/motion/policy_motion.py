@@ -66,7 +66,8 @@ class PolicyMotion:
             GAIN_PER_S,
         )
         self._phase_rad = 0.0
-        self._heading_rad, self._mean_heading_rad = 0.0, np.nan
+        self._heading_rad = 0.0
+        self._mean_heading_rad = np.nan
         self._measured_rad = np.zeros(len(self._yaw))
         self._robot = robot
         self._remaining_s = duration_s
@@ -121,7 +122,9 @@ class PolicyMotion:
         target = np.clip(self._start + WAVE_SPAN * np.clip(action, -1.0, 1.0), *WAVE_ENDS)
         self._wave += (1.0 - np.exp(-dt_s / CHANGE_S)) * (target - self._wave)
         wave = self._wave
-        frequency_hz, sine, cosine = wave[0], wave[8], wave[9]
+        frequency_hz = wave[0]
+        sine = wave[8]
+        cosine = wave[9]
         self.cycles += dt_s * frequency_hz
         self._phase_rad = float((self._phase_rad + dt_s * TURN * frequency_hz) % TURN)
         heading_rad = self._mean_heading(dt_s * frequency_hz)

@@ -17,7 +17,8 @@ class RateLimiter:
     ) -> None:
         self.angle_rad = np.array(angle_rad, dtype=float)
         self.speed_rad_s = np.zeros(len(self.angle_rad))
-        self._speed, self._acceleration = speed_limit_rad_s, acceleration_limit_rad_s2
+        self._speed = speed_limit_rad_s
+        self._acceleration = acceleration_limit_rad_s2
         self._gain = gain_per_s
 
     def step(self, dt_s: float, target_rad: Floats) -> Floats:

@@ -42,7 +42,8 @@ class Recorded:
             raise InputError("the times of a recording must grow")
         self._spline = scipy.interpolate.CubicSpline(time_s, joint_rad, bc_type="natural")
         fine = np.linspace(time_s[0], time_s[-1], 8 * len(time_s))
-        reach, limit = np.abs(self._spline(fine)).max(axis=0), np.array(robot.limit_rad)
+        reach = np.abs(self._spline(fine)).max(axis=0)
+        limit = np.array(robot.limit_rad)
         if (reach > limit).any():
             joint = int(np.argmax(reach / limit))
             moment = fine[np.argmax(np.abs(self._spline(fine)[:, joint]))]
@@ -119,12 +120,14 @@ class Recorded:
         """Largest acceleration (J,) of the joints during the clock's ramps."""
         x = np.linspace(0.0, 1.0, _RAMP_SAMPLES)[:, None]
         done_s = self._ramp_s * quintic_sum(x[:, 0]) / self.slowed
-        rate, growth = quintic(x) / self.slowed, quintic_slope(x) / self._ramp_s / self.slowed
+        rate = quintic(x) / self.slowed
+        growth = quintic_slope(x) / self._ramp_s / self.slowed
         found = []
         for places_s, sign in (
             (self._start_s + done_s, 1.0),
             (self._start_s + self._length_s - done_s, -1.0),
         ):
-            bend, speed = self._spline(places_s, 2), self._spline(places_s, 1)
+            bend = self._spline(places_s, 2)
+            speed = self._spline(places_s, 1)
             found.append(np.abs(bend * rate**2 + sign * speed * growth))
         return np.asarray(np.concatenate(found).max(axis=0))

@@ -20,7 +20,8 @@ class Refusals:
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
-        self._last, self._last_s = "", 0.0
+        self._last = ""
+        self._last_s = 0.0
         self._begin_s = 0.0
         self._lines = self._unreported = 0
 
@@ -30,7 +31,8 @@ class Refusals:
         text = plain(why if len(why) <= TEXT_MAX else f"{why[: TEXT_MAX - 3]}...")
         if text == self._last and time_s - self._last_s < QUIET_S:
             return
-        self._last, self._last_s = text, time_s
+        self._last = text
+        self._last_s = time_s
         if self._lines == 0:
             self._begin_s = time_s
         if self._lines == LINES_MAX:

@@ -53,7 +53,8 @@ class StopProfile:
         if self._goes_on:
             self._since_stop_s = min(self._since_stop_s, STOP_S) - dt_s
             if self._since_stop_s <= 0.0:
-                self._since_stop_s, self._goes_on = None, False
+                self._since_stop_s = None
+                self._goes_on = False
         else:
             self._since_stop_s += dt_s
         return 0.5 * (before + self.rate) * dt_s

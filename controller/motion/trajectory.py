@@ -95,7 +95,8 @@ class JointLimits:
         if not bad.any():
             return
         point, column = (int(k) for k in np.argwhere(bad)[0])
-        name, value = self.names[joints[column]], angle_rad[point, column]
+        name = self.names[joints[column]]
+        value = angle_rad[point, column]
         if not np.isfinite(value):
             raise InputError(f"{what}: {name}: {value} is not a number")
         raise InputError(f"{what}: {name}: {value:.2f} rad; its limit is {limit[column]:.2f}")

@@ -58,7 +58,8 @@ class VelocityGait:
         straight = type(gait)(straight.params.model_copy(update={"backward": False}))
         for bend in (-BEND_LIMIT_RAD, BEND_LIMIT_RAD):
             turned(straight, _KEY, bend).check(robot)
-        self._gait, self._robot = straight, robot
+        self._gait = straight
+        self._robot = robot
         cycle = GaitCycle(straight, robot)
         share = rate_beside_turn(straight, _KEY, robot, cycle.pace())
         self._full_rad_s = cycle.rate_rad_s * share
@@ -94,7 +95,8 @@ class VelocityGait:
         """
         if not (math.isfinite(forward_m_s) and math.isfinite(turn_rad_s)):
             raise InputError("velocity: not a number; send finite values")
-        speed, most = abs(forward_m_s), self.full_speed_m_s
+        speed = abs(forward_m_s)
+        most = self.full_speed_m_s
         if speed > most * _ROUNDING:
             raise InputError(f"velocity: {forward_m_s:.3g} m/s; at most {most:.3f} m/s is accepted")
         length_m = self._robot.length_m
@@ -126,8 +128,10 @@ class VelocityGait:
 
     def velocity_rad_s(self) -> Floats:
         """(J,) central difference over 4e-4 s of phase and bend."""
-        rate, half_s = self._full_rad_s * float(self._rate.angle_rad[0]), 2e-4
-        bend, bending = float(self._bend.angle_rad[0]), float(self._bend.speed_rad_s[0])
+        rate = self._full_rad_s * float(self._rate.angle_rad[0])
+        half_s = 2e-4
+        bend = float(self._bend.angle_rad[0])
+        bending = float(self._bend.speed_rad_s[0])
         before, after = (
             self._joints_rad(self._phase_rad + at_s * rate, bend + at_s * bending)
             for at_s in (-half_s, half_s)
