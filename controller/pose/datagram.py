@@ -58,7 +58,8 @@ def decode_pose(data: bytes) -> PoseSample:
     missing = sorted(_KEYS - set(row))
     if missing:
         raise UnusablePoseError(f"{', '.join(missing)}: missing; every pose needs these keys")
-    sequence, frame = row["sequence"], row["frame"]
+    sequence = row["sequence"]
+    frame = row["frame"]
     if not isinstance(sequence, int) or isinstance(sequence, bool) or sequence < 0:
         raise UnusablePoseError(f"sequence {sequence!r}: must be a whole number from 0 on")
     if not isinstance(frame, str) or len(frame) > 100:

@@ -55,7 +55,9 @@ class DeadReckoning:
 
     def __call__(self, state: JointState) -> BodyPose:
         """Advance to the state's time."""
-        joints, time_s, last = state.position_rad, state.time_s, self._last
+        joints = state.position_rad
+        time_s = state.time_s
+        last = self._last
         if last is None:
             level = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)
             self._heading_rad -= level.heading_rad

@@ -63,17 +63,16 @@ class ExternalPose:
         reckoning: Callable[[JointState], BodyPose],
         on_event: Callable[[str], None] = lambda text: None,
     ) -> None:
-        self._config, self._feed, self._reckoning, self._on_event = (
-            config,
-            feed,
-            reckoning,
-            on_event,
-        )
+        self._config = config
+        self._feed = feed
+        self._reckoning = reckoning
+        self._on_event = on_event
         self._body = TrackedBody(robot, config)
         self._history = MotionHistory(robot.joint_count)
         self._filter = PoseFilter(robot)
         self._clock, self._check = SenderClock(), MotionCheck()
-        self._relocation, self._has_slid = Relocation(), False
+        self._relocation = Relocation()
+        self._has_slid = False
         self._latency = LatencyEstimate(config.latency_s)
         self._sender: str | None = None
         self._frame = config.frame
@@ -120,7 +119,8 @@ class ExternalPose:
 
     def take_measured(self) -> MeasuredHeads:
         """Return the measurements since the last call."""
-        heads, has_slid = list(self._measured), self._has_slid
+        heads = list(self._measured)
+        has_slid = self._has_slid
         self._measured.clear()
         self._has_slid = False
         return MeasuredHeads(self._now_s, heads, has_slid)
@@ -199,7 +199,9 @@ class ExternalPose:
         if self._latency.is_known:
             self._measured.append(TimedHead(measured_s, measured))
         self.counts["used"] += 1
-        self._used, self._used_s, self._reason = sample, measured_s, ""
+        self._used = sample
+        self._used_s = measured_s
+        self._reason = ""
 
     def _has_relocated(self, placed: PlacedPose) -> bool:
         """Whether the body truly moved without its joints, and now lies where the poses say."""
@@ -235,7 +237,8 @@ class ExternalPose:
 
     def _is_next(self, sample: PoseSample, arrived: ArrivedPose) -> bool:
         """Whether a pose follows the newest one; a sender that starts again is reported."""
-        newest, before = self._newest, None
+        newest = self._newest
+        before = None
         if newest is not None and isinstance(newest.sample, PoseSample):
             before = newest.sample
         if before is not None and sample.sequence <= before.sequence:

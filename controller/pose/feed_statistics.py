@@ -92,7 +92,8 @@ class FeedStatistics:
 
     def _in_world(self, sample: PoseSample) -> tuple[Floats, Floats]:
         """Return centre (3,) and axes (3, 3) of the link that carries the body."""
-        config, world = self._config, turned(self._config.world_deg)
+        config = self._config
+        world = turned(self._config.world_deg)
         axes = world @ sample.rotation @ turned(config.offset_deg).T
         body_m = np.array(config.world_m) + world @ sample.position_m
         return body_m - axes @ np.array(config.offset_m), axes
@@ -109,10 +110,7 @@ class FeedStatistics:
         rotations = [sample.rotation for _, _, sample in self._poses]
         if len(rotations) < 10:
             return None
-        steps = np.array([
-            rotation_vector(two @ one.T)
-            for one, two in pairwise(rotations)
-        ])  # fmt: skip
+        steps = np.array([rotation_vector(two @ one.T) for one, two in pairwise(rotations)])
         return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
 
 

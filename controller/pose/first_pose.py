@@ -35,7 +35,9 @@ def await_first_pose(
         InputError: none arrives, none can be read, or ``judge`` returns why it cannot be right.
 
     """
-    until_s, arrived, reason = clock.now_s() + WAIT_S, list[ArrivedPose](), ""
+    until_s = clock.now_s() + WAIT_S
+    arrived = list[ArrivedPose]()
+    reason = ""
     while clock.now_s() < until_s:
         for each in feed.arrived(clock.now_s()):
             arrived.append(each)

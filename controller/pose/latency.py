@@ -45,14 +45,16 @@ class LatencyEstimate:
         if self._is_fixed or len(times) < 2 or stamped_s - LONGEST_S < times[0]:
             return
         if self._last is None:
-            step_s, heading = 0.0, heading_rad
+            step_s = 0.0
+            heading = heading_rad
         else:
             step_s = stamped_s - self._last[0]
             heading = self._last[1] + float(
                 np.arctan2(*(f(heading_rad - self._last[1]) for f in (np.sin, np.cos)))
             )
         if not 0.0 <= step_s < 0.5 * SLOW_S:  # a gap: begin again
-            self._last, self._seconds = None, 0.0
+            self._last = None
+            self._seconds = 0.0
             return
         moved = np.interp(stamped_s - self._shifts_s, times, history.headings_rad)
         off = heading - moved

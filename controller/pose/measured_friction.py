@@ -72,7 +72,8 @@ class MeasuredFriction(FrictionEstimator):
 
         """
         super().__init__(file, use)
-        self._measured, self._ground = measured, ground
+        self._measured = measured
+        self._ground = ground
         doubt = DOUBT_99 if ground is None else DOUBT_95
         self._filter = FrictionFilter(file, prior=PRIOR, doubt=doubt)
         self._cycles: list[_Cycle] = []
@@ -111,7 +112,8 @@ class MeasuredFriction(FrictionEstimator):
     ) -> Iterator[FoundFriction | None]:
         columns = (np.array(each) for each in zip(*cycles, strict=True))
         times, places, headings, points, links = columns
-        window, ground = SlideWindow(times, headings, points, places[0]), self._ground
+        window = SlideWindow(times, headings, points, places[0])
+        ground = self._ground
         if ground is not None:
             if any(_roughness_m(ground, each) > ROUGH_M for each in links[window.knots]):
                 yield self._filter.absorb(None, WINDOW_S)
@@ -161,7 +163,8 @@ def _roughness_m(ground: HeightField, links_m: Floats) -> float:
 
 
 def _readings(heads: list[TimedHead]) -> HeadReadings:
-    place, variance = [], []
+    place = []
+    variance = []
     for _, head in heads:
         heading = np.arctan2(head.rotation[1, 0], head.rotation[0, 0])
         place.append([*head.position_m[:2], heading])

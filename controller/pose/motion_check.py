@@ -92,7 +92,8 @@ class MotionCheck:
         way, seen = (np.array(column) for column in zip(*self._ways, strict=True))
         if float(np.vdot(way, way).real) < LEAST_WAY_M2:
             return None
-        same, mirrored = np.vdot(way, seen), np.vdot(way.conj(), seen)
+        same = np.vdot(way, seen)
+        mirrored = np.vdot(way.conj(), seen)
         size = float(np.sqrt(np.vdot(way, way).real * np.vdot(seen, seen).real)) or 1.0
         scale = float(np.sqrt(np.vdot(seen, seen).real / np.vdot(way, way).real))
         if scale > SCALE and abs(same) > SHARE * size:

@@ -65,7 +65,8 @@ class MotionHistory:
             row = self._rows[self._first]
             return Moment(time_s, row[1:4].copy(), row[4:].copy())
         k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1)) + self._first
-        one, two = self._rows[k - 1], self._rows[k]
+        one = self._rows[k - 1]
+        two = self._rows[k]
         part = float(np.clip((time_s - one[0]) / (two[0] - one[0]), 0.0, 1.0))
         row = one + part * (two - one)
         return Moment(time_s, row[1:4], row[4:])

@@ -102,7 +102,8 @@ class PoseFilter:
 
     def advance(self, moment: Moment) -> None:
         """Move the body as dead reckoning does since the last call, and grow the uncertainty."""
-        before, self._last = self._last, moment
+        before = self._last
+        self._last = moment
         self._shape = self._mean_frame(moment)
         if before is None:
             self._align()
@@ -113,7 +114,8 @@ class PoseFilter:
         self._body = rotation_by(np.array([0.0, 0.0, turn])) @ self._body
         if step_s > 0.0:
             slip = 2.0 * SLIP_TIME_S * SLIP_SHARE**2 / step_s
-            moved, turned = slip * float(way @ way), slip * turn * turn
+            moved = slip * float(way @ way)
+            turned = slip * turn * turn
             across = DRIFT_M2_S * step_s + moved
             rise = RISE_M2_S * step_s + 0.5 * moved
             tilt = TILT_RAD2_S * step_s
@@ -199,7 +201,8 @@ class PoseFilter:
     def _mean_axes(self, joint_rad: Floats) -> Floats:
         at_origin = BodyPose(0.0, np.zeros(3), np.eye(3))
         rotation = self._spine.in_world(at_origin, joint_rad).rotation
-        forward, up = rotation[:, :, 0].mean(axis=0), rotation[:, :, 2].mean(axis=0)
+        forward = rotation[:, :, 0].mean(axis=0)
+        up = rotation[:, :, 2].mean(axis=0)
         forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
         left = _cross(up, forward)
         left = left / max(float(np.linalg.norm(left)), 1e-9)
@@ -210,7 +213,8 @@ def rotation_vector(rotation: Floats) -> Floats:
     """Return the rotation vector (3,) of a rotation matrix, below a half turn."""
     r = rotation
     axis = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    sine, cosine = 0.5 * float(np.linalg.norm(axis)), 0.5 * (float(r.trace()) - 1.0)
+    sine = 0.5 * float(np.linalg.norm(axis))
+    cosine = 0.5 * (float(r.trace()) - 1.0)
     angle = float(np.arctan2(sine, cosine))
     if sine > 1e-9:
         return axis * (angle / (2.0 * sine))
@@ -246,6 +250,6 @@ def _corrected(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    return np.array([
-        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    ])  # fmt: skip
+    return np.array(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )

@@ -81,7 +81,8 @@ class Relocation:
 
     def add(self, pose: PlacedPose) -> Relocated | None:
         """Return how the body moved once its poses have settled; None before."""
-        used, last = self._used, self._last
+        used = self._used
+        last = self._last
         if used is None or last is None or not _follows(last, pose):
             return None
         self._last = pose

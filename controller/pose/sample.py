@@ -68,11 +68,13 @@ def rotation_of(quaternion_wxyz: Sequence[float]) -> Floats:
             "degrees"
         )
     w, x, y, z = w / length, x / length, y / length, z / length
-    return np.array([
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
 
 
 def quaternion_of(rotation: Floats) -> tuple[float, float, float, float]:
@@ -96,8 +98,10 @@ def turned(roll_pitch_yaw_deg: Sequence[float]) -> Floats:
     """Return the rotation (3, 3) by roll, pitch and yaw about fixed axes, in this order."""
     angles = np.radians(np.array(roll_pitch_yaw_deg, dtype=float))
     (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
-    return np.array([
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ])  # fmt: skip
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )

@@ -33,7 +33,8 @@ class TrackedBody:
     """The body that a source tracks, on a link of the robot."""
 
     def __init__(self, robot: RobotConfig, config: PoseConfig) -> None:
-        self._spine, self._config = SpineLinks.of(robot), config
+        self._spine = SpineLinks.of(robot)
+        self._config = config
         self._world_m = np.array(config.world_m)
         self._world = turned(config.world_deg)
         self._offset_m = np.array(config.offset_m)
@@ -56,7 +57,8 @@ class TrackedBody:
         at, link_in_head = self._in_head(joint_rad)
         link = head.rotation @ link_in_head
         link_m = head.head_in_world_m + head.rotation @ at
-        body_m, axes = link_m + link @ self._offset_m, link @ self._offset
+        body_m = link_m + link @ self._offset_m
+        axes = link @ self._offset
         return self._world.T @ (body_m - self._world_m), self._world.T @ axes
 
     def _in_head(self, joint_rad: Floats) -> tuple[Floats, Floats]:
@@ -67,7 +69,8 @@ class TrackedBody:
         if sample.covariance is None:
             noise_rad = float(np.radians(self._config.noise_deg))
             return self._config.noise_m**2 * np.eye(3), noise_rad**2 * np.eye(3)
-        position, turn = sample.covariance[:3, :3], sample.covariance[3:, 3:]
+        position = sample.covariance[:3, :3]
+        turn = sample.covariance[3:, 3:]
         world = self._world
         return (
             world @ position @ world.T + LEAST_SD_M**2 * np.eye(3),

@@ -30,7 +30,8 @@ class SimulatedTracker:
     """Measures a body in regular intervals; every chance comes from the seed."""
 
     def __init__(self, config: TrackerConfig, body: TrackedBody, seed: int = 0) -> None:
-        self.config, self._body = config, body
+        self.config = config
+        self._body = body
         self._rng = np.random.default_rng([seed, 0x7AC])
         self._noise = np.zeros(6)
         self._sequence = 0
@@ -42,7 +43,9 @@ class SimulatedTracker:
 
     def measure(self, head: BodyPose, joint_rad: Floats) -> tuple[int, float | None]:
         """Measure the body; returns the number of the pose, and when it arrives, or None."""
-        config, rng, now_s = self.config, self._rng, head.time_s
+        config = self.config
+        rng = self._rng
+        now_s = head.time_s
         position_m, axes = self._body.body(head, joint_rad)
         noise = self._next_noise()
         if self._begins(config.swap_every_s):
@@ -54,7 +57,8 @@ class SimulatedTracker:
         swapped = self._swap if now_s < self._swap_until_s else np.zeros(3)
         is_lost = rng.random() < config.lost_share or now_s < self._dropout_until_s
         delay_s = config.delay_s + config.jitter_s * rng.random()
-        sequence, self._sequence = self._sequence, self._sequence + 1
+        sequence = self._sequence
+        self._sequence = self._sequence + 1
         if is_lost:
             return sequence, None
         sample = PoseSample(
