@@ -103,7 +103,9 @@ def true_arrivals(
     centre_m: Floats, waypoints_m: Floats, radius_m: float
 ) -> tuple[int, list[float]]:
     """Return the waypoints (w, 2) that a way (n, 2) comes to in order, and least distances."""
-    first, reached, closest = 0, 0, []
+    first = 0
+    reached = 0
+    closest = []
     for waypoint_m in waypoints_m:
         away_m = np.hypot(*(centre_m[first:] - waypoint_m).T)
         closest.append(float(away_m.min()) if len(away_m) else np.inf)
@@ -121,7 +123,8 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
 
     The clocks are compared by the datagrams: the quickest one arrives when the server sent it.
     """
-    pose, offset_s = record.pose, clock_offset_s(truth, record)
+    pose = record.pose
+    offset_s = clock_offset_s(truth, record)
     if offset_s is None:
         return np.zeros(0), np.zeros(0)
     at_s = pose.time_s - offset_s

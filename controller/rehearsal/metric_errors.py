@@ -85,7 +85,8 @@ def with_head_poses(
     record: RunRecord, head_m: Floats, rotation: Floats
 ) -> tuple[RunRecord, Floats]:
     """Return the record with other poses (P, 3), (P, 3, 3) of the head, as ``true_record``."""
-    pose, cycle = record.pose, record.cycle
+    pose = record.pose
+    cycle = record.cycle
     rows = np.clip(np.searchsorted(cycle.time_s, pose.time_s), 0, len(cycle.time_s) - 1)
     spine = SpineLinks.of(record.header.robot)
     views = [
@@ -94,7 +95,8 @@ def with_head_poses(
     ]
     displacement_m = np.array([0.0, *(_advance_m(*pair) for pair in pairwise(views))])
     hz = record.header.run.cycle_hz
-    speed_m_s, smooth = np.empty(len(views)), 0.0
+    speed_m_s = np.empty(len(views))
+    smooth = 0.0
     for k, step_m in enumerate(displacement_m):
         smooth += min(1.0 / (_SMOOTHING_S * hz), 1.0) * (step_m * hz - smooth)
         speed_m_s[k] = smooth
@@ -115,7 +117,8 @@ def _advance_m(before: BodyView, now: BodyView) -> float:
 
 def slip_alarms(record: RunRecord, displacement_m: Floats) -> int:
     """Return how many slip alarms the monitor of the loop raises on a motion."""
-    pose, header = record.pose, record.header
+    pose = record.pose
+    header = record.header
     moving = pose.pulse_m_s > 0.0
     if not moving.any():
         return 0

@@ -23,7 +23,11 @@ from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.truth import read_truth
 
 RUNS: Final = (
-    *("jacksboro-traverse", "jacksboro-around", "random-10", "ramp-10-up", "steps-4cm"),
+    "jacksboro-traverse",
+    "jacksboro-around",
+    "random-10",
+    "ramp-10-up",
+    "steps-4cm",
     "flat-slalom",
 )
 """Runs that are rehearsed by default."""

@@ -124,7 +124,8 @@ def task_named(name: str) -> ControllerTask:
 
 def run_task(item: TaskRun) -> TaskResult:
     """Run a controller on a task; a controller that does not fit is a result as well."""
-    task, about = task_named(item.task), (item.task, item.controller, item.seed)
+    task = task_named(item.task)
+    about = (item.task, item.controller, item.seed)
     try:
         if task.is_rehearsed:
             return _rehearsed(task, item)
@@ -132,7 +133,8 @@ def run_task(item: TaskRun) -> TaskResult:
         result = run_robot(RunRequest(prepared, stoppable=False))
     except InputError as error:
         return TaskResult(*about, ended=f"not applicable: {error.faults[0]}")
-    numbers, outcome = result.summary, result.outcome
+    numbers = result.summary
+    outcome = result.outcome
     return TaskResult(
         *about,
         share=_digits(share(task, result)),
@@ -154,7 +156,8 @@ def share(task: ControllerTask, result: RunResult) -> float:
 
 
 def _moved_m(record: RunRecord, axis: str) -> float:
-    centre_m, time_s = record.pose.centre_m, record.pose.time_s
+    centre_m = record.pose.centre_m
+    time_s = record.pose.time_s
     ends: list[Floats] = [
         centre_m[time_s <= time_s[0] + _LENGTH_S].mean(axis=0),
         centre_m[time_s >= time_s[-1] - _LENGTH_S].mean(axis=0),
@@ -211,7 +214,9 @@ def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
         raise InputError(str(found["error"]))
     count = len(load_run(str(task.run)).waypoints_m)
     return TaskResult(
-        *(item.task, item.controller, item.seed),
+        item.task,
+        item.controller,
+        item.seed,
         share=_digits(found["truly_reached"] / count),
         duration_s=_digits(found["duration_s"]),
         ended=found["tripped"] or "ran to its end",
