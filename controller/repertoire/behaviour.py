@@ -59,7 +59,8 @@ class Wandering:
 
         """
         count = len(sizes)
-        self._repertoire, self._ground = repertoire, ground
+        self._repertoire = repertoire
+        self._ground = ground
         self._random = random = np.random.default_rng(seed)
         self.length_m = sizes * repertoire.length_m
         """(N,)"""
@@ -128,7 +129,8 @@ class Wandering:
 
     def _decide(self, bodies: Indices) -> None:
         """Choose the next action of bodies whose cycle has ended."""
-        crowd, random = self.crowd, self._random
+        crowd = self.crowd
+        random = self._random
         at = crowd.origin_m[bodies, :2]
         near = np.hypot(*(self._goal_m[bodies] - at).T) < self.length_m[bodies]
         there = bodies[near]
@@ -187,7 +189,8 @@ class Wandering:
             InputError: there is hardly any.
 
         """
-        ground, found = self._ground, np.zeros((0, 2))
+        ground = self._ground
+        found = np.zeros((0, 2))
         corner = np.array([ground.x0_m, ground.y0_m]) + 0.1 * np.array(ground.size_m)
         for _ in range(1000):
             if len(found) >= count:

@@ -34,7 +34,8 @@ class Crowd:
         ``balance_rad``: by how much a body that has come to lean rolls upright in a frame, at most
         ([YT] 4.2); 0 replays exactly what was recorded.
         """
-        self._balance_rad, self._largest_tip_m = balance_rad, largest_tip_m
+        self._balance_rad = balance_rad
+        self._largest_tip_m = largest_tip_m
         segments = repertoire.segments
         lengths = np.array([segment.frames for segment in segments])
         self._first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int32)
@@ -146,19 +147,43 @@ class Crowd:
     def _state(self) -> tuple[NDArray[Any], ...]:
         """Arrays (N, ...) that a step changes."""
         return (
-            self.rotation, self.origin_m, self.cycles, self._playing, self._next, self._ended,
-            self._bridge_from, self._bridge_frames, self._bridge_remaining, self._points,
-        )  # fmt: skip
+            self.rotation,
+            self.origin_m,
+            self.cycles,
+            self._playing,
+            self._next,
+            self._ended,
+            self._bridge_from,
+            self._bridge_frames,
+            self._bridge_remaining,
+            self._points,
+        )
 
     def step(self, frames: int = 1) -> None:
         """Go on by ``frames`` frames."""
         for _ in range(frames):
             _step(
-                self._turn, self._move, self._shape, self._first, self._last, self._bridge_length,
-                self.rotation, self.origin_m, self.scale, self.visible, self.segment, self.cycles,
-                self._playing, self._next, self._ended, self._bridge_from, self._bridge_frames,
-                self._bridge_remaining, self._points, self._balance_rad,
-            )  # fmt: skip
+                self._turn,
+                self._move,
+                self._shape,
+                self._first,
+                self._last,
+                self._bridge_length,
+                self.rotation,
+                self.origin_m,
+                self.scale,
+                self.visible,
+                self.segment,
+                self.cycles,
+                self._playing,
+                self._next,
+                self._ended,
+                self._bridge_from,
+                self._bridge_frames,
+                self._bridge_remaining,
+                self._points,
+                self._balance_rad,
+            )
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
@@ -187,10 +212,27 @@ def _balance(r, most):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _step(  # type: ignore[no-untyped-def]
-    turn, move, shape, first, last, bridge, rotation, origin, scale, visible, requested,
-    cycles, playing, following, ended, bridge_from, bridge_frames_of, bridge_remaining, points,
+    turn,
+    move,
+    shape,
+    first,
+    last,
+    bridge,
+    rotation,
+    origin,
+    scale,
+    visible,
+    requested,
+    cycles,
+    playing,
+    following,
+    ended,
+    bridge_from,
+    bridge_frames_of,
+    bridge_remaining,
+    points,
     balance,
-):  # fmt: skip
+):
     """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
     lanes = shape.shape[2]
     for b in range(len(following)):
@@ -207,17 +249,18 @@ def _step(  # type: ignore[no-untyped-def]
                 playing[b] = new
                 cycles[b] = 0
                 following[b] = first[new]
-        at, s, shown = following[b], scale[b], visible[b]
-        a, share = at, 0.0
+        at = following[b]
+        s = scale[b]
+        shown = visible[b]
+        a = at
+        share = 0.0
         r00, r01, r02 = rotation[b, 0], rotation[b, 1], rotation[b, 2]
         r10, r11, r12 = rotation[b, 3], rotation[b, 4], rotation[b, 5]
         r20, r21, r22 = rotation[b, 6], rotation[b, 7], rotation[b, 8]
         x, y, z = origin[b, 0], origin[b, 1], origin[b, 2]
         if shown and bridge_remaining[b] > 0:  # the shape goes over, the body frame stays
-            a, share = (
-                bridge_from[b],
-                (bridge_frames_of[b] - bridge_remaining[b] + 1.0) / (bridge_frames_of[b] + 1.0),
-            )
+            a = bridge_from[b]
+            share = (bridge_frames_of[b] - bridge_remaining[b] + 1.0) / (bridge_frames_of[b] + 1.0)
             bridge_remaining[b] -= 1
         else:
             bridge_remaining[b] = 0

@@ -71,7 +71,9 @@ class CrowdScene:
 
         """
         sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)
-        self._ground, self._fovy_deg, self._detail = ground, fovy_deg, detail
+        self._ground = ground
+        self._fovy_deg = fovy_deg
+        self._detail = detail
         links = repertoire.segments[0].link_m.shape[1]
         radii = np.array(robot.radii_m(2 * links + 1))[1::2]
         along = np.arange(links) / (links - 1)
@@ -85,7 +87,8 @@ class CrowdScene:
 
     def shots(self, frames: int, steps: int) -> Iterator[CrowdShot]:
         """Yield ``frames`` shots, ``steps`` frames of the repertoire apart."""
-        wandering, costs = self._wandering, self.costs
+        wandering = self._wandering
+        costs = self.costs
         crowd = wandering.crowd
         for k in range(frames):
             begun = time.process_time()

@@ -48,7 +48,8 @@ class DetailedCrowd:
 
     def __init__(self, ground: HeightField, radius_m: Floats) -> None:
         """``radius_m`` (L,): half the recorded body's height at its links."""
-        self._ground, self._radius_m = ground, radius_m
+        self._ground = ground
+        self._radius_m = radius_m
         self._step = GroundStep(ground)
         last = len(radius_m) - 1
         self._kept = {
@@ -64,7 +65,8 @@ class DetailedCrowd:
         """
         found = []
         for body in np.flatnonzero(levels > HIDDEN).tolist():
-            level, scale = int(levels[body]), float(crowd.scale[body])
+            level = int(levels[body])
+            scale = float(crowd.scale[body])
             links = crowd.link_m(body)
             if level == NEAR:
                 radius = scale * self._radius_m
@@ -74,7 +76,8 @@ class DetailedCrowd:
                 points = self._step.place(angles, links[-1, :2], r, radius).points_m
             else:
                 kept = self._kept[level]
-                points, radius = links[kept], scale * self._radius_m[kept]
+                points = links[kept]
+                radius = scale * self._radius_m[kept]
                 points[:, 2] = self._ground.elevation_m(points[:, 0], points[:, 1]) + radius
             found.append(DetailedChain(body, level, points, radius))
         return found

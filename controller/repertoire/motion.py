@@ -89,7 +89,9 @@ class RepertoireMotion(MotionWrapper):
 
         """
         repertoire.check(robot)
-        self._repertoire, self._robot, self._choose = repertoire, robot, choose
+        self._repertoire = repertoire
+        self._robot = robot
+        self._choose = choose
         self.action = first
         self._cycle = SegmentCycle(repertoire.segments[first], robot)
         self._switch = SourceSwitch(robot, self._cycle)
@@ -132,6 +134,7 @@ class RepertoireMotion(MotionWrapper):
         elif chosen == self.action:
             self._ends += 1
         else:
-            self.action, self._ends = chosen, 1
+            self.action = chosen
+            self._ends = 1
             self._cycle = SegmentCycle(self._repertoire.segments[chosen], self._robot)
             self._switch.join(self._cycle)

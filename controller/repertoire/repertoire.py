@@ -50,7 +50,8 @@ class Repertoire:
         """Return a line for each action that was not carried out in the direction of its kind."""
         lines = []
         for segment in self.segments:
-            speed_m_s, turn_rad_s = segment.speed_m_s, segment.turn_rad_s
+            speed_m_s = segment.speed_m_s
+            turn_rad_s = segment.turn_rad_s
             forward = {"brake": 0, "rest": 0}.get(segment.kind, 1)
             forward = -1 if segment.kind in REVERSE else forward
             left = SIDES.get(segment.kind, 0)

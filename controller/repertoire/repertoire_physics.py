@@ -98,7 +98,8 @@ class PhysicsBody:
 
     def _keep_view(self) -> None:
         # after the read: packets bring the simulated body up to the time, the clock alone does not
-        qpos, pose = self._backend.qpos, self._backend.pose
+        qpos = self._backend.qpos
+        pose = self._backend.pose
         assert qpos is not None, "a simulated robot has coordinates"
         assert pose is not None, "a simulated robot has a pose"
         self._joint_rad = qpos()[7:]

@@ -64,7 +64,8 @@ def plan_route(
     changes = {"robot": robot, "world": world, "motion": "repertoire"}
     fields = known.model_dump() | {k: v for k, v in changes.items() if v is not None}
     run = checked(RunConfig, fields, "command line")
-    body, ground = load_robot(run.robot, beside), load_world(run.world, beside)
+    body = load_robot(run.robot, beside)
+    ground = load_world(run.world, beside)
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: has no waypoints to plan for")
     file = repertoire_file or default_file(robot or known.robot, world or known.world)
@@ -173,10 +174,8 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
     if not actions:
         raise InputError(f"{path}: a plan without actions")
     run = checked(RunConfig, parts[0], str(path))
-    robot, world = (
-        checked(RobotConfig, parts[1], str(path)),
-        checked(WorldConfig, parts[2], str(path)),
-    )
+    robot = checked(RobotConfig, parts[1], str(path))
+    world = checked(WorldConfig, parts[2], str(path))
     repertoire.check(robot)
     return RepertoireRun(run, robot, world, repertoire, file, route, replan)
 
@@ -227,7 +226,8 @@ def search_cost(
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> SearchCost:
     """Time the search, and ``candidates`` random cycles of actions on the physics."""
-    run, start = job.run, job.route.pose[0]
+    run = job.run
+    start = job.route.pose[0]
     aimed_m = AIM_SHARE * run.waypoint_radius_m
     best = float("inf")
     found = job.route
@@ -236,7 +236,8 @@ def search_cost(
         found = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
         best = min(best, time.process_time() - begun)
     random = np.random.default_rng(seed)
-    spent, ran = 0.0, 0
+    spent = 0.0
+    ran = 0
     while ran < candidates:
         count = min(length, candidates - ran)
         actions = tuple(int(k) for k in random.choice(job.primitives.tried, size=count))

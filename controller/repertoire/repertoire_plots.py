@@ -18,7 +18,9 @@ from snakewalk.controller.repertoire.schedule_run import PlayedAction, ScheduleR
 from snakewalk.controller.repertoire.segment import Segment
 from snakewalk.controller.runlog.record import RunRecord
 
-BEGIN, ONE, TWO = GREY, SKY, BLUE
+BEGIN = GREY
+ONE = SKY
+TWO = BLUE
 """Bodies at the beginning, after one cycle, and after two."""
 _COLUMNS = 3
 

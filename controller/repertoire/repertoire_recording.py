@@ -93,7 +93,11 @@ def record_action(
     count = int(np.ceil(1.0 / (asked.frequency_hz * FRAME_S) - 1e-9))
     parameters["frequency_hz"] = 1.0 / (count * FRAME_S)
     motion = GaitMotion(make_gait("lateral-undulation", parameters), robot)
-    frames, links, rotations, goals, joints = [], [], [], [], []
+    frames = []
+    links = []
+    rotations = []
+    goals = []
+    joints = []
     with PhysicsBody(robot, world, motion.goal_rad()) as body:
         while motion.cycles < SETTLING:
             body.frame(motion.step(FRAME_S, body.view()))

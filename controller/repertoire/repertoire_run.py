@@ -86,7 +86,8 @@ class RouteMotion(MotionWrapper):
     replanned: str | None = None
 
     def __init__(self, prepared: RepertoireRun, on_event: OnEvent) -> None:
-        run, route = prepared.run, prepared.route
+        run = prepared.run
+        route = prepared.route
         self.follower = RouteFollower(
             prepared.primitives,
             route,
@@ -175,7 +176,9 @@ class RouteRun:
 
     def to_dict(self) -> dict[str, object]:
         """Numbers for a command's answer."""
-        job, outcome, follower = self.job, self.result.outcome, self.follower
+        job = self.job
+        outcome = self.result.outcome
+        follower = self.follower
         facts: dict[str, object] = {
             "waypoints": len(job.run.waypoints_m),
             **by_evidence(self.result, {"waypoints_reached": outcome.reached}),
@@ -186,7 +189,8 @@ class RouteRun:
             "duration_s": round(outcome.duration_s, 2),
             "tripped": outcome.tripped,
         }
-        cycle, route = follower.errors(), follower.route_errors()
+        cycle = follower.errors()
+        route = follower.route_errors()
         if len(cycle):
             errors = {
                 "cycle_error_median_m": round(float(np.median(cycle[:, 0])), 4),

@@ -31,9 +31,11 @@ class RouteFollower:
         beam: int = 100,
     ) -> None:
         """Start on ``route``; with ``replan`` the search begins again at the end of each cycle."""
-        self._primitives, self._route = primitives, route
+        self._primitives = primitives
+        self._route = route
         self._waypoints_m, self._radius_m = tuple(waypoints_m), radius_m
-        self._replan, self._beam = replan, beam
+        self._replan = replan
+        self._beam = beam
         self.reached = 0
         self.chosen: list[int] = [route.actions[0]]
         """Actions so far."""

@@ -145,7 +145,8 @@ class ScheduleRun(PathlessRun):
 
     def remark(self) -> str | None:
         """Return a warning if the body may move much differently than requested."""
-        recorded, world = self.repertoire.world, self.world.name
+        recorded = self.repertoire.world
+        world = self.world.name
         if world != recorded:
             return (
                 f"{self.config.file}: recorded on world {recorded}; on {world} speeds, turns and "
@@ -200,7 +201,8 @@ class ScheduleMotion(MotionWrapper):
     """Asks the secondary controller for an action at the end of each, and comes to rest in time."""
 
     def __init__(self, prepared: ScheduleRun, on_event: OnEvent) -> None:
-        self._prepared, self._on_event = prepared, on_event
+        self._prepared = prepared
+        self._on_event = on_event
         self._controller = prepared.controller()
         self._now_s = 0.0
         self._begun: tuple[float, int, tuple[float, float], Floats] | None = None
@@ -228,7 +230,8 @@ class ScheduleMotion(MotionWrapper):
         assert self._begun is not None, "an action is under way"
         begin_s, before, requested, pose = self._begun
         now = _pose(view)
-        segment, scale = self._prepared.repertoire.segments[before], self._prepared.scale
+        segment = self._prepared.repertoire.segments[before]
+        scale = self._prepared.scale
         recorded = scale * segment.speed_m_s, segment.turn_rad_s
         measured = _rates(pose, now, self._now_s - begin_s)
         self.played.append(PlayedAction(begin_s, before, requested, recorded, measured))

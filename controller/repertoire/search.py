@@ -139,9 +139,13 @@ class _Level:
 
     def only(self, which: Ints) -> "_Level":
         return _Level(
-            self.pose[which], self.passed[which], self.time_s[which],
-            self.before, self.parent[which], self.action[which],
-        )  # fmt: skip
+            self.pose[which],
+            self.passed[which],
+            self.time_s[which],
+            self.before,
+            self.parent[which],
+            self.action[which],
+        )
 
 
 def _expanded(
@@ -149,10 +153,8 @@ def _expanded(
 ) -> tuple[Floats, Ints, Floats]:
     """Every action after each sequence: (nB, 3) poses, (nB,) waypoints passed, (nB,) time."""
     c, s = np.cos(level.pose[:, 2]), np.sin(level.pose[:, 2])
-    travel, duration_s = (
-        primitives.travel[primitives.tried],
-        primitives.duration_s[primitives.tried],
-    )
+    travel = primitives.travel[primitives.tried]
+    duration_s = primitives.duration_s[primitives.tried]
     x, y = travel[None, :, :, 0], travel[None, :, :, 1]
     at_x = level.pose[:, 0, None, None] + c[:, None, None] * x - s[:, None, None] * y
     at_y = level.pose[:, 1, None, None] + s[:, None, None] * x + c[:, None, None] * y
@@ -168,8 +170,10 @@ def _expanded(
 
 
 def _backtracked(level: _Level, at: int, candidates: int) -> Route:
-    reached, time_s = int(level.passed[at]), float(level.time_s[at])
-    poses, actions = [level.pose[at]], []
+    reached = int(level.passed[at])
+    time_s = float(level.time_s[at])
+    poses = [level.pose[at]]
+    actions = []
     before: _Level | None = level
     while before is not None and before.before is not None:
         actions.append(int(before.action[at]))

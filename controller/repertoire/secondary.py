@@ -108,7 +108,8 @@ class SecondaryController:
 
     def missing(self, speed_m_s: float, turn_rad_s: float) -> str:
         """Return the motion that is requested and that no segment has; empty if one has it."""
-        direction, side = self._requested_direction(speed_m_s), self._requested_side(turn_rad_s)
+        direction = self._requested_direction(speed_m_s)
+        side = self._requested_side(turn_rad_s)
         has = (self._direction == direction) & (self._side == side)
         return "" if has[self._steady].any() else _DIRECTIONS[direction] + _SIDES[side]
 

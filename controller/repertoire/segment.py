@@ -57,7 +57,8 @@ class Segment:
 
     def travel(self) -> tuple[Floats, Floats]:
         """Poses in the frame of pose 0: rotations (T + 1, 3, 3) and origins (T + 1, 3)."""
-        rotation, origin = np.empty((self.frames + 1, 3, 3)), np.zeros((self.frames + 1, 3))
+        rotation = np.empty((self.frames + 1, 3, 3))
+        origin = np.zeros((self.frames + 1, 3))
         rotation[0] = np.eye(3)
         for k in range(self.frames):
             rotation[k + 1] = rotation[k] @ self.turn[k]

@@ -59,7 +59,8 @@ class SeparatedCrowd:
 
     def _yield(self, body: int) -> None:
         """Shift a body away from the one that stops it, unless it would meet another one."""
-        crowd, links = self._crowd, len(self._radius_m)
+        crowd = self._crowd
+        links = len(self._radius_m)
         place = crowd.points_m[body, :2, round(self.met[body] * (links - 1))]
         other = crowd.points_m[self.blocker[body], :2, :links]
         away = place - other[:, np.linalg.norm(other.T - place, axis=1).argmin()]
@@ -78,7 +79,8 @@ class SeparatedCrowd:
 
     def _stopped(self, old_m: Floats) -> Ints:
         """Mark further bodies that have to return to links ``old_m``, and return them."""
-        known, points = self.blocker.copy(), self._crowd.points_m
+        known = self.blocker.copy()
+        points = self._crowd.points_m
         _stop(points, old_m, self._crowd.scale, self._radius_m, known, self.blocker, self.met)
         return np.flatnonzero(self.blocker != known)
 
@@ -116,9 +118,15 @@ def _meeting(one, scale_one, other, scale_other, radius):  # type: ignore[no-unt
         for a in range(max(0, k - links + 2), min(k, links - 2) + 1):
             b = k - a
             gap = _segment_gap(
-                one[0, a], one[1, a], one[0, a + 1], one[1, a + 1],
-                other[0, b], other[1, b], other[0, b + 1], other[1, b + 1],
-            )  # fmt: skip
+                one[0, a],
+                one[1, a],
+                one[0, a + 1],
+                one[1, a + 1],
+                other[0, b],
+                other[1, b],
+                other[0, b + 1],
+                other[1, b + 1],
+            )
             wide = scale_one * max(radius[a], radius[a + 1])
             if gap < wide + scale_other * max(radius[b], radius[b + 1]):
                 return a, b
@@ -147,7 +155,7 @@ def _apart(box, i, j):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _stop(  # type: ignore[no-untyped-def]
     points, old, scale, radius, known, blocker, met
-):  # fmt: skip
+):
     """Write into ``blocker`` the bodies that have to return; those of ``known`` have returned."""
     box = _boxes(points, scale, radius)
     last = len(radius) - 1.0
@@ -184,7 +192,8 @@ def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _find_pairs(points, scale, radius, pairs):  # type: ignore[no-untyped-def]
     """Write the pairs that intersect into ``pairs``, as many as it holds; return their number."""
-    box, count = _boxes(points, scale, radius), 0
+    box = _boxes(points, scale, radius)
+    count = 0
     for i in range(len(points)):
         for j in range(i):
             if count == len(pairs):

@@ -57,7 +57,8 @@ def crowd(
     if out.suffix != ".mp4":
         raise InputError(f"{out}: a film ends in .mp4")
     repertoire = load_repertoire(file)
-    robot, place = load_robot(repertoire.robot), load_world(world)
+    robot = load_robot(repertoire.robot)
+    place = load_world(world)
     ground = build_ground(place)
     if ground is None:
         raise InputError(f"world {place.name}: has no hills; there are jacksboro-basin and others")

@@ -50,7 +50,8 @@ def record(
 ) -> None:
     """Simulate forward, left and right actions, and record a settled cycle of each."""
     check_picture(picture)
-    body, ground = load_robot(robot), load_world(world)
+    body = load_robot(robot)
+    ground = load_world(world)
     flat(ground)
     file = out or default_file(robot, world)
     refuse_to_overwrite([file, picture], force)
