@@ -171,22 +171,39 @@ def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
             "nticks": 5,
         }
         layout["legend" if row == 1 else f"legend{row}"] = {
-            "orientation": "h", "x": 1.0, "xanchor": "right", "y": top, "yanchor": "bottom",
-        }  # fmt: skip
+            "orientation": "h",
+            "x": 1.0,
+            "xanchor": "right",
+            "y": top,
+            "yanchor": "bottom",
+        }
         layout["annotations"].append(
             {
-                "text": f"<b>{title}</b>", "xref": "paper", "yref": "paper", "x": 0.0, "y": top,
-                "xanchor": "left", "yanchor": "bottom", "showarrow": False,
+                "text": f"<b>{title}</b>",
+                "xref": "paper",
+                "yref": "paper",
+                "x": 0.0,
+                "y": top,
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "showarrow": False,
             }
-        )  # fmt: skip
+        )
     return layout
 
 
 def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
     return {
-        "type": "line", "x0": time_s, "x1": time_s, "yref": "paper", "y0": 0.0, "y1": 1.0,
-        "line": {"color": colour, "width": 1, "dash": dash}, "opacity": 0.6, "layer": "below",
-    }  # fmt: skip
+        "type": "line",
+        "x0": time_s,
+        "x1": time_s,
+        "yref": "paper",
+        "y0": 0.0,
+        "y1": 1.0,
+        "line": {"color": colour, "width": 1, "dash": dash},
+        "opacity": 0.6,
+        "layer": "below",
+    }
 
 
 def _traces(

@@ -22,8 +22,10 @@ from snakewalk.controller.track.bone_motion import BoneMotion
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook
 
-FPS, FINE_FPS = 15, 25
-SIZE, FINE_SIZE = (800, 450), (1280, 720)
+FPS = 15
+FINE_FPS = 25
+SIZE = (800, 450)
+FINE_SIZE = (1280, 720)
 _LONGEST_S: Final = 27.0
 """Longest film: a longer run is shown faster."""
 
@@ -57,7 +59,8 @@ def film_run(
     if len(time_s) < 2:
         raise InputError("the log holds no two poses: there is nothing to film")
     path.parent.mkdir(parents=True, exist_ok=True)
-    plan, measured = header.plan, header.pose_evidence.is_measured
+    plan = header.plan
+    measured = header.pose_evidence.is_measured
     drawn: int = film.render_film(
         header.robot,
         header.world,
@@ -157,7 +160,8 @@ def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
         return record.qpos.time_s, record.qpos.qpos
     pose = record.pose
     rows = min(len(pose.time_s), len(record.cycle.time_s))
-    head, turn = pose.head_m[:rows], pose.rotation[:rows].reshape(-1, 9)
+    head = pose.head_m[:rows]
+    turn = pose.rotation[:rows].reshape(-1, 9)
     joints = record.cycle.measured_rad[:rows]
     known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
     if not known.any():

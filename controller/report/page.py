@@ -85,7 +85,9 @@ def page(
         texts: dict[str, Any] = {
             key: without_folders(one) for key, one in known.items() if isinstance(one, str)
         }
-        numbers, config, made = replace(numbers, **texts), shared(config), without_folders(made)
+        numbers = replace(numbers, **texts)
+        config = shared(config)
+        made = without_folders(made)
         events = [replace(event, text=without_folders(event.text)) for event in events]
         trip = None if trip is None else replace(trip, reason=without_folders(trip.reason))
         cause = None if found.cause is None else without_folders(found.cause)
@@ -143,10 +145,15 @@ def _headline(n: RunSummary, found: RunVerdict) -> str:
 def _facts(n: RunSummary, found: RunVerdict) -> tuple[tuple[str, object], ...]:
     backend = "simulation" if n.backend == "sim" else n.backend
     return (
-        ("robot", n.robot), ("ground", n.world), ("motion", n.motion),
-        ("bus", backend), ("seed", n.seed), ("configuration", n.config_hash),
-        ("pose", found.evidence), ("snakewalk", n.software),
-    )  # fmt: skip
+        ("robot", n.robot),
+        ("ground", n.world),
+        ("motion", n.motion),
+        ("bus", backend),
+        ("seed", n.seed),
+        ("configuration", n.config_hash),
+        ("pose", found.evidence),
+        ("snakewalk", n.software),
+    )
 
 
 def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
@@ -157,37 +164,52 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     missed = f"{n.missed_deadlines} of {n.cycles}"
     took = f"in {_fmt(n.duration_s, 1)} s"
     tiles = [
-        ("Waypoints", f"{_fmt(n.waypoints_reached, 0)} of {n.waypoints}",
-              f"in {_fmt(n.duration_s, 1)} s"),
-        ("Path error", f"{_fmt(n.path_error_mean_m, 3)} m",
-              f"at most {_fmt(n.path_error_max_m, 3)} m"),
-        ("Speed", f"{_fmt(n.speed_m_s, 3)} m/s",
-              "of the centre of mass, along the path"),
-        ("Gain η", _fmt(n.eta, 2),
-              f"of the links over the pulse; predicted {_fmt(n.eta_predicted, 2)}"),
-        ("Travelled", f"{_fmt(n.travelled_m, 2)} m",
-              f"path of {_fmt(n.path_length_m, 2)} m"),
-        ("Tracking", f"{_fmt(n.tracking_rms_rad, 3)} rad",
-              f"RMS; lag {_fmt(n.lag_s, 3)} s"),
+        (
+            "Waypoints",
+            f"{_fmt(n.waypoints_reached, 0)} of {n.waypoints}",
+            f"in {_fmt(n.duration_s, 1)} s",
+        ),
+        (
+            "Path error",
+            f"{_fmt(n.path_error_mean_m, 3)} m",
+            f"at most {_fmt(n.path_error_max_m, 3)} m",
+        ),
+        ("Speed", f"{_fmt(n.speed_m_s, 3)} m/s", "of the centre of mass, along the path"),
+        (
+            "Gain η",
+            _fmt(n.eta, 2),
+            f"of the links over the pulse; predicted {_fmt(n.eta_predicted, 2)}",
+        ),
+        ("Travelled", f"{_fmt(n.travelled_m, 2)} m", f"path of {_fmt(n.path_length_m, 2)} m"),
+        ("Tracking", f"{_fmt(n.tracking_rms_rad, 3)} rad", f"RMS; lag {_fmt(n.lag_s, 3)} s"),
         ("Peak current", f"{_fmt(n.peak_current_a, 2)} A", torque),
-        ("Energy", f"{_fmt(n.electrical_energy_j, 0)} J",
-              f"cost of transport {_fmt(n.electrical_cost_of_transport, 2)}"
-              + (", sampled" if n.energy_source == "sampled" else "")),
-        ("Hottest servo", f"{_fmt(n.peak_temperature_c, 0)} °C",
-              f"supply down to {_fmt(n.lowest_voltage_v, 1)} V"),
+        (
+            "Energy",
+            f"{_fmt(n.electrical_energy_j, 0)} J",
+            f"cost of transport {_fmt(n.electrical_cost_of_transport, 2)}"
+            + (", sampled" if n.energy_source == "sampled" else ""),
+        ),
+        (
+            "Hottest servo",
+            f"{_fmt(n.peak_temperature_c, 0)} °C",
+            f"supply down to {_fmt(n.lowest_voltage_v, 1)} V",
+        ),
         ("Missed deadlines", missed, wire),
         ("Safety", _count(n.clamps, "clamp"), f"{vetoes}, {_count(n.alarms, 'alarm')}"),
-    ]  # fmt: skip
+    ]
     if n.carrier_share is not None:
         tiles.insert(5, ("On wide waves", _pct(n.carrier_share), "of the walk's decisions"))
     found = n.friction_found
     if found is not None:
         (along, along_to), (across, across_to) = found.along_95, found.across_95
         tiles.append(
-            ("Friction found", f"{found.along:.2f} along, {found.across:.2f} across",
-                  f"95 %: {along:.2f} to {along_to:.2f}, {across:.2f} to {across_to:.2f}; "
-                  f"world's file: {found.along_file:g}, {found.across_file:g}")
-        )  # fmt: skip
+            (
+                "Friction found",
+                f"{found.along:.2f} along, {found.across:.2f} across",
+                f"95 %: {along:.2f} to {along_to:.2f}, {across:.2f} to {across_to:.2f}; "
+                f"world's file: {found.along_file:g}, {found.across_file:g}",
+            )
+        )
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
         return [("Travelled", f"{_fmt(n.travelled_m, 2)} m", took), *tiles[5:]]
     return tiles

@@ -54,7 +54,8 @@ def _first_joint(reason: str, robot: RobotConfig) -> int | None:
 
 def _limited_values(record: RunRecord, joint: int) -> tuple[LimitedValue, ...]:
     """Values of the last cycle in which the joint was read, and of its last slow reading."""
-    cycle, slow = record.cycle, record.slow
+    cycle = record.cycle
+    slow = record.slow
     limits = SafetyLimits.from_config(record.header.robot, record.header.run.safety)
     values: list[LimitedValue] = []
     read = np.flatnonzero(cycle.valid[:, joint])

@@ -61,16 +61,22 @@ def _slow(axes: Axes, record: RunRecord) -> None:
     time = np.append(slow.time_s, record.end_s)
     for k, joint in enumerate(slow.temperature_c.T):
         axes.step(
-            time, np.append(joint, joint[-1]), where="post", color=MEAN, linewidth=0.8, alpha=0.7,
+            time,
+            np.append(joint, joint[-1]),
+            where="post",
+            color=MEAN,
+            linewidth=0.8,
+            alpha=0.7,
             label="each servo" if k == 0 else None,
-        )  # fmt: skip
+        )
     hottest = np.nanmax(np.where(np.isnan(slow.temperature_c), -1.0, slow.temperature_c), axis=1)
     hottest[hottest < 0.0] = np.nan
     axes.step(time, np.append(hottest, hottest[-1]), where="post", color=HIGHEST, label="hottest")
     axes.set_ylabel("temperature (°C)")
     limit = record.header.run.safety.temperature_limit_c
     axes.set_title(f"Temperature (limit {limit:g} °C) and supply")
-    coolest, warmest = np.nanmin(slow.temperature_c), np.nanmax(slow.temperature_c)
+    coolest = np.nanmin(slow.temperature_c)
+    warmest = np.nanmax(slow.temperature_c)
     axes.set_ylim(coolest - 2.0, max(warmest + 0.4 * (warmest - coolest), coolest + 10.0))
     lowest = np.where(np.isnan(slow.voltage_v), np.inf, slow.voltage_v).min(axis=1)
     lowest[np.isinf(lowest)] = np.nan

@@ -17,7 +17,8 @@ def joints_figure(record: RunRecord) -> Figure | None:
     if len(cycle.time_s) < 2:
         return None
     joints = cycle.asked_rad.shape[1]
-    asked, measured = cycle.asked_rad, cycle.measured_rad
+    asked = cycle.asked_rad
+    measured = cycle.measured_rad
     gap = np.where(cycle.valid, measured - asked, np.nan)
     span = _largest(np.concatenate([asked, measured]))
     height = float(np.clip(0.075 * joints, 1.2, 2.6)) * 3 + 0.9
@@ -33,9 +34,14 @@ def joints_figure(record: RunRecord) -> Figure | None:
         strict=True,
     ):
         image = axes.imshow(
-            values[rows].T, aspect="auto", cmap=ANGLES, vmin=-limit, vmax=limit, extent=extent,
+            values[rows].T,
+            aspect="auto",
+            cmap=ANGLES,
+            vmin=-limit,
+            vmax=limit,
+            extent=extent,
             interpolation="nearest",
-        )  # fmt: skip
+        )
         axes.set_title(title)
         axes.grid(visible=False)
         axes.set_facecolor(PALE)

@@ -12,7 +12,9 @@ from snakewalk.controller.runlog.record import RunRecord
 
 def slope_figure(record: RunRecord) -> Figure | None:
     """Draw the slope under the body, and where the walk rides on wide waves; None if level."""
-    pose, header, walk = record.pose, record.header, record.walk
+    pose = record.pose
+    header = record.header
+    walk = record.walk
     if header.ground is None or len(pose.time_s) < 2:
         return None
     slope = ground_slope(header.ground, pose.links_m)
@@ -24,10 +26,17 @@ def slope_figure(record: RunRecord) -> Figure | None:
     is_wide = walk.carrier_rad > 0.0
     if is_wide.any():
         axes.fill_between(
-            np.append(walk.time_s, record.end_s), 0.0, 1.0,
-            where=np.append(is_wide, is_wide[-1:]), step="post", color=GREY, alpha=0.25,
-            linewidth=0.0, transform=axes.get_xaxis_transform(), label="walk on wide waves",
-        )  # fmt: skip
+            np.append(walk.time_s, record.end_s),
+            0.0,
+            1.0,
+            where=np.append(is_wide, is_wide[-1:]),
+            step="post",
+            color=GREY,
+            alpha=0.25,
+            linewidth=0.0,
+            transform=axes.get_xaxis_transform(),
+            label="walk on wide waves",
+        )
     axes.set_ylabel("slope (degrees)")
     axes.set_xlabel("time (s)")
     axes.set_xlim(0.0, max(record.end_s, 1e-3))

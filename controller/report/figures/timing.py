@@ -23,9 +23,14 @@ def timing_figure(record: RunRecord) -> Figure | None:
     missed = np.flatnonzero(skipped_cycles(record))
     if len(missed):
         axes.scatter(
-            cycle.deadline_s[missed + 1], np.full(len(missed), period_ms), marker="v", s=42,
-            color=RED, label="deadlines missed", zorder=3,
-        )  # fmt: skip
+            cycle.deadline_s[missed + 1],
+            np.full(len(missed), period_ms),
+            marker="v",
+            s=42,
+            color=RED,
+            label="deadlines missed",
+            zorder=3,
+        )
     top = float(np.nanmax(np.append(1e3 * cycle.lateness_s, period_ms)))
     axes.set_ylim(0.0, 1.12 * top)
     axes.set_ylabel("time (ms)")

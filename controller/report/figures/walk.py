@@ -36,9 +36,17 @@ def walk_figure(record: RunRecord) -> Figure | None:
         label = f"wide waves, {is_wide.mean():.0%}"
         if is_wide.any():
             states.fill_between(
-                number, 0.0, 1.0, where=is_wide, step="mid", color=GREY, alpha=0.25, linewidth=0.0,
-                transform=states.get_xaxis_transform(), label=label,
-            )  # fmt: skip
+                number,
+                0.0,
+                1.0,
+                where=is_wide,
+                step="mid",
+                color=GREY,
+                alpha=0.25,
+                linewidth=0.0,
+                transform=states.get_xaxis_transform(),
+                label=label,
+            )
         states.set_ylabel("state")
         states.set_title("States of the walk")
         legend_above(states)
@@ -51,13 +59,27 @@ def walk_figure(record: RunRecord) -> Figure | None:
         count.grid(visible=False)
     aim = panels[-1]
     aim.axhline(0.0, color=GREY, linewidth=0.8)
-    aim.plot(number, walk.heading_error_rad, color=BLUE, linewidth=1.0, marker=".", markersize=4,
-             label="heading error of the shape")  # fmt: skip
+    aim.plot(
+        number,
+        walk.heading_error_rad,
+        color=BLUE,
+        linewidth=1.0,
+        marker=".",
+        markersize=4,
+        label="heading error of the shape",
+    )
     aim.plot(number, walk.ramp_rad, color=AMBER, linewidth=1.0, label="bend added against it")
     none = walk.candidates == 0
     if many and none.any():
-        aim.scatter(number[none], walk.heading_error_rad[none], s=28, facecolor="none",
-                    edgecolor=RED, label="no shape within the tolerance", zorder=3)  # fmt: skip
+        aim.scatter(
+            number[none],
+            walk.heading_error_rad[none],
+            s=28,
+            facecolor="none",
+            edgecolor=RED,
+            label="no shape within the tolerance",
+            zorder=3,
+        )
     aim.set_ylabel("angle (rad)")
     aim.set_title("Aim")
     aim.set_xlabel("decision")
