@@ -83,7 +83,8 @@ def decode_command(
     """
     try:
         row = parse_json(line)
-        kind, age_s = row["kind"], now_s() - float(row["sent_s"])
+        kind = row["kind"]
+        age_s = now_s() - float(row["sent_s"])
         if kind in _NAMES:
             if not age_s >= -_AHEAD_S:  # NaN, too
                 return Refused(f"{kind}: its time is {-age_s:.1f} s ahead of this machine's clock")
@@ -105,7 +106,8 @@ def _command(kind: str, row: dict[str, Any]) -> Command:
     if kind == "goals":
         return JointGoals(_texts(row["joints"]), [float(value) for value in row["position_rad"]])
     if kind == "trajectory":
-        time_s, position_rad = _unpacked(row["time_s"], 1), _unpacked(row["position_rad"], 2)
+        time_s = _unpacked(row["time_s"], 1)
+        position_rad = _unpacked(row["position_rad"], 2)
         if time_s is None or position_rad is None:
             raise ValueError("a trajectory needs times and positions")
         return JointTrajectory(

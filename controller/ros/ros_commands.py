@@ -63,7 +63,8 @@ class CommandTopics:
     """Subscriptions to the topics with commands."""
 
     def __init__(self, node: Node, options: RosOptions) -> None:
-        self._node, self._options = node, options
+        self._node = node
+        self._options = options
         self.pending: deque[Command] = deque(maxlen=_PENDING_MAX)
         self._lock = threading.Lock()
         self._delay_s = 0.0
@@ -134,7 +135,8 @@ class CommandTopics:
 
     def on_trajectory(self, message: Any) -> None:
         """Keep a trajectory."""
-        stamp, points = message.header.stamp, message.points
+        stamp = message.header.stamp
+        points = message.points
         if not points:
             self._command(HoldStill(), stamp, "trajectory")
             return
@@ -192,7 +194,8 @@ class CommandTopics:
 
     def on_velocity(self, message: Any) -> None:
         """Keep a velocity along the body and a rate of turn."""
-        linear, angular = message.linear, message.angular
+        linear = message.linear
+        angular = message.angular
         others = {
             "linear.y": linear.y,
             "linear.z": linear.z,
@@ -209,7 +212,8 @@ class CommandTopics:
 
     def on_goal_pose(self, message: Any) -> None:
         """Keep the place of a goal pose; a walk has no heading at its end."""
-        header, at = message.header, message.pose.position
+        header = message.header
+        at = message.pose.position
         command: Command = GoTo(at.x, at.y)
         if header.frame_id != self.frame:
             command = Refused(

@@ -171,7 +171,9 @@ class RobotNode:
     """Topics and services of one run."""
 
     def __init__(self, node: Node, end: ObserverEnd, options: RosOptions) -> None:
-        self._node, self._end, self._options = node, end, options
+        self._node = node
+        self._end = end
+        self._options = options
         self._clock = WallClock()
         self._offset = ClockOffset()
         self._messages = RosMessages(
@@ -289,7 +291,8 @@ class RobotNode:
         self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)
 
     def _log_event(self, row: Mapping[str, Any]) -> None:
-        kind, text = row["kind"], row["text"]
+        kind = row["kind"]
+        text = row["text"]
         log = self._node.get_logger()
         if row["level"] == "error":
             log.error(f"{kind}: {text}")
@@ -318,7 +321,8 @@ class RobotNode:
         """Press the run's stop button, and answer when torque is off."""
         button = self._button
         if button is None:
-            response.success, response.message = False, "no run has begun yet"
+            response.success = False
+            response.message = "no run has begun yet"
             return response
         began_s = self._clock.now_s()
         button.press(f"ROS service {self._node.get_fully_qualified_name()}/stop")

@@ -52,7 +52,9 @@ def serve(line: Connection, argument: str) -> None:
 def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
     """Return a message as a datagram; a message without a pose becomes a text that says why."""
     pose = message.pose.pose if has_covariance else message.pose
-    at, turn, stamp = pose.position, pose.orientation, message.header.stamp
+    at = pose.position
+    turn = pose.orientation
+    stamp = message.header.stamp
     covariance = None
     if has_covariance:
         covariance = np.array(message.pose.covariance, dtype=float).reshape(6, 6)
@@ -77,7 +79,8 @@ def poses_of(message: Any, child: str) -> Iterator[PoseStamped]:
     """Return the transforms of a ``TFMessage`` to one frame as poses."""
     for each in message.transforms:
         if each.child_frame_id == child:
-            at, turn = each.transform.translation, each.transform.rotation
+            at = each.transform.translation
+            turn = each.transform.rotation
             pose = Pose(position=Point(x=at.x, y=at.y, z=at.z), orientation=turn)
             yield PoseStamped(header=each.header, pose=pose)
 
@@ -86,7 +89,8 @@ class _Sender:
     """Counts the messages, and passes them on."""
 
     def __init__(self, line: Connection) -> None:
-        self._line, self._count = line, 0
+        self._line = line
+        self._count = 0
 
     def __call__(self, message: Any, *, has_covariance: bool) -> None:
         self._line.send_bytes(pose_of(message, self._count, has_covariance=has_covariance))
