@@ -93,7 +93,8 @@ class Hands:
 
     def _take(self) -> list[str | Refused]:
         """Return the keys; late ones, other than for the end, as a reason why they are dropped."""
-        taken, self._waiting = self._waiting, []
+        taken = self._waiting
+        self._waiting = []
         now_s = self._now_s()
         return [
             key if now_s - since_s <= LATE_S or key in _ENDS else _late(key, now_s - since_s)

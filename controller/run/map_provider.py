@@ -91,7 +91,8 @@ class MapProvider:
 
     def facts(self) -> dict[str, float | int]:
         """Numbers for log and answer; none without a map."""
-        ground_map, ground = self.ground_map, self.true_ground
+        ground_map = self.ground_map
+        ground = self.true_ground
         if ground_map is None or ground is None or not ground_map.known.any():
             return {}
         error_m = np.abs(ground_map.errors_m(ground))

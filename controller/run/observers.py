@@ -13,7 +13,9 @@ from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.motion.refusals import Refusals
 from snakewalk.controller.runtime.drive import OnProgress, Progress
 
-PAGE, ROS, SHADOW = "page", "ros", "shadow"
+PAGE = "page"
+ROS = "ros"
+SHADOW = "shadow"
 """Observers that have an option of their own."""
 GOALS = "goals"
 """Argument of the ROS node of a live run, which accepts goal poses."""
@@ -116,7 +118,8 @@ class Observers:
 
     def watch(self, policy: Literal["stop", "warn"], warn: Callable[[str, str], None]) -> None:
         """Set ``safety.lost_observer`` of the run, and what reports (kind, text)."""
-        self._policy, self._warn = policy, warn
+        self._policy = policy
+        self._warn = warn
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Pass a row of the log on."""

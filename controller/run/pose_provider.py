@@ -89,7 +89,8 @@ def pose_faults(run: RunConfig, robot: RobotConfig, world: WorldConfig, *, metal
 
 def pose_evidence(prepared: PreparedRun, backend: Backend) -> PoseEvidence:
     """Return how the poses of a run are known."""
-    run, robot = prepared.run, prepared.robot
+    run = prepared.run
+    robot = prepared.robot
     if backend.pose is not None and run.pose_is_true:
         return SIMULATED
     if run.pose is None:
@@ -159,7 +160,8 @@ class PoseComparison:
 
     def __call__(self, state: JointState) -> BodyPose:
         """Return the estimated pose."""
-        pose, true = self.estimate(state), self.true()
+        pose = self.estimate(state)
+        true = self.true()
         self._head_m.append(float(np.hypot(*(pose.head_in_world_m - true.head_in_world_m)[:2])))
         turn = pose.heading_rad - true.heading_rad
         self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
@@ -190,7 +192,8 @@ def pose_provider(
         InputError: the camera is missing, does not show the robot, or cannot work here.
 
     """
-    run, robot = prepared.run, prepared.robot
+    run = prepared.run
+    robot = prepared.robot
     true = backend.pose
     if true is not None and run.pose_is_true:
         measured = true

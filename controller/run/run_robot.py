@@ -144,7 +144,8 @@ def check(request: RunRequest) -> CheckedRun:
         InputError: folder, port, pose, map, compliance, shadow or plan have a fault.
 
     """
-    prepared, port = request.prepared, request.port
+    prepared = request.prepared
+    port = request.port
     if request.folder is not None:
         refuse_another_run(request.folder, request.overwrite)
     rehearsed = None if isinstance(port, str | None) else port
@@ -186,7 +187,8 @@ def open_run(
         InputError: one of them cannot be opened.
 
     """
-    prepared, observers = request.prepared, request.observers or Observers()
+    prepared = request.prepared
+    observers = request.observers or Observers()
     safety = prepared.run.safety
     backend = _backend(prepared, checked)
     evidence = _evidence(prepared, backend)
@@ -257,12 +259,16 @@ def open_run(
 
 def drive(request: RunRequest, opened: OpenedRun) -> Outcome:
     """Switch torque on, run the motion to its end, and switch torque off."""
-    prepared, backend = request.prepared, opened.backend
+    prepared = request.prepared
+    backend = opened.backend
     loop = Drive(
         link=opened.link,
         clock=backend.clock,
         sensors=Sensors(
-            *(opened.map.measure, backend.wire_busy_s, backend.energy, opened.pose.health),
+            opened.map.measure,
+            backend.wire_busy_s,
+            backend.energy,
+            opened.pose.health,
             pose_sd_m=opened.evidence.position_m or 0.0,
             pose_is_measured=opened.evidence.is_measured,
         ),
@@ -318,7 +324,8 @@ def write_summary(numbers: RunSummary, folder: Path) -> RunSummary:
 
 
 def _backend(prepared: PreparedRun, checked: CheckedRun) -> Backend:
-    run, robot = prepared.run, checked.robot
+    run = prepared.run
+    robot = checked.robot
     if checked.rehearsed is not None:
         return checked.rehearsed.open(run, robot)
     if checked.initial_pose is None:

@@ -56,7 +56,8 @@ def check_servos(run: RunConfig, robot: RobotConfig) -> None:
     _check_hold(run, robot)
     _check_fuse(robot)
     _check_uncompiled_rate(run)
-    budget, safety = robot_budget(robot, robot.servo.baud, fast=True), run.safety
+    budget = robot_budget(robot, robot.servo.baud, fast=True)
+    safety = run.safety
     budget.check(run.cycle_hz)
     check_ages(
         budget,
@@ -137,7 +138,8 @@ def check_compliance(run: RunConfig, robot: RobotConfig) -> None:
     config = run.compliance
     if config is None:
         return
-    faults, allowed = [], run.safety.goal_rate_rad_s - robot.joint_speed_limit_rad_s
+    faults = []
+    allowed = run.safety.goal_rate_rad_s - robot.joint_speed_limit_rad_s
     if config.yield_rate_rad_s > allowed:
         faults.append(
             f"run {run.name}: compliance.yield_rate_rad_s {config.yield_rate_rad_s:g}: together "

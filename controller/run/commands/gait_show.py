@@ -34,7 +34,8 @@ def show_gait(
     """Show a gait's parameters with ranges and units, its source, and the joint speeds it needs."""
     check_picture(picture)
     prepared = prepare_gait(name, robot=robot, parameters=parameters(param))
-    gait, body = prepared.gait, prepared.robot
+    gait = prepared.gait
+    body = prepared.robot
     cycle = GaitCycle(gait, body)
     spans = ranges(gait.model)
     found: dict[str, object] = {
@@ -55,11 +56,14 @@ def show_gait(
     if as_json:
         rows = {
             key: {
-                "value": values[key], "default": span.default, "low": span.low, "high": span.high,
+                "value": values[key],
+                "default": span.default,
+                "low": span.low,
+                "high": span.high,
                 "description": span.description,
             }
             for key, span in spans.items()
-        }  # fmt: skip
+        }
         print(json.dumps(found | {"parameters": rows}))
         return
     found["needs"] = ", ".join(needed_joints(type(gait)))

@@ -85,9 +85,17 @@ def plan(
                 "--with repertoire: does not use --motion, --track, --seed or --set; leave them out"
             )
         planner.load()(
-            run, repertoire=repertoire, robot=robot, world=world, beam=beam or 400, physics=physics,
-            out=out, carry=carry, force=force, as_json=as_json,
-        )  # fmt: skip
+            run,
+            repertoire=repertoire,
+            robot=robot,
+            world=world,
+            beam=beam or 400,
+            physics=physics,
+            out=out,
+            carry=carry,
+            force=force,
+            as_json=as_json,
+        )
         return
     if repertoire is not None or beam is not None or out is not None or carry or physics:
         raise InputError(
@@ -95,9 +103,14 @@ def plan(
         )
 
     prepared = prepare_walk(
-        run, keys=key_values("--set", set_), seed=seed, motion=motion, robot=robot, world=world,
+        run,
+        keys=key_values("--set", set_),
+        seed=seed,
+        motion=motion,
+        robot=robot,
+        world=world,
         track=track,
-    )  # fmt: skip
+    )
     found, warnings = _facts(prepared)
     if as_json:
         found["warnings"] = warnings

@@ -93,7 +93,8 @@ def watch(
     The time begins with the first message. Without one the check lasts at least ``WAIT_S``, because
     ROS 2 needs seconds to find a publisher.
     """
-    found, start_s = FeedStatistics(config), clock.now_s()
+    found = FeedStatistics(config)
+    start_s = clock.now_s()
     due_s, end_s = start_s + LINE_S, start_s + max(seconds, WAIT_S)
     while clock.now_s() < end_s:
         clock.sleep_until_s(clock.now_s() + LOOK_S)

@@ -19,8 +19,18 @@ if TYPE_CHECKING:
 
 
 KINDS: Final = (
-    *("run", "robot", "world", "synthesis", "gait", "recording", "skin", "animal", "schedule"),
-    *("faults", "servo", "policy"),
+    "run",
+    "robot",
+    "world",
+    "synthesis",
+    "gait",
+    "recording",
+    "skin",
+    "animal",
+    "schedule",
+    "faults",
+    "servo",
+    "policy",
 )
 """Names of ``models``, known before they are built."""
 

@@ -88,8 +88,10 @@ class ExternalSource(ABC):
             InputError: no pose arrives, or the first cannot be the robot's.
 
         """
-        prepared, clock = context.prepared, context.backend.clock
-        robot, run = prepared.robot, prepared.run
+        prepared = context.prepared
+        clock = context.backend.clock
+        robot = prepared.robot
+        run = prepared.run
         config = robot.pose or PoseConfig()
         rehearsed = context.backend.poses
         opened = rehearsed if rehearsed is not None else self.open_feed(context.argument, clock)

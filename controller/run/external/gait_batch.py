@@ -60,7 +60,8 @@ def run_together(
     first = prepared[0]
     bodies = make_bodies(first.robot, first.world, len(prepared), first.run.physics_step_s)
     batch = RobotBatch(first.run, bodies)
-    period_s, cycle = 1.0 / first.run.cycle_hz, 0
+    period_s = 1.0 / first.run.cycle_hz
+    cycle = 0
     with ExitStack() as stack:
         opened = [stack.enter_context(RunLog(path)) for path in logs]
         runs = [
@@ -78,8 +79,10 @@ def run_together(
 
 class _Row:
     def __init__(self, batch: RobotBatch, number: int, prepared: GaitRun, log: RunLog) -> None:
-        run, robot = prepared.run, prepared.robot
-        plan, pose = prepared.check_plan(), prepared.initial_pose()
+        run = prepared.run
+        robot = prepared.robot
+        plan = prepared.check_plan()
+        pose = prepared.initial_pose()
         self.body: BatchRow = batch.start(number, robot, prepared.world, pose)
         self.link = SafeLink(self.body, SafetyLimits.from_config(robot, run.safety), self.body)
         self.log = log
@@ -98,7 +101,8 @@ class _Row:
         self.is_over = False
         self._motion = prepared.make_source(self._event)
         self.derating = Derating(run.safety, robot, self._event, self.link.load)
-        self._spine, self._period_s = SpineLinks.of(robot), 1.0 / run.cycle_hz
+        self._spine = SpineLinks.of(robot)
+        self._period_s = 1.0 / run.cycle_hz
         self.log.event(0.0, "start", "torque on; ramp to the shape")
         try:
             state = self.link.enable()

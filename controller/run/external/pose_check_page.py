@@ -39,7 +39,8 @@ class PoseCheckPage:
 
     def __init__(self, log: RunLog, prepared: PreparedRun, config: PoseConfig, source: str) -> None:
         """Show the poses of ``source`` in the page behind ``log``."""
-        self._log, self._config = log, config
+        self._log = log
+        self._config = config
         self._robot = prepared.robot
         self._tracked = TrackedBody(prepared.robot, config)
         self._straight = np.zeros(prepared.robot.joint_count)
@@ -57,25 +58,44 @@ class PoseCheckPage:
 
     def show(self, time_s: float, sample: PoseSample) -> None:
         """Draw the body at a pose."""
-        straight, count = self._straight, len(self._straight)
-        unknown, no = np.full(count, np.nan), np.zeros(count, np.uint8)
+        straight = self._straight
+        count = len(self._straight)
+        unknown = np.full(count, np.nan)
+        no = np.zeros(count, np.uint8)
         state = JointState(
             time_s, unknown, unknown, unknown, unknown, unknown, no, no, unknown, no == 1, unknown
         )
         self._log.cycle(
-            time_s, unknown, unknown, state, deadline_s=time_s, lateness_s=0.0,
-            wire_busy_s=float("nan"), electrical_j=float("nan"), mechanical_j=float("nan"),
-            yield_rad=None, verdict="pass", reason="", joints=[],
-        )  # fmt: skip
+            time_s,
+            unknown,
+            unknown,
+            state,
+            deadline_s=time_s,
+            lateness_s=0.0,
+            wire_busy_s=float("nan"),
+            electrical_j=float("nan"),
+            mechanical_j=float("nan"),
+            yield_rad=None,
+            verdict="pass",
+            reason="",
+            joints=[],
+        )
         head = self._tracked.head(sample, straight)
         view = body_in_world(
             self._robot, BodyPose(time_s, head.position_m, head.rotation), straight
         )
         self._log.add(
-            PoseTable, time_s, head_m=head.position_m, rotation=head.rotation,
-            links_m=view.link_m, centre_m=view.centre_m, speed_m_s=float("nan"),
-            predicted_speed_m_s=float("nan"), pulse_m_s=float("nan"), path_s_m=float("nan"),
-        )  # fmt: skip
+            PoseTable,
+            time_s,
+            head_m=head.position_m,
+            rotation=head.rotation,
+            links_m=view.link_m,
+            centre_m=view.centre_m,
+            speed_m_s=float("nan"),
+            predicted_speed_m_s=float("nan"),
+            pulse_m_s=float("nan"),
+            path_s_m=float("nan"),
+        )
 
     def report(self, time_s: float, facts: dict[str, Any], faults: list[str]) -> None:
         """Show the facts of the feed, and its faults, as events."""

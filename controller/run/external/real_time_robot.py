@@ -38,7 +38,8 @@ class RealTimeRobot:
     """
 
     def __init__(self, robot: RobotConfig, world: WorldConfig) -> None:
-        self._robot, self._world = robot, world
+        self._robot = robot
+        self._world = world
         self._view: Any = None
         self._line, other = pipe()
         self._process = start(_serve, other, robot, world, daemon=True)

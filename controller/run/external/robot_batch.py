@@ -127,7 +127,8 @@ class BatchRow:
 
     def __init__(self, batch: RobotBatch, row: int, robot: RobotConfig) -> None:
         self.robot = robot
-        self._batch, self._row = batch, row
+        self._batch = batch
+        self._row = row
         self._zero_s = batch.time_s
         line = simulated_line(robot, self)
         assert isinstance(line, SimLine)
@@ -201,7 +202,8 @@ class BatchRow:
 
     def read(self) -> JointState:
         """Return the present state; angles are whole positions."""
-        firmware, drive = self._firmware, self.drive
+        firmware = self._firmware
+        drive = self.drive
         unit_rad = np.abs(self._units.rad_per_position)
         return JointState(
             self.time_s,
@@ -254,7 +256,9 @@ class BatchRow:
 
     def take_output(self, *, is_slice: bool) -> None:
         """Copy the motors' output to the servos, which check themselves after a slice."""
-        bodies, row, drive = self._batch.bodies, self._row, self.drive
+        bodies = self._batch.bodies
+        row = self._row
+        drive = self.drive
         drive.current_a[:], drive.pwm[:] = bodies.current_a[row], bodies.pwm[row]
         for name, values in zip(_ENERGIES, bodies.energies_j[:, row], strict=True):
             getattr(drive, name)[:] = values

@@ -43,7 +43,9 @@ def use_worker(
         until: ends the worker.
 
     """
-    run, robot, world = prepared.run, prepared.robot, prepared.world
+    run = prepared.run
+    robot = prepared.robot
+    world = prepared.world
     if not isinstance(prepared, WalkRun) or not isinstance(source, AsksTwin):
         return
     if run.motion != "walk" or not _tries_pieces(prepared) or find_spec("mujoco") is None:
@@ -68,7 +70,9 @@ def second_body(
             body elsewhere. None if the pose assumes the friction (joints, IMU).
 
     """
-    run, world, robot = prepared.run, prepared.world, prepared.robot
+    run = prepared.run
+    world = prepared.world
+    robot = prepared.robot
     if not _is_bare_on_known_ground(prepared):
         return None
     twin = cache(backend.twin) if backend.twin is not None and run.pose_is_true else None

@@ -120,14 +120,17 @@ def simulated_line(
         InputError: the servos are of different series.
 
     """
-    rate, joints = baud or robot.servo.baud, range(robot.joint_count) if rows is None else rows
+    rate = baud or robot.servo.baud
+    joints = range(robot.joint_count) if rows is None else rows
     if rows is None and robot.is_mixed:
         raise InputError(
             f"robot {robot.name}: its ports have servos of different series, and one simulated "
             "line has one series; serve the servos of each port alone: snakewalk bus serve --servos"
         )
-    ids, at = [robot.servo_ids[row] for row in joints], np.array(joints, np.intp)
-    records, motors = [robot.servo_records[row] for row in joints], motors_of(robot)
+    ids = [robot.servo_ids[row] for row in joints]
+    at = np.array(joints, np.intp)
+    records = [robot.servo_records[row] for row in joints]
+    motors = motors_of(robot)
     mounting = deviation.mounting(robot)
     mounting = Mounting(mounting.sign[at], mounting.zero_rad[at])
     on_it = [motors[row] for row in joints]
@@ -166,10 +169,14 @@ class ServedRobot:
     ) -> None:
         physics, _ = physics_modules()
         deviation = serving.deviation
-        self._robot, self._deviation = robot, deviation
+        self._robot = robot
+        self._deviation = deviation
         ground = build_ground(world)
         self.body: MujocoPlant = physics.MujocoPlant(
-            *(deviation.robot(robot), deviation.world(world), ground, serving.physics_step_s),
+            deviation.robot(robot),
+            deviation.world(world),
+            ground,
+            serving.physics_step_s,
             is_placed=False,
         )
         straight = (0.0,) * robot.joint_count

@@ -35,7 +35,10 @@ class _SimulatedBody:
     ) -> None:
         plant, twin = physics_modules()
         self.plant: MujocoPlant = plant.MujocoPlant(
-            *(deviation.robot(robot), deviation.world(world), ground, run.physics_step_s),
+            deviation.robot(robot),
+            deviation.world(world),
+            ground,
+            run.physics_step_s,
             is_placed=False,
         )
         self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
@@ -123,9 +126,12 @@ def split(
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     motors = motors_of(robot)
     body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
-    clock, imu = RealTimeClock(), made.imu()
+    clock = RealTimeClock()
+    imu = made.imu()
     line = simulated_line(
-        *(robot, body, replace(deviation, slip_rad=None)),
+        robot,
+        body,
+        replace(deviation, slip_rad=None),
         imu if imu is not None and imu.config.id in here else None,
         rows=rows,
         clock=clock,

@@ -46,14 +46,13 @@ class SimulatedBus:
         if not robot.is_mixed:
             line = simulated_line(robot, plant, deviation, imu)
             return cls(robot.model_copy(update={"ports": ()}), (line,))
-        shared, clock = SharedPlant(plant, motors_of(robot)), SimClock(plant.time_s)
+        shared = SharedPlant(plant, motors_of(robot))
+        clock = SimClock(plant.time_s)
         lines: list[SimLine | FeetechLine] = []
         for port in robot.ports:
             rows = [row for row, each in enumerate(robot.servo_ids) if each in port.ids]
             own = imu if imu is not None and imu.config.id in port.ids else None
-            line = simulated_line(
-                *(robot, shared.share(rows), deviation, own), rows=rows, clock=clock
-            )
+            line = simulated_line(robot, shared.share(rows), deviation, own, rows=rows, clock=clock)
             line.label = f"{port.port} (simulated)"
             lines.append(line)
         # a servo of Protocol 2.0 may act within a slice: last, so that the body follows its stops

@@ -46,7 +46,8 @@ class TwinTrial:
 
     def answers(self, question: TwinQuestion) -> Iterator[TwinAnswer]:
         """Yield the answers, each when it is known."""
-        pilot, robot = self._pilot, self._prepared.robot
+        pilot = self._pilot
+        robot = self._prepared.robot
         twin = pilot.twin
         assert twin is not None
         twin.friction = question.friction
@@ -66,7 +67,8 @@ class RehearsedTwin:
     """A ``TwinAnswers`` in simulated time: a reply needs ``PIECE_S``."""
 
     def __init__(self, trial: TwinTrial, now_s: Callable[[], float]) -> None:
-        self._trial, self._now_s = trial, now_s
+        self._trial = trial
+        self._now_s = now_s
         self._pieces: Iterator[TwinAnswer] = iter(())
         self._due_s = 0.0
 
@@ -74,7 +76,8 @@ class RehearsedTwin:
         """Ask; the present piece is completed first."""
         now_s = self._now_s()
         begin_s = max(now_s, min(self._due_s, now_s + PIECE_S))
-        self._pieces, self._due_s = self._trial.answers(question), begin_s + PIECE_S
+        self._pieces = self._trial.answers(question)
+        self._due_s = begin_s + PIECE_S
 
     def arrived(self) -> Sequence[TwinAnswer]:
         """Return the answers that are due."""

@@ -55,7 +55,8 @@ def prepare_gait(
     keys = gait_keys(keys)
     gait, known = gait_by_name(name, parameters)
     if known is not None:
-        robot, world = robot or known.robot, world or known.world
+        robot = robot or known.robot
+        world = world or known.world
     changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
     gaits = [gait, *(other for _, other in changes)]
     pitch = any(each.needs.pitch for each in gaits)

@@ -24,8 +24,11 @@ def foreign_joints(
     path = Path(track)
     reader = _reader(path)
     chosen = {"joints": asked.joints, "unit": asked.unit, "topic": asked.topic}
-    given = [name for name, value in {**chosen, "episode": asked.episode}.items()
-             if value not in (None, {})]  # fmt: skip
+    given = [
+        name
+        for name, value in {**chosen, "episode": asked.episode}.items()
+        if value not in (None, {})
+    ]
     if reader is None:
         if given:
             option = "--joint" if given[0] == "joints" else f"--{given[0]}"

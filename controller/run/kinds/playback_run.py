@@ -31,7 +31,8 @@ def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
     Up to 0.9 of the limit they are unchanged. A corner would need any acceleration, and slow the
     complete recording.
     """
-    start, room = _LINEAR * limit_rad, (_MOST - _LINEAR) * limit_rad
+    start = _LINEAR * limit_rad
+    room = (_MOST - _LINEAR) * limit_rad
     size = np.abs(joints)
     soft = start + room * np.tanh(np.maximum(size - start, 0.0) / room)
     return np.asarray(np.sign(joints) * np.where(size > start, soft, size))

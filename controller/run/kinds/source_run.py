@@ -45,7 +45,8 @@ class SourceRun(PathlessRun):
             InputError: one line for each fault.
 
         """
-        robot, source = self.robot, self.make(self.robot)
+        robot = self.robot
+        source = self.make(self.robot)
         if self.make(robot) is source:
             raise InputError("the motion source: make a fresh one at each call, not always one")
         source.needs.check(robot, "the motion source")

@@ -70,7 +70,8 @@ class SteeredRun(PathRun, GaitRun):
             travel_per_body=CYCLES_PER_BODY,
         )
         swim = SteeredGait(self.gait, self.robot, course, run.walk.carrot_m)
-        walk, table = self.ashore, self.config.ashore
+        walk = self.ashore
+        table = self.config.ashore
         if walk is None or table is None:
             return swim
         return Landing(

@@ -140,7 +140,8 @@ class WalkRun(PathRun):
         planner: PathPlanner | None = None,
         fitter: PitchFitter | None = None,
     ) -> Pilot:
-        run, robot = self.run, self.robot
+        run = self.run
+        robot = self.robot
         time_law = TimeLaw(
             JointTrack(chooser.track, self.retarget.joints_rad, robot.limit_rad),
             self.pulse_segments_s,
@@ -285,7 +286,8 @@ class WalkRun(PathRun):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Surprising properties of the path and the shapes, one line each."""
-        pulse_m_s, lines = self.pulse_m_s, []
+        pulse_m_s = self.pulse_m_s
+        lines = []
         if self.path.length_m > pulse_m_s * self.run.time_limit_s:
             lines.append(
                 f"path: {self.path.length_m:.1f} m at a pulse of {pulse_m_s:.2f} m/s need at "
@@ -327,7 +329,8 @@ class WalkRun(PathRun):
 
     def _too_steep(self, section: SteepSection) -> str:
         x_m, y_m = self.path.position(section.begin_m)
-        slope, known = np.degrees(section.slope_rad), np.degrees(self._climbed_rad)
+        slope = np.degrees(section.slope_rad)
+        known = np.degrees(self._climbed_rad)
         return (
             f"the path climbs {slope:.1f} deg from {section.begin_m:.1f} to {section.end_m:.1f} m, "
             f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {known:.1f} deg; "
