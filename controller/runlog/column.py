@@ -28,7 +28,9 @@ joints, ``points`` lists of coordinates, ``object`` is any JSON."""
 Watched = Literal["all", "newest", ""]
 UNITS: Final = ("rad_s", "m_s", "rad", "ah", "a", "s", "m", "c", "v", "j")
 """Suffixes of names that are units; the longest comes first."""
-JOINT, LINK, ANY = "joint", "link", "any"
+JOINT = "joint"
+LINK = "link"
+ANY = "any"
 """Sizes that differ from robot to robot, and from row to row."""
 _JSON_TYPES: Final = {
     "integer": "integer",

@@ -87,7 +87,8 @@ def read_log(path: Path, *, is_ours: bool = False) -> RunRecord:
 
 def _foreign(data: bytes) -> str:
     """Return the sentence about a complete MCAP that another program wrote."""
-    profile, topics = "", set[str]()
+    profile = ""
+    topics = set[str]()
     for record in StreamReader(BytesIO(data), emit_chunks=True).records:
         if isinstance(record, Header):
             profile = record.profile
@@ -150,7 +151,8 @@ def _topics(path: Path, data: bytes) -> dict[int, str]:
         LogError: chunks are packed in a way that logs are not.
 
     """
-    topics, chunks = dict[int, str](), 0
+    topics = dict[int, str]()
+    chunks = 0
     try:
         for record in StreamReader(BytesIO(data), emit_chunks=True).records:
             if isinstance(record, Channel):
@@ -207,7 +209,9 @@ def _said_bytes(chunk: bytes) -> int:
 
 def _whole_records(data: bytes) -> tuple[int, bool, int]:
     """Bytes of complete records, whether the footer ends them, and their stated unpacked bytes."""
-    at, opcode, unpacked = len(_MAGIC), 0, 0
+    at = len(_MAGIC)
+    opcode = 0
+    unpacked = 0
     while at + _HEAD.size <= len(data) and opcode != _FOOTER:
         opcode, length = _HEAD.unpack_from(data, at)
         if at + _HEAD.size + length > len(data):

@@ -108,7 +108,9 @@ class Header:
 
     def row(self) -> Json:
         """Row of ``ConfigTable``; the ground is thinned."""
-        plan, pose, ground = self.plan, self.initial_pose, self.ground
+        plan = self.plan
+        pose = self.initial_pose
+        ground = self.ground
         return {
             "format": FORMAT,
             "software": self.software,
@@ -146,9 +148,12 @@ class Header:
             pydantic.ValidationError: the configuration is not of this version.
 
         """
-        plan, ground = row["plan"], row["ground"]
-        winding, pose = row.get("winding"), row.get("laid")
-        run, robot = RunConfig.model_validate(row["run"]), RobotConfig.model_validate(row["robot"])
+        plan = row["plan"]
+        ground = row["ground"]
+        winding = row.get("winding")
+        pose = row.get("laid")
+        run = RunConfig.model_validate(row["run"])
+        robot = RobotConfig.model_validate(row["robot"])
         evidence = row.get("evidence")
         return cls(
             software=row["software"],
@@ -228,7 +233,8 @@ class RunRecord:
 
     def tables(self) -> tuple[Table, ...]:
         """Tables of all topics but ``ConfigTable``; those of the plan begin at 0 s."""
-        events, values = self.events, [getattr(self, field.name) for field in fields(self)]
+        events = self.events
+        values = [getattr(self, field.name) for field in fields(self)]
         return (
             *(each for each in values if isinstance(each, Table)),
             PathTable(np.array([s for s, _ in self.paths]), [m for _, m in self.paths]),

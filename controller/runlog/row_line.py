@@ -163,7 +163,8 @@ class RunEnd:
             self._in.clear()
 
     def _end_line(self) -> None:
-        size, line = self._in_bytes, bytes(self._in)
+        size = self._in_bytes
+        line = bytes(self._in)
         self._in_bytes = 0
         self._in.clear()
         if size > LINE_BYTES:

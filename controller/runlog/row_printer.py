@@ -79,7 +79,8 @@ class RowPrinter:
 
     def _fast_row(self, values: Mapping[str, Any]) -> str:
         cells = [values[name] for name in self._defaults]
-        places, arrays = [], []
+        places = []
+        arrays = []
         for at, shape in self._arrays:
             value = cells[at]
             if value is None:
@@ -169,7 +170,8 @@ def _exact_row() -> Callable[[Any], str]:
         array = np.asarray(values, dtype=float)
         now = array.tobytes()
         if now != last:
-            last, last_text = now, exact_text(array)
+            last = now
+            last_text = exact_text(array)
         return last_text
 
     return print_row

@@ -89,7 +89,9 @@ def record_of(
         last = table_of(kind, rows.get(kind.topic.name, ()), sizes)
         return _joined(kind, cast(Sequence[T], earlier.get(kind, ())), last)
 
-    paths, changed, events = table(PathTable), table(WaypointTable), table(EventTable)
+    paths = table(PathTable)
+    changed = table(WaypointTable)
+    events = table(EventTable)
     waypoints = (
         (0.0, header.plan.waypoints_m),
         *zip(changed.time_s.tolist(), changed.waypoints_m, strict=True),

@@ -120,7 +120,9 @@ class CycleTable(Table):
             is_known=True,
             curves=(
                 Curve(
-                    *(Panel.CYCLE, "began late", "amber"),
+                    Panel.CYCLE,
+                    "began late",
+                    "amber",
                     scale=1e3,
                     flat=0.0,
                     constant="no cycle began late",

@@ -36,14 +36,16 @@ class TruthLog:
         centre_m: Floats,
     ) -> None:
         """Write where the body was when a pose was measured."""
-        self._write({
-            "sequence": sequence,
-            "time_s": round(time_s, 6),
-            "sent_s": None if sent_s is None else round(sent_s, 6),
-            "head_m": [round(float(value), 6) for value in head_m],
-            "rotation": [round(float(value), 7) for value in rotation.ravel()],
-            "centre_m": [round(float(value), 6) for value in centre_m],
-        })  # fmt: skip
+        self._write(
+            {
+                "sequence": sequence,
+                "time_s": round(time_s, 6),
+                "sent_s": None if sent_s is None else round(sent_s, 6),
+                "head_m": [round(float(value), 6) for value in head_m],
+                "rotation": [round(float(value), 7) for value in rotation.ravel()],
+                "centre_m": [round(float(value), 6) for value in centre_m],
+            }
+        )
 
     def _write(self, row: Mapping[str, Any]) -> None:
         self._file.write(json.dumps(row, separators=(",", ":")) + "\n")
@@ -96,7 +98,8 @@ def read_truth(path: Path) -> Truth:
         raise InputError(
             f"{path}: contains no truth of a served robot; give the file of bus serve --truth"
         )
-    header, poses = rows[0], rows[1:]
+    header = rows[0]
+    poses = rows[1:]
     if not poses:
         raise InputError(f"{path}: the served robot was never measured")
     try:

@@ -243,7 +243,8 @@ class RunLog:
         self._writer.flush()
 
     def _write_batch(self) -> None:
-        batch, self._batch = self._batch, []
+        batch = self._batch
+        self._batch = []
         for table, time_s, row in batch:
             data = row if isinstance(row, bytes) else self._printers[table].row(row).encode()
             stamp_ns = round(time_s * 1e9)
@@ -257,7 +258,8 @@ class RunLog:
         how = "moved" if os.fstat(self._file.fileno()).st_nlink > 0 else "deleted"
         _LOGGER.warning(
             "%s: was %s during the run; it is kept open, and written again at the end",
-            *(self._part, how),
+            self._part,
+            how,
         )
 
     def _has_its_name(self) -> bool:
