@@ -68,12 +68,12 @@ def allowed(
         robot: names the joints.
 
     """
-    heat, amps, volts = state.temperature_c, current_a, state.voltage_v
-    limit_c, limit_a, voltage_min_v = (
-        safety.temperature_limit_c,
-        safety.current_limit_of_a(robot),
-        safety.voltage_limits_v(robot.servo)[0],
-    )
+    heat = state.temperature_c
+    amps = current_a
+    volts = state.voltage_v
+    limit_c = safety.temperature_limit_c
+    limit_a = safety.current_limit_of_a(robot)
+    voltage_min_v = safety.voltage_limits_v(robot.servo)[0]
     limit_rad = _lag_limits_rad(safety, robot)
     band_v, edge_v = VOLTAGE_BAND * robot.servo.supply_v, VOLTAGE_EDGE * robot.servo.supply_v
     ratings = (
@@ -170,7 +170,9 @@ class Derating:
         self.rate = 1.0
         self.least = 1.0
         """Lowest rate so far."""
-        self._safety, self._robot, self._load = safety, robot, load
+        self._safety = safety
+        self._robot = robot
+        self._load = load
         power = robot.power
         self._fuse_a = math.inf if power is None or power.fuse_a is None else power.fuse_a
         servo = robot.servo
@@ -225,7 +227,8 @@ class Derating:
 
     def _allowed_by_load(self, load: LoadEstimate, state: JointState) -> Allowed:
         """Return the rate that the supply's fuse and the windings allow."""
-        fuse_a, limit_c = self._fuse_a, self._safety.winding_limit_c
+        fuse_a = self._fuse_a
+        limit_c = self._safety.winding_limit_c
         if (
             load.current_a <= CURRENT_START * fuse_a
             and not load.hottest_c > limit_c - WINDING_BAND_C

@@ -193,14 +193,18 @@ class Drive:
         on_event: OnEvent = lambda kind, text: None,
     ) -> None:
         self._observer = observer
-        self._link, self._clock, self._pose = link, clock, sensors.pose
+        self._link = link
+        self._clock = clock
+        self._pose = sensors.pose
         health = sensors.pose_health
         self._pose_hold = None if health is None else PoseHold(health, self._on_pose)
         self._believes = not sensors.pose_is_measured
         self._motion, self._path = motion, path_progress(motion)
         self._open = motion if isinstance(motion, OpenWaypoints) else None
         self._waypoints_m = None if self._open is None else self._open.waypoints_m
-        self._log, self._robot, self._run = log, robot, run
+        self._log = log
+        self._robot = robot
+        self._run = run
         self._gain = gain
         self._slip_monitor = SlipMonitor(
             robot.length_m, gain, run.safety.advance_fraction, sensors.pose_sd_m
@@ -227,8 +231,12 @@ class Drive:
 
     def run(self) -> Outcome:
         """Enable, ramp to the first shape, follow the path, settle, disable."""
-        clock, log, motion, path = self._clock, self._log, self._motion, self._path
-        period_s, spine = 1.0 / self._run.cycle_hz, SpineLinks.of(self._robot)
+        clock = self._clock
+        log = self._log
+        motion = self._motion
+        path = self._path
+        period_s = 1.0 / self._run.cycle_hz
+        spine = SpineLinks.of(self._robot)
         with _no_long_collections(), self._link:
             state = self._link.enable()
             self._wire_s = self._wire_busy_s()
@@ -303,14 +311,18 @@ class Drive:
 
     def _hold_out(self, period_s: float) -> None:
         """Go on reading while a trip holds the body, until its torque is off."""
-        link, log = self._link, self._log
+        link = self._link
+        log = self._log
         if not isinstance(link, HoldingLink):
             return
         for tick in ticks(self._clock, period_s, lambda: math.inf if link.is_holding else -1.0):
             with _LATCHED:
                 state = link.read()
                 log.cycle(
-                    *(tick.deadline_s, state.position_rad, state.position_rad, state),
+                    tick.deadline_s,
+                    state.position_rad,
+                    state.position_rad,
+                    state,
                     deadline_s=tick.deadline_s,
                     lateness_s=tick.lateness_s,
                     wire_busy_s=math.nan,
@@ -337,7 +349,8 @@ class Drive:
         )
 
     def _find_friction(self, view: BodyView) -> None:
-        sent, monitor = self._link.last_verdict, self._friction_monitor
+        sent = self._link.last_verdict
+        monitor = self._friction_monitor
         if monitor is None or sent is None:
             return
         found = monitor.update(view, sent.goal_rad)
@@ -385,8 +398,11 @@ class Drive:
         return self._steer(period_s * rate, view)
 
     def _steer(self, period_s: float, view: BodyView) -> Floats:
-        path, log, now_s = self._path, self._log, self._clock.now_s()
-        reached, missed = path.reached, path.missed
+        path = self._path
+        log = self._log
+        now_s = self._clock.now_s()
+        reached = path.reached
+        missed = path.missed
         goal = self._motion.step(period_s, view)
         if self._open is not None and self._open.waypoints_m is not self._waypoints_m:
             self._waypoints_m = self._open.waypoints_m
@@ -449,7 +465,8 @@ class Drive:
             self._observer.step(tick.deadline_s, sent_s, sent_rad, state)
         self._measure_speed()
         path = self._path
-        pulse_m_s, along_m = path.pulse_m_s, path.along_m
+        pulse_m_s = path.pulse_m_s
+        along_m = path.along_m
         self._log.add(
             PoseTable,
             tick.deadline_s,

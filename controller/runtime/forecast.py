@@ -112,7 +112,10 @@ def forecast(
     """
     body = _PaperBody(robot, friction, ground, step_s)
     body.begin(start_m, heading_rad, pilot.goal_rad())
-    times, angles, centres, pulse_m = [0.0], [body.joints], [], 0.0
+    times = [0.0]
+    angles = [body.joints]
+    centres = []
+    pulse_m = 0.0
     torques = [np.zeros(robot.joint_count)]
     while True:
         view = body.view()
@@ -145,7 +148,9 @@ class _PaperBody:
         ground: HeightField | None,
         step_s: float,
     ) -> None:
-        self._robot, self._friction, self._ground = robot, friction, ground
+        self._robot = robot
+        self._friction = friction
+        self._ground = ground
         self._step_s, self._head_m, self._head_rad = step_s, np.zeros(2), 0.0
         self._velocity, self._moving_m_s = np.zeros(3), np.zeros((robot.joint_count + 1, 2))
         self._yaw = np.array([axis == "y" for axis in robot.joint_axes])
@@ -169,15 +174,19 @@ class _PaperBody:
 
     def step(self, goal: Floats, view: BodyView) -> Floats:
         """Move the joints to ``goal`` (J,) and the body with them; returns torques (J,), N m."""
-        step_s, weight_n, share = self._step_s, self._weight_n, self._share
+        step_s = self._step_s
+        weight_n = self._weight_n
+        share = self._share
         before = _in_head_frame(self._robot, self.joints)
         after = _in_head_frame(self._robot, goal)
         shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
-        points, headings = before.link_m[:, :2], before.headings_rad
+        points = before.link_m[:, :2]
+        headings = before.headings_rad
         c, s = np.cos(self._head_rad), np.sin(self._head_rad)
         turn = np.array([[c, -s], [s, c]])
         tangential, normal = slope_load(self._ground, view.link_m)
-        tangential, normal = share * (tangential @ turn), share[:, 0] * normal
+        tangential = share * (tangential @ turn)
+        normal = share[:, 0] * normal
         was_m_s = self._moving_m_s @ turn
         held = self._balance(points, headings, shape_m_s, was_m_s, tangential, normal)
         velocity = self._velocity
@@ -212,14 +221,26 @@ class _PaperBody:
         friction = self._friction
         try:
             self._velocity = rigid_velocity(
-                points, headings, shape_m_s, friction, self._velocity,
-                tangential=tangential, normal=normal,
-            )  # fmt: skip
+                points,
+                headings,
+                shape_m_s,
+                friction,
+                self._velocity,
+                tangential=tangential,
+                normal=normal,
+            )
         except NoBalanceError:
             self._velocity = inertial_velocity(
-                points, headings, shape_m_s, friction, was_m_s, self._step_s, self._velocity,
-                tangential=tangential, normal=normal,
-            )  # fmt: skip
+                points,
+                headings,
+                shape_m_s,
+                friction,
+                was_m_s,
+                self._step_s,
+                self._velocity,
+                tangential=tangential,
+                normal=normal,
+            )
             return False
         return True
 

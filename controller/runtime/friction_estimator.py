@@ -16,7 +16,8 @@ class FrictionEstimator(ABC):
     """Estimates the friction under a body; call ``update`` once a cycle."""
 
     def __init__(self, file: FrictionConfig, use: Callable[[FrictionConfig], None]) -> None:
-        self._file, self._use = file, use
+        self._file = file
+        self._use = use
         self._confirmed = 0
         self._used = self._reported = file
 
@@ -57,13 +58,15 @@ class FrictionEstimator(ABC):
 
     def event_text(self) -> str | None:
         """A line when the friction in use has changed notably since the last one."""
-        used, reported = self._used, self._reported
+        used = self._used
+        reported = self._reported
         change = max(
             abs(used.along / reported.along - 1.0), abs(used.across / reported.across - 1.0)
         )
         if change < _NOTABLE:
             return None
-        self._reported, file = used, self._file
+        self._reported = used
+        file = self._file
         if used == file:
             return "the friction found is that of the world's file again"
         return (

@@ -23,7 +23,8 @@ from snakewalk.controller.walk.twin import Twin, seen_state
 SPAN_S = 1.5
 """Duration of motion that is replayed (ours): in a shorter span the initial speed counts too much,
 in a longer one bodies diverge."""
-_SETTLED, _RESTS = 4, 3
+_SETTLED = 4
+_RESTS = 3
 """After ``_SETTLED`` spans in a row that confirm the file's friction, ``_RESTS`` are skipped behind
 each replayed one (ours): a quarter of the cost, and up to 4.5 s until a change is visible."""
 _STRIDE = 5
@@ -75,11 +76,13 @@ class OnTwin:
     degrees in a second (ours): a stuck link is sometimes far off."""
 
     def __init__(self, robot: RobotConfig, make_twin: Callable[[], Twin]) -> None:
-        self._robot, self._make_twin = robot, make_twin
+        self._robot = robot
+        self._make_twin = make_twin
 
     def slid(self, span: Span, friction: FrictionConfig) -> Floats:
         """As ``SlideModel``."""
-        twin, robot = self._make_twin(), self._robot
+        twin = self._make_twin()
+        robot = self._robot
         twin.use_friction(friction)
         (before, before_rad), (now, now_rad) = (seen_state(robot, v) for v in span.views[:2])
         try:
@@ -148,13 +151,15 @@ class FrictionMonitor(FrictionEstimator):
 
         """
         super().__init__(file, use)
-        self._model, self._cycle_s = model, cycle_s
+        self._model = model
+        self._cycle_s = cycle_s
         self._filter = FrictionFilter(file, model.sigma)
         self._count = max(1, round(SPAN_S / cycle_s))
         self._views: list[BodyView] = []
         self._goals_rad: list[Floats] = []
         self._replays: Iterator[FoundFriction | None] = iter(())
-        self._rests, self._since_s = 0, 0.0
+        self._rests = 0
+        self._since_s = 0.0
 
     def update(self, view: BodyView, goal_rad: Floats) -> FoundFriction | None:
         """Process a cycle, as ``FrictionEstimator``."""
@@ -180,5 +185,6 @@ class FrictionMonitor(FrictionEstimator):
         for friction in self._filter.hypotheses():
             predicted.append(self._model.slid(span, friction))
             yield None
-        since_s, self._since_s = self._since_s, 0.0
+        since_s = self._since_s
+        self._since_s = 0.0
         yield self._filter.update(span.slid, np.array(predicted), since_s)

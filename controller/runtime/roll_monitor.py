@@ -31,7 +31,8 @@ class RollMonitor:
             self._since_s = time_s
         if time_s - self._since_s < _LASTS_S:
             return None
-        self._over, self._since_s = not self._over, None
+        self._over = not self._over
+        self._since_s = None
         if self._over:
             return f"rolled over: the links lie {np.rad2deg(roll_rad):.0f} degrees off upright"
         return "upright again"
