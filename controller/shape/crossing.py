@@ -55,7 +55,8 @@ def _is_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
 
 @compiled("boolean(float64[::1], float64[::1], int64, float64, float64)")
 def _touches(x: Floats, y: Floats, lag: int, width_m: float, piece_m: float) -> bool:
-    points, reach_m = len(x) - 1, width_m + piece_m  # largest distance of middles that touch
+    points = len(x) - 1
+    reach_m = width_m + piece_m  # largest distance of middles that touch
     for i in range(points - lag):
         j = i + lag
         while j < points:

@@ -20,7 +20,8 @@ ShapeFilter = Callable[[Floats], Bools]
 """Shapes (S, N) to a mask (S,) of those that cannot be used."""
 _ROUNDS = 50
 _FACTORS = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
-_DRAWN, _ENOUGH = 200, 0.2
+_DRAWN = 200
+_ENOUGH = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,8 @@ def build_library(
         curvature = _wide_enough(states, filters, points)
     states = curvature * states
     rejected = dict.fromkeys(filters, 0)
-    recorded, made = np.empty((0, points)), [np.empty((0, points))]
+    recorded = np.empty((0, points))
+    made = [np.empty((0, points))]
     frame: Ints = np.empty(0, dtype=np.int64)
     for wanted, band in _counts(random_count, waves):
         got = 0

@@ -113,7 +113,8 @@ def limit_to_waves(states: Complexes, first: int, last: int, share: float) -> Co
     inside = np.zeros(states.shape[-1], dtype=bool)
     inside[first - 1 : last] = True
     energy = np.abs(states) ** 2
-    kept, rest = energy[..., inside].sum(axis=-1), energy[..., ~inside].sum(axis=-1)
+    kept = energy[..., inside].sum(axis=-1)
+    rest = energy[..., ~inside].sum(axis=-1)
     most = kept * (1.0 - share) / share  # energy outside the band that the share allows
     down = np.sqrt(np.minimum(1.0, most / np.where(rest > 0.0, rest, 1.0)))
     up = np.sqrt((kept + rest) / np.where(kept > 0.0, kept + down**2 * rest, 1.0))

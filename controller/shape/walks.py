@@ -157,7 +157,8 @@ class _WalkState:
             other = (self.degree[q], self.selected[q], self.failures[q])
             sign = compare_w(other, score)
             if sign > 0 or (sign == 0 and self.last[q] < self.last[best]):
-                best, score = q, other
+                best = q
+                score = other
         return best
 
     def frontier(self, near: list[int]) -> int:
@@ -175,7 +176,8 @@ class _WalkState:
         The cost is the number of short returns, then of steps; ties go by Warnsdorff's rule.
         """
         soon = SHORT_RETURN * len(self.near)
-        here, now = self.path[-1], self.step
+        here = self.path[-1]
+        now = self.step
         came_from = {here: here}
         cost = {here: (0, 0)}
         queue = [(0, 0, 0, 0, here)]
