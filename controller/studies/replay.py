@@ -43,11 +43,14 @@ def replay(
         InputError: the simulator is not installed, or the record holds no cycle.
 
     """
-    cycle, header = record.cycle, record.header
+    cycle = record.cycle
+    header = record.header
     if len(cycle.time_s) == 0:
         raise InputError("the log holds no cycle: there is nothing to replay")
     backend = _backend(record)
-    chain, clock, robot = backend.chain, backend.clock, header.robot
+    chain = backend.chain
+    clock = backend.clock
+    robot = header.robot
     head_pose = cast(Callable[[], BodyPose], backend.pose)  # a simulated body always has one
     period_s = 1.0 / header.run.cycle_hz
     numbers = np.rint((cycle.deadline_s - cycle.deadline_s[0]) / period_s)
@@ -127,7 +130,8 @@ def differences(
 
 
 def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
-    cycle, rows = record.cycle, len(record.cycle.time_s)
+    cycle = record.cycle
+    rows = len(record.cycle.time_s)
     seen = replace(
         cycle,
         measured_rad=np.where(valid[:rows], cycle.measured_rad, np.nan),

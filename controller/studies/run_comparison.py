@@ -47,7 +47,9 @@ class ComparedRun:
 
 def compared_run(record: RunRecord, name: str) -> ComparedRun:
     """Return the compared parts of a record."""
-    header, pose, cycle = record.header, record.pose, record.cycle
+    header = record.header
+    pose = record.pose
+    cycle = record.cycle
     settings: dict[str, Any] = {"bus": header.backend, "software": header.software}
     for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):
         settings |= flat(config.model_dump(mode="json"), table)

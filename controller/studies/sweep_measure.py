@@ -137,7 +137,8 @@ def measurement(
 
 def varied(prepared: P, rng: np.random.Generator) -> P:
     """Return a run with another friction (up to 15 % off) and supply (5 %)."""
-    world, robot = prepared.world, prepared.robot
+    world = prepared.world
+    robot = prepared.robot
     slick, volts = rng.uniform(-1.0, 1.0, 2)
     factor = 1.0 + FRICTION_SPREAD * slick
     friction = world.friction.model_copy(

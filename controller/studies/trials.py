@@ -123,7 +123,8 @@ def prepare_case(
     if spread_m == 0.0:
         return found
     relief = found.planner.relief if isinstance(found, WalkRun) else None
-    start_m, rng = np.array(found.run.start_m), np.random.default_rng(seed)
+    start_m = np.array(found.run.start_m)
+    rng = np.random.default_rng(seed)
     for _ in range(_START_DRAWS):
         x_m, y_m = start_m + spread_m * rng.standard_normal(2)
         if relief is None or relief.safe(x_m, y_m):
@@ -216,7 +217,9 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
 def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
     result = run_robot(RunRequest(prepared, stoppable=False))
     stood = ground_contact(result.record, prepared.ground)
-    numbers, outcome, off = result.summary, result.outcome, result.pose.error
+    numbers = result.summary
+    outcome = result.outcome
+    off = result.pose.error
     reached = outcome.reached if off is None else off.waypoints_reached
     complete = outcome.tripped is None and reached == outcome.waypoints
     ended = None if complete else failure(result.record)
@@ -343,7 +346,8 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
     rows: list[CaseSummary] = []
     for case in cases:
         some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
-        complete, first = sum(t.complete for t in some), sum(t.first_pass for t in some)
+        complete = sum(t.complete for t in some)
+        first = sum(t.first_pass for t in some)
         rows.append(
             CaseSummary(
                 run=case.run,
@@ -404,7 +408,8 @@ def wilson(successes: int, runs: int) -> tuple[float, float]:
     if runs == 0:
         return 0.0, 1.0
     z = 1.959964  # normal quantile of 97.5 %
-    share, square = successes / runs, z * z / runs
+    share = successes / runs
+    square = z * z / runs
     middle = (share + square / 2.0) / (1.0 + square)
     half = z * math.sqrt((share * (1.0 - share) + square / 4.0) / runs) / (1.0 + square)
     return round(max(middle - half, 0.0), 3), round(min(middle + half, 1.0), 3)

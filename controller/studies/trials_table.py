@@ -36,7 +36,8 @@ class TrialsTable(CsvTable):
 
         """
         super().__init__(path, columns=COLUMNS, place=_PLACE, command="trials run")
-        self._configs, self._spread = dict(configs), f"{spread_m:g}"
+        self._configs = dict(configs)
+        self._spread = f"{spread_m:g}"
 
     def finished(self, planned: Sequence[tuple[Case, int]]) -> list[Trial]:
         """The entries of ``planned`` that the table holds."""
@@ -52,7 +53,8 @@ class TrialsTable(CsvTable):
 
     def add(self, trial: Trial) -> None:
         """Append a finished trial."""
-        case, measured = asdict(trial.case), asdict(trial)
+        case = asdict(trial.case)
+        measured = asdict(trial)
         case["keys"] = " ".join(f"{key}={value}" for key, value in trial.case.keys)
         case["robot"], case["world"] = trial.case.robot or "", trial.case.world or ""
         case["compliance"] = {None: "", True: "on", False: "off"}[trial.case.compliance]

@@ -53,7 +53,9 @@ def measure_together(points: Sequence[Point], device: str | None) -> Iterator[Re
     if others:
         LOGGER.warning(
             "%d of %d points run on the compiled simulator: %s",
-            *(len(others), len(points), "; ".join(reasons)),
+            len(others),
+            len(points),
+            "; ".join(reasons),
         )
     for point in others:
         yield point, measure(point)

@@ -269,7 +269,8 @@ def _tell_friction(
     *,
     as_json: bool,
 ) -> None:
-    first, out = logs[paths[0]].goals, outs.world
+    first = logs[paths[0]].goals
+    out = outs.world
     told = first.world.friction
     errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
     settings = [
@@ -359,7 +360,8 @@ def _servo(
     force: bool,
     as_json: bool,
 ) -> None:
-    start, fit = search.start, search.fit
+    start = search.start
+    fit = search.fit
     if not fit and start is None:
         raise InputError("--no-fit judges constants: give them with --start FILE")
     refuse_to_overwrite([out, robot_file and robot_file.out], force)
@@ -372,7 +374,8 @@ def _servo(
     if fit or found is None:
         with ProgressBar("fits", transient=True) as bar:
             found = fit_pendulum(
-                *(fitted, found),
+                fitted,
+                found,
                 seed=search.seed,
                 backlash=search.backlash,
                 on_progress=bar.update,
@@ -435,7 +438,9 @@ def _reached_bounds(found: "ServoConstants") -> dict[str, tuple[float, str]]:
         LOGGER.warning(
             "%s: %g is the %s end of its range, so other constants may be wrong, too; check mass, "
             "arm and supply, and do not use the result for another load",
-            *(name, bound, which),
+            name,
+            bound,
+            which,
         )
     return reached
 

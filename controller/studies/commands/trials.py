@@ -229,7 +229,8 @@ def _cases(
             raise InputError(f"--compliance {word}: expected on or off")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs}
-    keys, axes = [key for key, _ in overs], [values for _, values in overs]
+    keys = [key for key, _ in overs]
+    axes = [values for _, values in overs]
     cases = [
         study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
         for run in runs
@@ -261,7 +262,7 @@ def _run(
     missing = [item for item in planned if item not in done]
     with table or nullcontext():
         some = study.trials(
-            *(missing, where.workers), dask=where.dask, spread_m=start_spread, changes=changes
+            missing, where.workers, dask=where.dask, spread_m=start_spread, changes=changes
         )
         for trial in show_progress(
             some, str(out or "trials"), len(planned), done=len(found), transient=False

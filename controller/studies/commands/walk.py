@@ -55,7 +55,8 @@ def walk(
     """Walk graphs of states until all are visited: number of steps, and how soon states repeat."""
     check_picture(picture)
 
-    graphs, rules = graph or ["er:1000:9"], rule or list(RULES)
+    graphs = graph or ["er:1000:9"]
+    rules = rule or list(RULES)
     for spec in graphs:  # refuse bad input before any work starts
         graph_source(spec)
     for name in rules:

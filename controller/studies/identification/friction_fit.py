@@ -60,7 +60,8 @@ _STEP: Final = 0.1
 """Change of the logarithms for a numerical derivative (ours)."""
 _MOST: Final = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
-_ALONE, _TOGETHER = 4, 2
+_ALONE = 4
+_TOGETHER = 2
 """Steps with friction alone, then with all differences of robots (ours)."""
 _DETERMINED: Final = 0.35
 """Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
@@ -90,7 +91,8 @@ class FrictionLog:
             InputError: the log does not allow a friction estimate, with the reason.
 
         """
-        header, pose = record.header, record.pose
+        header = record.header
+        pose = record.pose
         told = header.run.pose
         true = header.backend == "sim" and header.run.pose_is_true
         measured = told == "camera" or true
@@ -280,7 +282,9 @@ class _Fit:
         workers: int,
         on_progress: Callable[[int, int], None],
     ) -> None:
-        self._logs, self._workers, self._on_progress = logs, workers, on_progress
+        self._logs = logs
+        self._workers = workers
+        self._on_progress = on_progress
         first = logs[0].goals
         told = first.world.friction
         frictions = ("along", "across") if told.back is None else ("along", "across", "back")
@@ -291,9 +295,11 @@ class _Fit:
         kinds = np.concatenate([_kinds(log) for log in logs])
         measured = np.concatenate([log.vector() for log in logs])
         self._known = np.isfinite(measured)  # a servo may not report its current
-        self._measured, self._kinds = measured[self._known], kinds[self._known]
+        self._measured = measured[self._known]
+        self._kinds = kinds[self._known]
         self._noise = np.array(_FLOORS)
-        links, joints = first.robot.link_count, first.robot.joint_count
+        links = first.robot.link_count
+        joints = first.robot.joint_count
         covariance = np.diag(constants.healthy[2:] ** 2)
         servos = slice(links, links + joints)
         covariance[servos, servos] += _COMMON**2
@@ -328,7 +334,8 @@ class _Fit:
 
     def misfit(self) -> float:
         """As ``friction_misfit``."""
-        k, values = len(self._names), self._start.copy()
+        k = len(self._names)
+        values = self._start.copy()
         others = np.zeros(len(self._steps))
         now = self._simulated(np.append(values, others))
         for _ in range(_ALONE):
@@ -355,7 +362,8 @@ class _Fit:
         found = {name: of(each[i]) for i, name in enumerate(self._names)}
         mass = found.pop(MASS, None)
         if mass is not None:  # and what the links weigh more, each
-            k, robot = len(self._names), self._logs[0].goals.robot
+            k = len(self._names)
+            robot = self._logs[0].goals.robot
             each[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
             each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
             mass = of(each[k - 1])
@@ -442,7 +450,8 @@ def _kinds(log: FrictionLog) -> Ints:
 def _places(links_m: Floats) -> Floats:
     """Place of a body in plan (T, 3): its centre, m, and its heading."""
     half = links_m.shape[1] // 2
-    front, rear = links_m[:, :half, :2].mean(axis=1), links_m[:, half:, :2].mean(axis=1)
+    front = links_m[:, :half, :2].mean(axis=1)
+    rear = links_m[:, half:, :2].mean(axis=1)
     ahead = front - rear
     heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     return np.column_stack([links_m[:, :, :2].mean(axis=1), heading])
@@ -454,5 +463,6 @@ def _motion(goals: Goals, places: Floats) -> Floats:
     edges = np.arange(round(SETTLED_S * hz), len(places), round(WINDOW_S * hz))
     first, last = places[edges[:-1]], places[edges[1:]]
     way, (c, s) = last[:, :2] - first[:, :2], (np.cos(first[:, 2]), np.sin(first[:, 2]))
-    ahead, left = c * way[:, 0] + s * way[:, 1], c * way[:, 1] - s * way[:, 0]
+    ahead = c * way[:, 0] + s * way[:, 1]
+    left = c * way[:, 1] - s * way[:, 0]
     return np.column_stack([ahead, left, last[:, 2] - first[:, 2]])

@@ -101,14 +101,14 @@ def fit_pendulum(
     rng = np.random.default_rng(seed)
     searched = ranges(logs[0].actuator)
     given = searched.start if start is None else start.values
-    first, squares = given[:FITTED], given[FITTED:]
-    width, total = (
-        (searched.high - searched.low)[:FITTED],
-        starts + hops + 1 + backlash * len(BACKLASHES_RAD),
-    )
+    first = given[:FITTED]
+    squares = given[FITTED:]
+    width = (searched.high - searched.low)[:FITTED]
+    total = starts + hops + 1 + backlash * len(BACKLASHES_RAD)
     pool: list[OptimizeResult] = []
     for k in range(starts):
-        factor, shift = np.exp(rng.normal(0.0, _SPREAD, len(first))), rng.normal(size=len(first))
+        factor = np.exp(rng.normal(0.0, _SPREAD, len(first)))
+        shift = rng.normal(size=len(first))
         drawn = first if k == 0 else first * factor + 0.02 * width * shift
         pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
         on_progress(k + 1, total)
@@ -122,7 +122,8 @@ def fit_pendulum(
         pool.append(_fit(logs, drawn, squares, _COARSE_S, _COARSE_TURNS))
         pool.sort(key=lambda fit: float(fit.cost))
         on_progress(starts + k + 1, total)
-    best, most_rad = pool[0].x, 0.0
+    best = pool[0].x
+    most_rad = 0.0
     if backlash:
         best, squares, most_rad = _with_backlash(
             logs, pool[0], squares, lambda done: on_progress(starts + hops + done, total)
@@ -131,7 +132,8 @@ def fit_pendulum(
     on_progress(total, total)
     least, most = _alike(logs, values, squares)
     chosen = float(np.clip(first[_P_UNIT] / values[_P_UNIT], least, most))
-    smallest, greatest = _scaled(values, least), _scaled(values, most)
+    smallest = _scaled(values, least)
+    greatest = _scaled(values, most)
     values = _scaled(values, chosen)
     low, high = _intervals(logs, values, squares)
     unknown = np.full(len(squares), np.nan)
@@ -226,7 +228,8 @@ def _scaled(values: Floats, factor: float) -> Floats:
 def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
     """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
     searched = ranges(logs[0].actuator)
-    lowest, highest = searched.low[: len(values)], searched.high[: len(values)]
+    lowest = searched.low[: len(values)]
+    highest = searched.high[: len(values)]
     limit = _cost(values, logs, squares) * (1.0 + _CHI_SQUARE / _blocks(logs))
     ends = []
     for step in (1.0 / _FACTOR, _FACTOR):
@@ -251,7 +254,8 @@ def _intervals(
     logs do not determine have an interval as wide as their range.
     """
     searched = ranges(logs[0].actuator)
-    lowest, highest = searched.low[: len(values)], searched.high[: len(values)]
+    lowest = searched.low[: len(values)]
+    highest = searched.high[: len(values)]
     width = highest - lowest
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
     steps[FITTED:] = _BACKLASH_TURN * values[FITTED:]

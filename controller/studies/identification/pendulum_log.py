@@ -75,8 +75,17 @@ def read_pendulum_log(path: Path) -> PendulumLog:
         )
     actuator = str(data.get("motor", ""))
     return PendulumLog(
-        *(path, actuator, mass_kg, arm_m, p_gain, time_s - time_s[0]),
-        *(goal, position, volts, (torque > 0.0).astype(float), limit_a),
+        path,
+        actuator,
+        mass_kg,
+        arm_m,
+        p_gain,
+        time_s - time_s[0],
+        goal,
+        position,
+        volts,
+        (torque > 0.0).astype(float),
+        limit_a,
     )
 
 

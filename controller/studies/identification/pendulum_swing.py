@@ -49,7 +49,8 @@ def robot_swing_rad(
         step_s: of the simulation.
 
     """
-    motor, gear = motors_of(robot)[0], gears_of(robot)[0]
+    motor = motors_of(robot)[0]
+    gear = gears_of(robot)[0]
     weight_n_m = log.mass_kg * GRAVITY_M_S2 * log.arm_m
     plant = BenchPlant(
         1,
@@ -63,7 +64,9 @@ def robot_swing_rad(
     drive.p_gain_per_rad[:] = p_gain_per_rad(round(log.p_gain), motor)
     drive.current_limit_a[:] = log.current_limit_a
     drive.goal_rad[:] = log.goal_rad[0]
-    out, heard, last = np.empty_like(log.time_s), 0, len(log.time_s) - 1
+    out = np.empty_like(log.time_s)
+    heard = 0
+    last = len(log.time_s) - 1
     heard_s = log.time_s + bench["delay_s"]
     for k, until_s in enumerate(np.append(log.time_s[1:], log.time_s[-1])):
         out[k] = plant.position_rad[0]
@@ -90,8 +93,16 @@ def swing_rad(values: Floats, log: PendulumLog, step_s: float = FINE_S) -> Float
     _swing(
         values,
         values[_GEAR],
-        *(log.time_s, log.goal_rad, log.supply_v, log.torque_on),
-        *(log.position_rad[0], log.mass_kg, log.arm_m, log.p_gain, log.current_limit_a, step_s),
+        log.time_s,
+        log.goal_rad,
+        log.supply_v,
+        log.torque_on,
+        log.position_rad[0],
+        log.mass_kg,
+        log.arm_m,
+        log.p_gain,
+        log.current_limit_a,
+        step_s,
         out,
     )
     return out
@@ -117,14 +128,23 @@ def _swing(
     out: Floats,
 ) -> None:
     """Forces in the middle of a step; friction would stop the shaft in it, up to its greatest."""
-    kt, resistance, armature, offset = values[0], values[1], values[2], values[3]
-    viscous, p_unit, delay_s = values[12], values[13], values[14]
+    kt = values[0]
+    resistance = values[1]
+    armature = values[2]
+    offset = values[3]
+    viscous = values[12]
+    p_unit = values[13]
+    delay_s = values[14]
     shaft_kg_m2 = mass_kg * arm_m * arm_m
     inertia = shaft_kg_m2 + armature
     weight_n_m = mass_kg * GRAVITY_M_S2 * arm_m
-    has_play, play = gear[BACKLASH] > 0.0, np.zeros(3)
+    has_play = gear[BACKLASH] > 0.0
+    play = np.zeros(3)
     rotor_kg_m2 = max(armature, LEAST_ROTOR_KG_M2)
-    q, w, more, heard = start_rad, 0.0, 0.0, 0
+    q = start_rad
+    w = 0.0
+    more = 0.0
+    heard = 0
     out[0] = q
     for k in range(1, len(time_s)):
         span_s = time_s[k] - time_s[k - 1]
@@ -143,20 +163,31 @@ def _swing(
             push = damping = 0.0
             if torque_on[k - 1] > 0.0:
                 duty = min(max(p_gain * p_unit * (goal - q), -1.0), 1.0)
-                push, damping = kt / resistance * duty * supply_v[k - 1], kt * kt / resistance
+                push = kt / resistance * duty * supply_v[k - 1]
+                damping = kt * kt / resistance
                 amps = (push - damping * (play[SPEED] if has_play else w)) / kt
                 if abs(amps) > current_limit_a:
-                    push, damping = math.copysign(kt * current_limit_a, amps), 0.0
+                    push = math.copysign(kt * current_limit_a, amps)
+                    damping = 0.0
             motor = push - damping * w
             friction = friction_n_m(gear, w, motor, load) + viscous * abs(w)
             half = 0.5 * h * damping / inertia
             free = ((1.0 - half) * w + h * (push + load) / inertia) / (1.0 + half)
             rest = abs(free) - h * friction / (inertia * (1.0 + half))
-            before, w = w, math.copysign(rest, free) if rest > 0.0 else 0.0
+            before = w
+            w = math.copysign(rest, free) if rest > 0.0 else 0.0
             if has_play:
                 w, more = turn_with_backlash(
-                    *(gear, play, h, shaft_kg_m2, rotor_kg_m2, before, w),
-                    *(push, damping + viscous, load),
+                    gear,
+                    play,
+                    h,
+                    shaft_kg_m2,
+                    rotor_kg_m2,
+                    before,
+                    w,
+                    push,
+                    damping + viscous,
+                    load,
                 )
                 q += 0.5 * h * more
             q += 0.5 * h * w

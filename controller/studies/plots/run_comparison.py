@@ -31,9 +31,11 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
     with style():
         figure = Figure(figsize=(WIDTH_IN, 4.6 + 1.9 * len(panels)), layout="constrained")
         tracks, *rest = figure.subplots(
-            1 + len(panels), 1, squeeze=False,
+            1 + len(panels),
+            1,
+            squeeze=False,
             gridspec_kw={"height_ratios": [2.4, *([1.0] * len(panels))]},
-        )[:, 0]  # fmt: skip
+        )[:, 0]
         _draw_tracks(tracks, runs)
         for axes, (title, unit, key, values, times) in zip(rest, panels, strict=True):
             for number, (time_s, value) in enumerate(zip(times, values, strict=True)):

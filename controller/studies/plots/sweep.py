@@ -33,8 +33,16 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
             Line2D([], [], color=colours[robot], label=robot, marker="o", linestyle="")
             for robot in robots
         ]
-        ring = Line2D([], [], color=GREY, markersize=9, markerfacecolor="none", marker="o",
-                      linestyle="", label="default parameters")  # fmt: skip
+        ring = Line2D(
+            [],
+            [],
+            color=GREY,
+            markersize=9,
+            markerfacecolor="none",
+            marker="o",
+            linestyle="",
+            label="default parameters",
+        )
         figure.legend(handles=[*handles, ring], loc="outside upper center", ncols=4)
         save_picture(figure, path, dpi=110)
 

@@ -29,7 +29,9 @@ def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
     cells = [_place(row) for row in rows]
     names = [name for name in cells[0] if len({cell[name] for cell in cells}) > 1]
     values = {name: list(dict.fromkeys(cell[name] for cell in cells)) for name in names}
-    across, up, rest = names[:1], names[1:2], names[2:]
+    across = names[:1]
+    up = names[1:2]
+    rest = names[2:]
     panels = list(product(*(values[name] for name in rest)))
     columns, lines = (len(values[a[0]]) if a else 1 for a in (across, up))
     wide = min(len(panels), max(1, 8 // columns))
@@ -90,7 +92,13 @@ def _draw_cell(panel: Axes, x: int, y: int, row: CaseSummary) -> None:
     panel.add_patch(Rectangle((x - 0.48, y - 0.48), 0.96, 0.96, color=colour, linewidth=0))
     causes = [f"{count} {cause}" for cause, count in _shown_causes(row)]
     panel.text(
-        x, y + 0.3, f"{complete} of {row.runs}",
-        ha="center", va="center", fontsize=9, fontweight="bold", color=INK,
-    )  # fmt: skip
+        x,
+        y + 0.3,
+        f"{complete} of {row.runs}",
+        ha="center",
+        va="center",
+        fontsize=9,
+        fontweight="bold",
+        color=INK,
+    )
     panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=8.5, color=INK)

@@ -50,7 +50,8 @@ MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
 LEAST_S: Final = 4.0
 """A shorter log is not sufficient (ours)."""
-_DELAY_STEP_S, _USUAL_DELAY_S = 0.005, 0.005
+_DELAY_STEP_S = 0.005
+_USUAL_DELAY_S = 0.005
 """Simulated delay of the goals, and its usual deviation between a read and a write (ours)."""
 
 
@@ -151,7 +152,8 @@ class Diagnosis:
 
     def text(self, robot: RobotConfig) -> str:
         """Say it to a person."""
-        named, most = self.named, int(np.argmax(self.residual_a))
+        named = self.named
+        most = int(np.argmax(self.residual_a))
         if named is None:
             return (
                 "nothing differs from the shadow more than between robots that are well; most "
@@ -196,8 +198,10 @@ class Constants:
     """All possible differences as one vector: friction (2), loads (L), servos (J), slips (J)."""
 
     def __init__(self, robot: RobotConfig) -> None:
-        links, joints = robot.link_count, robot.joint_count
-        self._links, self._joints = links, joints
+        links = robot.link_count
+        joints = robot.joint_count
+        self._links = links
+        self._joints = joints
         mass_kg = robot.mean_link_mass_kg
         sizes = (2, links, joints, joints)
 
@@ -215,7 +219,8 @@ class Constants:
         self.causes: list[tuple[Cause, int | None, list[int]]] = [("friction", None, [0, 1])]
         first = 2
         kinds: tuple[tuple[Cause, int], ...] = (
-            *(("load", links), ("weaker servo", joints)),
+            ("load", links),
+            ("weaker servo", joints),
             ("slipped horn", joints),
         )
         for cause, count in kinds:
@@ -266,7 +271,8 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
         InputError: the log is too short, or the ground is not level.
 
     """
-    header, cycle = record.header, record.cycle
+    header = record.header
+    cycle = record.cycle
     world = header.world if world is None else world
     check_level(world)
     count = next((k for k, verdict in enumerate(cycle.verdict) if verdict == "veto"), None)
@@ -370,7 +376,8 @@ class Signatures:
                 refined[k] = self._refined(likely, apart, parts) if worth else explained
         # the residual of the best explanation is noise: it judges all of them
         likely = self._likelihood([apart, *(rest for _, rest, _ in refined.values())])
-        well, named = likely.of(apart), []
+        well = likely.of(apart)
+        named = []
         for k, (values, rest, slopes) in refined.items():
             cause, at, parts = constants.causes[k]
             evidence = likely.cause(rest, slopes, values, constants.faulty[parts]) - well
@@ -404,15 +411,18 @@ class Signatures:
         Gauss-Newton steps; the slopes follow by Broyden's update.
         """
         constants = self._constants
-        slopes, faulty = self._effects[:, parts], constants.faulty[parts]
-        values, changed = np.zeros(len(parts)), np.zeros(len(apart))
+        slopes = self._effects[:, parts]
+        faulty = constants.faulty[parts]
+        values = np.zeros(len(parts))
+        changed = np.zeros(len(apart))
         best = (-math.inf, values, apart, slopes)
         for _ in range(_REFINEMENTS):
             target = apart - changed + slopes @ values
             step = self._allowed(likely.best(target, slopes, faulty), parts) - values
             if np.abs(step / faulty).max() < _LEAST_STEP:
                 break
-            values, before = values + step, changed
+            values = values + step
+            before = changed
             changed = self._changed(parts, values)
             slopes = slopes + np.outer(changed - before - slopes @ step, step) / (step @ step)
             rest = apart - changed

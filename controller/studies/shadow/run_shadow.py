@@ -81,7 +81,8 @@ class ShadowAlarm:
         now = np.stack(
             [state.current_a - shadow.current_a, state.position_rad - shadow.position_rad]
         )
-        quick, slow = 1.0 / (self.cycle_hz * _SMOOTH_S), 1.0 / (self.cycle_hz * _MEMORY_S)
+        quick = 1.0 / (self.cycle_hz * _SMOOTH_S)
+        slow = 1.0 / (self.cycle_hz * _MEMORY_S)
         self._smooth += min(quick, 1.0) * np.where(state.valid, now - self._smooth, 0.0)
         self._square += min(slow, 1.0) * (self._smooth**2 - self._square)
         effect = self._slope * shadow.velocity_rad_s * self._late_s(state)
@@ -141,7 +142,8 @@ class RunShadow:
         on_event: Callable[[str, str], None],
     ) -> None:
         self._of = (run, robot, world)
-        self._log, self._on_event = log, on_event
+        self._log = log
+        self._on_event = on_event
         rows = round(MOST_S * run.cycle_hz) + 1
         self._rows: deque[tuple[float, Floats, Floats, Floats]] = deque(maxlen=rows)
         self._alarm = ShadowAlarm(robot, run.cycle_hz)

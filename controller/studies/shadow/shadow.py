@@ -37,7 +37,8 @@ class Shadow:
         deviation: Deviation = NO_DEVIATION,
     ) -> None:
         backend = simulated(run, robot, world, ground, initial_pose, deviation)
-        self._chain, self._clock = backend.chain, backend.clock
+        self._chain = backend.chain
+        self._clock = backend.clock
         self.head_pose = cast(Callable[[], BodyPose], backend.pose)
         """Pose of its head; a simulated body always has one."""
         self._lay_down = cast(Callable[[InitialPose], None], backend.lay_down)
