@@ -27,9 +27,12 @@ def shortest_tree(
 
     """
     count = len(starts) - 1
-    distance, before = np.full(count, np.inf), np.full(count, -9999, np.int64)
-    keys, nodes = np.empty(len(ends) + 1), np.empty(len(ends) + 1, np.int64)
-    settled, size = np.zeros(count, np.bool_), np.array([1])
+    distance = np.full(count, np.inf)
+    before = np.full(count, -9999, np.int64)
+    keys = np.empty(len(ends) + 1)
+    nodes = np.empty(len(ends) + 1, np.int64)
+    settled = np.zeros(count, np.bool_)
+    size = np.array([1])
     distance[source], keys[0], nodes[0] = 0.0, 0.0, source
     while size[0] > 0:
         yield _UNITS
@@ -54,11 +57,14 @@ def _settle(
     size: Ints,
 ) -> None:
     """Settle the next nodes; ``keys`` and ``nodes`` are a binary heap with ``size[0]`` entries."""
-    done, n = 0, size[0]
+    done = 0
+    n = size[0]
     while n > 0 and done < _SETTLED_IN_STEP:
         node = nodes[0]
         n -= 1
-        key, moved, at = keys[n], nodes[n], 0
+        key = keys[n]
+        moved = nodes[n]
+        at = 0
         while 2 * at + 1 < n:  # sift the last entry down from the top
             child = 2 * at + 1
             if child + 1 < n and keys[child + 1] < keys[child]:
@@ -73,7 +79,8 @@ def _settle(
         settled[node] = True
         done += 1
         for arc in range(starts[node], starts[node + 1]):
-            end, length = ends[arc], distance[node] + weights[arc]
+            end = ends[arc]
+            length = distance[node] + weights[arc]
             if length < distance[end]:
                 distance[end], before[end] = length, node
                 at = n

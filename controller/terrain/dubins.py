@@ -84,7 +84,10 @@ def _draw(start: Floats, pieces_m: Floats, bend_1_m: Floats, s_m: Floats, points
     """
     for k in range(len(s_m)):
         for i in range(s_m.shape[1]):
-            x, y, heading, left_m = start[k, 0], start[k, 1], start[k, 2], s_m[k, i]
+            x = start[k, 0]
+            y = start[k, 1]
+            heading = start[k, 2]
+            left_m = s_m[k, i]
             for piece in range(3):
                 length = min(left_m, pieces_m[k, piece])
                 left_m -= length
@@ -116,7 +119,8 @@ def dubins_curves(
     for kind, (first, middle, last) in enumerate(_TURNS):
         c0 = z0 + 1j * first * radius_m * np.exp(1j * h0)
         c1 = z1 + 1j * last * radius_m * np.exp(1j * h1)
-        apart, towards = np.abs(c1 - c0), np.angle(c1 - c0)
+        apart = np.abs(c1 - c0)
+        towards = np.angle(c1 - c0)
         if middle == 0.0:
             aside = (first - last) * radius_m
             there = apart >= abs(aside)
@@ -171,7 +175,9 @@ class PathTurns:
             joins: number of places.
 
         """
-        self.path, self._cost_per_m, self._least_per_m = path, cost_per_m, least_per_m
+        self.path = path
+        self._cost_per_m = cost_per_m
+        self._least_per_m = least_per_m
         self._headings_rad = np.atleast_1d(np.asarray(headings_rad, float))
         self._radius_m = radius_m
         self._s_m = np.linspace(0.0, until_m, joins)
@@ -184,13 +190,17 @@ class PathTurns:
         """Compute all Dubins curves, once."""
         if self._curves is not None:
             return self._curves
-        headings, s_m, path = self._headings_rad, self._s_m, self.path
+        headings = self._headings_rad
+        s_m = self._s_m
+        path = self.path
         yield 100
-        joins, times = len(s_m), len(headings)
+        joins = len(s_m)
+        times = len(headings)
         at_m = path.position(s_m)
         ahead = path.position(s_m + _STEP_M) - path.position(s_m - _STEP_M)
         direction = np.tile(np.arctan2(ahead[:, 1], ahead[:, 0]), times)
-        starts, goals = np.repeat(headings, joins), np.tile(at_m, (times, 1))
+        starts = np.repeat(headings, joins)
+        goals = np.tile(at_m, (times, 1))
         pieces = []
         for k in range(0, len(starts), _LAID_POSES):
             yield 700
@@ -222,7 +232,8 @@ class PathTurns:
         first = direction * count
         yield 100
         order = first + np.argsort(self._bound[first : first + count])
-        best, chosen = np.inf, int(order[0])
+        best = np.inf
+        chosen = int(order[0])
         for some in np.split(order, range(_BATCH, count, _BATCH)):
             if self._bound[some[0]] >= best:
                 break
@@ -232,7 +243,8 @@ class PathTurns:
             cost = cost * self._length_m[exist] + self._rest[exist]
             k = int(np.argmin(cost))
             if cost[k] < best:
-                best, chosen = float(cost[k]), int(exist[k])
+                best = float(cost[k])
+                chosen = int(exist[k])
         goal, kind = divmod(chosen, len(_TURNS))
         turn_m = self._length_m[chosen]
         at = np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M)))

@@ -58,7 +58,8 @@ class ElevationMap:
         x, y = np.rint((points_m[:, :2] - low) / spacing_m).astype(np.int64).T
         cell = y * columns + x
         order = np.lexsort((points_m[:, 2], cell))
-        cell, z_m = cell[order], points_m[order, 2]
+        cell = cell[order]
+        z_m = points_m[order, 2]
         cells, first, count = np.unique(cell, return_index=True, return_counts=True)
         chosen = first + _QUANTILE[height] * (count - 1)
         lower, upper = np.floor(chosen).astype(np.int64), np.ceil(chosen).astype(np.int64)
@@ -178,7 +179,8 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
     out = z_m[tuple(nearest)] - base
     index = np.where(holes, np.cumsum(holes).reshape(holes.shape) - 1, -1)
     count = int(holes.sum())
-    weight, right = np.zeros(count), np.zeros(count)
+    weight = np.zeros(count)
+    right = np.zeros(count)
     pairs = []
     for axis in (0, 1):
         below, above = (

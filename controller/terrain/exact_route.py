@@ -72,7 +72,8 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
         (int(a), int(b)): float(x)
         for a, b, x in zip(*(part[~np.isnan(edges.saddle_x_m)] for part in edges), strict=True)
     }
-    here, corners = start, [*lead, nodes_m[start]]
+    here = start
+    corners = [*lead, nodes_m[start]]
     while here != end:
         onward = int(towards[here])
         x = saddles.get((here, onward), saddles.get((onward, here)))
@@ -85,7 +86,8 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
 
 def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
     """Cells of the ground within the margin, or None."""
-    ground, margin = relief.ground, relief.config.edge_margin_m
+    ground = relief.ground
+    margin = relief.config.edge_margin_m
     lines = []
     points = np.stack([start, end])
     for axis, low in enumerate((ground.x0_m, ground.y0_m)):
@@ -111,7 +113,8 @@ def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
 
 def _edges(cells: _Cells) -> _Edges:
     """Sides of cells between safe corners, diagonals of safe cells, and paths over saddles."""
-    safe, number = cells.safe, np.arange(cells.safe.size).reshape(cells.safe.shape)
+    safe = cells.safe
+    number = np.arange(cells.safe.size).reshape(cells.safe.shape)
     corners = safe[:-1, :-1], safe[:-1, 1:], safe[1:, :-1], safe[1:, 1:]
     all_safe = corners[0] & corners[1] & corners[2] & corners[3]
     lower_left, lower_right = number[:-1, :-1], number[:-1, 1:]
@@ -151,7 +154,8 @@ def _saddles_m(cells: _Cells) -> Floats:
 
 def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tuple[Floats, Indices]:
     """Cost (n,) to the target and the next node (n,) towards it."""
-    there, back = np.empty(len(edges.a)), np.empty(len(edges.a))
+    there = np.empty(len(edges.a))
+    back = np.empty(len(edges.a))
     for begin in range(0, len(edges.a), _CHUNK):
         piece = slice(begin, begin + _CHUNK)
         from_m, to_m = nodes_m[edges.a[piece]], nodes_m[edges.b[piece]]

@@ -17,7 +17,8 @@ class Footprint:
     """Slopes in a disc of diameter ``footprint_m``; exact on samples, bilinear between them."""
 
     def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
-        self._ground, radius_m = ground, config.footprint_m / 2.0
+        self._ground = ground
+        radius_m = config.footprint_m / 2.0
         x, y = fitted_gradient(ground, config.slope_window_m)
         squares = [windowed_mean(ground, a * b, radius_m) for a, b in ((x, x), (x, y), (y, y))]
         mean_x, mean_y = fitted_gradient(ground, radius_m)

@@ -87,12 +87,17 @@ class GrowingMap:
         """
         self.pictures += 1
         cell, inside = self._cells(points_m)
-        cell, z_m, error_m = cell[inside], points_m[inside, 2], error_m[inside]
+        cell = cell[inside]
+        z_m = points_m[inside, 2]
+        error_m = error_m[inside]
         order = np.lexsort((z_m, cell))
-        cell, z_m, error_m = cell[order], z_m[order], error_m[order]
+        cell = cell[order]
+        z_m = z_m[order]
+        error_m = error_m[order]
         cells, first, count = np.unique(cell, return_index=True, return_counts=True)
         enough = count >= _LEAST_POINTS
-        cells, middle = cells[enough], (first + (count - 1) // 2)[enough]
+        cells = cells[enough]
+        middle = (first + (count - 1) // 2)[enough]
         self._fuse(cells, z_m[middle], np.maximum(error_m[middle], _LEAST_ERROR_M), time_s)
 
     def touch(self, points_m: Floats) -> None:
@@ -151,7 +156,8 @@ class GrowingMap:
         new = np.isnan(before_m)
         with np.errstate(invalid="ignore"):
             other = ~new & (np.abs(z_m - before_m) > _CONTRADICTS * np.hypot(error_m, was_m))
-        weight, was = error_m**-2.0, was_m**-2.0  # 0 for a new sample
+        weight = error_m**-2.0
+        was = was_m**-2.0  # 0 for a new sample
         joined_m = (weight * z_m + was * np.nan_to_num(before_m)) / (weight + was)
         joined_error_m = np.maximum((weight + was) ** -0.5, _LEAST_ERROR_M)
         nearer = other & (error_m < was_m)

@@ -105,7 +105,8 @@ class _Knowledge:
     """A map and its lazily built planners."""
 
     def __init__(self, ground: HeightField, config: PlannerConfig) -> None:
-        self._ground, self._config = ground, config
+        self._ground = ground
+        self._config = config
 
     @cached_property
     def cautious(self) -> TerrainPlanner:
@@ -127,11 +128,13 @@ class _Knowledge:
             within_m: distance from the head; farther ground counts as unknown.
 
         """
-        graph, relief = self.cautious.graph, self.cautious.relief
+        graph = self.cautious.graph
+        relief = self.cautious.relief
         if graph is None or relief is None or not len(graph.nodes_m):
             return points  # the planner reports this
         near = np.hypot(*(graph.nodes_m - points[0]).T) <= within_m
-        found, reach_m = [points[0]], _REACH_M
+        found = [points[0]]
+        reach_m = _REACH_M
         for point in points[1:]:
             costs = np.where(near, graph.costs_from(found[-1], reach_m), np.inf)
             node = graph.nearest(point)

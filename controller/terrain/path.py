@@ -72,7 +72,8 @@ class SplinePath:
         self, point_m: ArrayLike, from_s_m: float = 0.0, window_m: float = WINDOW_M
     ) -> float:
         """Arc length of the closest point in ``[from_s_m, from_s_m + window_m]``."""
-        at_s_m, gap_m = np.array([from_s_m]), np.empty(1)
+        at_s_m = np.array([from_s_m])
+        gap_m = np.empty(1)
         point = np.asarray(point_m, dtype=float)[None, :2]
         _project(self._s, self._xy, np.ascontiguousarray(point), at_s_m, gap_m, window_m)
         return float(at_s_m[0])
@@ -102,7 +103,8 @@ class SplinePath:
 
     def passes(self, points_m: ArrayLike) -> list[float]:
         """Arc lengths of the first closest approaches to points (n, 2), in their order."""
-        found, at_m = list[float](), 0.0
+        found = list[float]()
+        at_m = 0.0
         for point in np.asarray(points_m, dtype=float):
             at_m = self.first_pass(point, at_m)
             found.append(at_m)
@@ -125,12 +127,14 @@ def _project(
                 low = middle + 1
             else:
                 high = middle
-        least, best = np.inf, low
+        least = np.inf
+        best = low
         x, y = points_m[k, 0], points_m[k, 1]
         for mark in range(low, len(marks_m)):
             if mark > low and marks_m[mark] > end_m:
                 break
             square = (xy_m[0, mark] - x) ** 2 + (xy_m[1, mark] - y) ** 2
             if square < least:
-                least, best = square, mark
+                least = square
+                best = mark
         s_m[k], gap_m[k] = marks_m[best], np.sqrt(least)

@@ -96,7 +96,8 @@ class TerrainPlanner:
         number: int = 1,
     ) -> Steps[SplinePath]:
         """Plan as a call does, in steps."""
-        points, avoid = np.asarray(points_m, float), np.asarray(avoid_m, float).reshape(-1, 2)
+        points = np.asarray(points_m, float)
+        avoid = np.asarray(avoid_m, float).reshape(-1, 2)
         kept = _apart(points)
         self._numbers = [number - 1 + k for k in kept]
         if len(kept) < 2:
@@ -114,7 +115,7 @@ class TerrainPlanner:
         yield 300
         until_m = path.first_pass(points[1])
         turns = PathTurns(
-            *(path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, self._least_per_m)
+            path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, self._least_per_m
         )
         turn = yield from turns.cheapest_in_steps()
         yield 300
@@ -287,7 +288,8 @@ class TerrainPlanner:
 
     def _fault(self, k: int, point: Floats) -> list[str]:
         """Return the fault of the k-th point; 0 is the start."""
-        relief, graph = self.relief, self.graph
+        relief = self.relief
+        graph = self.graph
         if relief is None or graph is None or relief.safe(*point):
             return []
         node = graph.nearest(point)
@@ -307,7 +309,8 @@ class TerrainPlanner:
 
 def _apart(points: Floats) -> list[int]:
     """Indices of points (n, 2) that are apart: of close ones the first, or the end of the path."""
-    kept, last = [0], len(points) - 1
+    kept = [0]
+    last = len(points) - 1
     for k in range(1, last + 1):
         while k == last and len(kept) > 1 and _is_close(points, kept[-1], k):
             kept.pop()
@@ -322,7 +325,8 @@ def _is_close(points: Floats, j: int, k: int) -> bool:
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
     """Halve the sides of the polygon at unsafe places of the spline, and their neighbours."""
-    at, ends = 0.0, [0.0]
+    at = 0.0
+    ends = [0.0]
     for before, point in pairwise(points):
         at = path.nearest(point, at, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1)
         ends.append(at)
@@ -346,7 +350,8 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
         reach = relief.config.slope_window_m
         return f"is within {reach:g} m of ground that the world's map does not know"
     slope = np.degrees(float(relief.slope_rad(*point)))
-    variance, most = float(relief.variance_m2(*point)), relief.config.variance_limit_m2
+    variance = float(relief.variance_m2(*point))
+    most = relief.config.variance_limit_m2
     limit = np.degrees(relief.config.slope_limit_rad)
     return (
         f"is on unsafe ground: slope {slope:.1f} deg (limit {limit:.1f}), elevation variance "
@@ -379,17 +384,20 @@ def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:
     yield 200 + 2 * len(a)
     longest_m = float(np.hypot(*(nodes_m[b] - nodes_m[a]).T).max())
     samples = 1 + longest_m / SAMPLE_M
-    costs, safes = list[Floats](), list[Bools]()
+    costs = list[Floats]()
+    safes = list[Bools]()
     for k in range(0, len(a), pairs_in_step := max(1, int(_SAMPLES_IN_STEP / samples))):
         yield 1000
         some = slice(k, k + pairs_in_step)
         part, _, is_safe = graph.edge_cost(nodes_m[a[some]], nodes_m[b[some]], longest_m)
         costs.append(part)
         safes.append(is_safe)
-    cost, safe = np.concatenate(costs), np.concatenate(safes)
+    cost = np.concatenate(costs)
+    safe = np.concatenate(safes)
     yield 200 + len(a)
     cost = np.where(safe | (b - a == 1), cost, np.inf) + _CORNER_M * graph.length_weight
-    best, back = np.full(last + 1, np.inf), np.zeros(last + 1, dtype=int)
+    best = np.full(last + 1, np.inf)
+    back = np.zeros(last + 1, dtype=int)
     best[0] = 0.0
     for i, j, weight in zip(a.tolist(), b.tolist(), cost.tolist(), strict=True):
         if best[i] + weight < best[j]:

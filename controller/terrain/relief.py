@@ -88,7 +88,8 @@ class Relief:
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field, ``edge_margin_m`` or more from its border."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
-        ground, margin = self.ground, self.config.edge_margin_m - EDGE_TOLERANCE_M
+        ground = self.ground
+        margin = self.config.edge_margin_m - EDGE_TOLERANCE_M
         w, h = ground.size_m
         inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x) >= margin
         inside &= np.minimum(y - ground.y0_m, ground.y0_m + h - y) >= margin

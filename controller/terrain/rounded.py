@@ -35,7 +35,8 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
         pieces.append(corners_m[k : k + 1])
         if not free[k]:
             continue
-        back, onward = -sides[k - 1] / length[k - 1], sides[k] / length[k]
+        back = -sides[k - 1] / length[k - 1]
+        onward = sides[k] / length[k]
         reach = min(0.5 * length[k - 1], 0.5 * length[k], _MOST_M)
         for _ in range(_HALVINGS):
             bend = _bend(corners_m[k], back * reach, onward * reach)

@@ -48,7 +48,8 @@ class SafeGraph:
         """Slopes under the body, by which edges are weighed."""
         self.length_weight = relief.config.length_weight
         """Weight of a metre of path on level ground."""
-        ground, config = relief.ground, relief.config
+        ground = relief.ground
+        config = relief.config
         w, h = (size - 2.0 * config.edge_margin_m for size in ground.size_m)
         x = _centred(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
         y = _centred(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
@@ -70,8 +71,10 @@ class SafeGraph:
         """Return this graph with an extra cost within a footprint of places (k, 2)."""
         if len(places_m) == 0:
             return self
-        found, edges = copy(self), self._edges
-        found._avoid_m, found._trees = np.asarray(places_m, float), {}
+        found = copy(self)
+        edges = self._edges
+        found._avoid_m = np.asarray(places_m, float)
+        found._trees = {}
         yield 500
         rows = np.repeat(np.arange(len(self.nodes_m)), np.diff(edges.indptr))
         weights = edges.data.copy()
@@ -157,7 +160,8 @@ class SafeGraph:
         length = np.hypot(*(to_m - from_m).T)
         longest_m = float(length.max(initial=least_longest_m))
         count = max(2, int(np.ceil(longest_m / SAMPLE_M)) + 1)
-        part, at = np.linspace(0.0, 1.0, count), np.empty((len(from_m), count, 2))
+        part = np.linspace(0.0, 1.0, count)
+        at = np.empty((len(from_m), count, 2))
         for axis in range(2):  # numpy is slow with an innermost axis of two values
             step = np.multiply.outer(to_m[:, axis] - from_m[:, axis], part)
             np.add(from_m[:, axis, None], step, out=at[..., axis])
@@ -174,11 +178,15 @@ class SafeGraph:
 
     def _cost_per_m(self, points_m: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:
         """Cost (...) of a metre along unit vectors (..., 2), of one against, and the risk."""
-        ground, config = self._relief.ground, self._relief.config
+        ground = self._relief.ground
+        config = self._relief.config
         w, h = ground.size_m
         margin = config.edge_margin_m - EDGE_TOLERANCE_M
-        shape, count = points_m.shape[:-1], points_m[..., 0].size
-        there, back, risk = np.empty(count), np.empty(count), np.empty(count)
+        shape = points_m.shape[:-1]
+        count = points_m[..., 0].size
+        there = np.empty(count)
+        back = np.empty(count)
+        risk = np.empty(count)
         _weigh(
             self._layers,
             (ground.x0_m, ground.y0_m, ground.spacing_m),

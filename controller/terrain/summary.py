@@ -63,8 +63,10 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
     steepest = np.zeros(2)
     share = 1.0
     if planner.relief is not None and planner.graph is not None:
-        ground, at = planner.relief.ground, path.position(_samples(path))
-        surface, z = ground.slope_rad(*at.T), ground.elevation_m(*at.T)
+        ground = planner.relief.ground
+        at = path.position(_samples(path))
+        surface = ground.slope_rad(*at.T)
+        z = ground.elevation_m(*at.T)
         variance = planner.relief.variance_m2(*at.T)
         strip = ground.slope_rad(*(at[:, None] + _disc_m(planner.relief.config.footprint_m)).T)
         ahead = np.gradient(at, axis=0)

@@ -54,8 +54,10 @@ class WaypointTurns:
             radius_m: preferred radius of turns.
 
         """
-        self._cost_per_m, self._least = cost_per_m, least_per_m
-        self._safe, self._radius_m = safe, radius_m
+        self._cost_per_m = cost_per_m
+        self._least = least_per_m
+        self._safe = safe
+        self._radius_m = radius_m
 
     def __call__(self, path: SplinePath, waypoints_m: ArrayLike, *, any_start: bool) -> SplinePath:
         """Return the path with turns at sharp bends near its start or a waypoint.
@@ -78,7 +80,8 @@ class WaypointTurns:
         yield 500
         if path.length_m < _SHORTEST_M:
             return path
-        legs, turned = _legs(path, np.asarray(waypoints_m, float)), False
+        legs = _legs(path, np.asarray(waypoints_m, float))
+        turned = False
         for k in range(0 if any_start else 1, len(legs) + 1):
             yield 200
             if self._is_sharp(legs, k):
@@ -104,7 +107,8 @@ class WaypointTurns:
     def arrive_in_steps(self, leg: SplinePath, onward_m: Floats) -> Steps[SplinePath | None]:
         """Join a leg to a waypoint and the points (n, 2) after it by a safe turn, or None."""
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
-        to_m, backs = leg.piece_m(0.0, leg.length_m), np.array([back])
+        to_m = leg.piece_m(0.0, leg.length_m)
+        backs = np.array([back])
         found = yield from self._turned(to_m, None, backs, backs - np.pi)
         return None if found is None else SplinePath.tabulated(np.vstack([*found, onward_m[1:]]))
 
@@ -147,11 +151,13 @@ class WaypointTurns:
         for side in sides:
             yield from side.lay_in_steps()
         least = np.sum([side.least for side in sides], axis=0)
-        best, chosen = np.inf, list[Turn]()
+        best = np.inf
+        chosen = list[Turn]()
         for direction in np.argsort(least).tolist():
             if least[direction] >= best:
                 break
-            cost, turns = float(least[direction]), list[Turn]()
+            cost = float(least[direction])
+            turns = list[Turn]()
             for side in sides:
                 turn = yield from side.cheapest_in_steps(direction)
                 cost += turn.cost - side.least[direction]
@@ -159,7 +165,8 @@ class WaypointTurns:
                     break
                 turns.append(turn)
             else:
-                best, chosen = cost, turns
+                best = cost
+                chosen = turns
         return chosen
 
 
