@@ -107,7 +107,8 @@ class Analysis:
         [PT] 2.4 calls the absolute error proportional to it (Fig. 5(a)). Slope through the origin,
         points, and correlation, over all frames and points.
         """
-        error, slope = np.abs(self.pulse.body_error_rad), self.slope_rad
+        error = np.abs(self.pulse.body_error_rad)
+        slope = self.slope_rad
         seen = np.isfinite(error)
         if seen.sum() < 3 or min(np.ptp(error[seen]), np.ptp(slope[seen])) < 1e-12:
             return None
@@ -123,12 +124,15 @@ class Analysis:
 
     def facts(self) -> dict[str, Any]:
         """Plain numbers for the table and JSON; None if ``*_not_told`` has a reason."""
-        track, wave, pulse = self.track, self.wave, self.pulse
+        track = self.track
+        wave = self.wave
+        pulse = self.pulse
         u = pulse.points_per_frame
         known = np.isfinite(u)
         scale = track.rate_hz / track.angles_rad.shape[1]
         spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
-        angle, lateral = self.undulation.angle_rad, self.undulation.lateral
+        angle = self.undulation.angle_rad
+        lateral = self.undulation.lateral
         at = [0, 25, 50, 75, 99]
         no_wave, no_pulse = wave.unknown_reason, self.pulse_unknown_reason
         points, correlation = self.error_slope or (None, None)

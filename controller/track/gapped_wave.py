@@ -84,14 +84,16 @@ def _first_turns(number: Ints, components: Floats) -> float:
 def _refined(number: Ints, spans: list[Ints], components: Floats, first: float) -> float:
     """Frequency near ``first``, turns per frame, with the least residual over the spans."""
     spanned = [np.flatnonzero((number >= span[0]) & (number <= span[-1])) for span in spans]
-    best, reach = first, _REACH
+    best = first
+    reach = _REACH
     for _ in range(_ZOOMS):
         tried = np.clip(best * np.linspace(1.0 - reach, 1.0 + reach, _TRIED), 1e-6, 0.5)
         left = [
             sum(_squares_left(number[run], components[run], turns) for run in spanned)
             for turns in tried
         ]
-        best, reach = float(tried[int(np.argmin(left))]), 2.0 * reach / (_TRIED - 1)
+        best = float(tried[int(np.argmin(left))])
+        reach = 2.0 * reach / (_TRIED - 1)
     return best
 
 

@@ -78,7 +78,8 @@ def measure_pulse_speed(
     if step < 1 or most < 1 or points < NEIGHBOURS + 2 * most:
         raise ValueError(f"cannot look for shifts of {most} points over {step} frames on {points}")
     later, earlier = _pairs(number, step)
-    now, before = angles_rad[later], angles_rad[earlier]
+    now = angles_rad[later]
+    before = angles_rad[earlier]
     if not heading_known:
         before = before + _body_rotation(now, before)[:, None]
     best = np.full(now.shape, np.inf)
@@ -154,14 +155,16 @@ def _pairs(number: Ints, step: int) -> tuple[Ints, Ints]:
 def _fit(now: Floats, before: Floats, u: int) -> tuple[Floats, Floats]:
     """Best w in 0..1 and squared residual, (S, N), for the whole shift u; inf where unseen."""
     points = now.shape[1]
-    w, error = np.full(now.shape, np.nan), np.full(now.shape, np.inf)
+    w = np.full(now.shape, np.nan)
+    error = np.full(now.shape, np.inf)
     first, last = max(0, u), min(points, points - 1 + u)  # n with n - u and n + 1 - u on the body
     if last - first < NEIGHBOURS:
         return w, error
     start = before[:, first - u : last - u]
     rise = before[:, first - u + 1 : last - u + 1] - start
     off = now[:, first:last] - start
-    square, cross = _sums(rise**2), _sums(rise * off)
+    square = _sums(rise**2)
+    cross = _sums(rise * off)
     share = np.clip(cross / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
     middle = slice(first + NEIGHBOURS // 2, last - NEIGHBOURS // 2)
     w[:, middle] = share

@@ -50,7 +50,8 @@ def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | No
         if len(held) < 3:
             return None
         joints = np.asarray(held["joints_rad"], dtype=float)
-        rate_hz, name = float(held["rate_hz"]), str(held["robot"])
+        rate_hz = float(held["rate_hz"])
+        name = str(held["robot"])
     except (TypeError, ValueError, OSError):
         return None  # load_track raises with the reason
     if name != robot.name or joints.ndim != 2 or len(joints) < 2:

@@ -64,7 +64,9 @@ def joint_demand(joints_rad: Floats, time_s: Floats, rate_hz: float, wave_hz: fl
         raise ValueError("no two frames follow each other")
     runs = np.split(np.arange(len(time_s)), np.flatnonzero(~joins) + 1)
     width = rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz) if wave_hz > 0.0 else 0.0
-    speeds, accelerations, raw = [], [], 0.0
+    speeds = []
+    accelerations = []
+    raw = 0.0
     for run in runs:
         if len(run) < 2:
             continue

@@ -133,11 +133,14 @@ def track_from_points(
     every = 1 if uneven else common_step(number[whole])
     if every > 1:
         listed = (number - number[whole][0]) % every == 0
-        points, whole, number = points[listed], whole[listed], number[listed] // every
+        points = points[listed]
+        whole = whole[listed]
+        number = number[listed] // every
         status = [status[k] for k in np.flatnonzero(listed).tolist()] if status else ()
         rate_hz /= every
     elif not uneven and is_mostly_every_nth(number[whole]):
-        time_s, uneven = number / rate_hz, True
+        time_s = number / rate_hz
+        uneven = True
         rate_hz = 1.0 / float(np.median(np.diff(time_s[whole])))
     absent = _absent(number, time_s if uneven else None, rate_hz)
     dropped = int(len(points) - whole.sum())
@@ -228,7 +231,9 @@ def _between(
     Times next to a frame without a body, or in long gaps, get no body.
     """
     first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
-    bodies, numbers, nearest = [points[:0]], [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    bodies = [points[:0]]
+    numbers = [np.zeros(0, np.int64)]
+    nearest = [np.zeros(0, np.int64)]
     for run in np.split(first, np.flatnonzero(np.diff(first) > 1) + 1):
         if not run.size:
             continue

@@ -155,7 +155,8 @@ def _turns_a_frame(phasor: Floats) -> float:
     The phasor is smoothed over time, well above the resulting frequency. The first and the last
     cycle are tapered: the analytic signal treats a recording as periodic.
     """
-    turns, smooth = 0.5, phasor
+    turns = 0.5
+    smooth = phasor
     for step in range(_STEPS):
         if step:
             width = 1.0 / (2.0 * np.pi * CUT_CYCLES * max(abs(turns), 1.0 / len(phasor)))
@@ -176,7 +177,8 @@ def _headward(runs: Sequence[Floats], cycle: float) -> float:
     for curvature in runs:
         if len(curvature) < 2:
             continue
-        in_time, along = np.gradient(curvature, axis=0), np.gradient(curvature, axis=1)
+        in_time = np.gradient(curvature, axis=0)
+        along = np.gradient(curvature, axis=1)
         width = min(cycle, len(curvature)) / 8.0
         negative.append(gaussian_filter1d(-(in_time * along).sum(axis=1), width) < 0.0)
     return float(np.concatenate(negative).mean()) if negative else 0.0

@@ -93,7 +93,8 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
 def _unpacked_mat(data: bytes) -> int:
     """Size in bytes of a MATLAB file's unpacked content; each variable is packed separately."""
     order = "<" if data[126:128] == b"IM" else ">"
-    at, size = _MAT_HEAD, 0
+    at = _MAT_HEAD
+    size = 0
     while at + 8 <= len(data):
         kind, length = struct.unpack_from(f"{order}II", data, at)
         at += 8
@@ -107,7 +108,8 @@ def _unpacked_mat(data: bytes) -> int:
 
 def _unpacked(packed: memoryview) -> int:
     """Unpacked bytes of a zlib stream, counted piece by piece up to a fault."""
-    stream, size = zlib.decompressobj(), 0
+    stream = zlib.decompressobj()
+    size = 0
     rest: bytes | memoryview = packed
     try:
         while rest and size <= MOST_BYTES:

@@ -53,8 +53,10 @@ def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     notes = []
     if choice.keypoints is None and len(longest) < len(joints):
         beside = [joints[k].name for k in range(len(joints)) if k not in longest]
-        notes.append(f"{len(beside)} joints outside the longest chain are left out: "
-                     f"{', '.join(beside)}; --keypoints uses them")  # fmt: skip
+        notes.append(
+            f"{len(beside)} joints outside the longest chain are left out: "
+            f"{', '.join(beside)}; --keypoints uses them"
+        )
     kept = longest if choice.keypoints is None else list(range(len(joints)))
     notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")
     rate = rate_hz if rate_hz is not None else 1.0 / step_s
@@ -109,7 +111,8 @@ def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Fl
     """Number of frames, frame time, and all channel values."""
     text = [word.rstrip(":").upper() for word in words[:5]]
     stated = [number_or_none(word) for word in words[1:5]]
-    frames, step_s = stated[0] if stated else None, stated[3] if len(stated) > 3 else None
+    frames = stated[0] if stated else None
+    step_s = stated[3] if len(stated) > 3 else None
     if text[:1] != ["FRAMES"] or frames is None or step_s is None or not step_s > 0.0:
         raise InputError(f"{file}: expected Frames: N and Frame Time: S above 0 after MOTION")
     rows = words[5:]
@@ -128,7 +131,8 @@ def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Fl
 
 def _places(joints: list[_Joint], values: Floats) -> Floats:
     """(T, K, 3) places of the joints for channel values (T, C)."""
-    frames, column = len(values), 0
+    frames = len(values)
+    column = 0
     turns = np.empty((len(joints), frames, 3, 3))
     places = np.empty((frames, len(joints), 3))
     for k, joint in enumerate(joints):
@@ -154,7 +158,8 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
 
 def _about(axis: int, angle: Floats) -> Floats:
     turn = np.zeros((len(angle), 3, 3))
-    one, two = (axis + 1) % 3, (axis + 2) % 3
+    one = (axis + 1) % 3
+    two = (axis + 2) % 3
     turn[:, axis, axis] = 1.0
     turn[:, one, one] = turn[:, two, two] = np.cos(angle)
     turn[:, two, one], turn[:, one, two] = np.sin(angle), -np.sin(angle)

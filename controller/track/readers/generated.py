@@ -65,7 +65,9 @@ def _script(
     gain = np.full(count, figures.episodes[0].gain)
     waves = np.full(count, figures.episodes[0].waves or figures.waves)
     heading = np.zeros(count)
-    begin_s, last_gain, last_waves = 0.0, float(gain[0]), float(waves[0])
+    begin_s = 0.0
+    last_gain = float(gain[0])
+    last_waves = float(waves[0])
     for episode in figures.episodes:
         span_s = episode.cycles / figures.frequency_hz
         u = np.clip((at - begin_s) / span_s, 0.0, 1.0)
@@ -74,7 +76,9 @@ def _script(
         gain += (episode.gain - last_gain) * ease
         waves += (next_waves - last_waves) * ease
         heading += episode.turn_rad * ease
-        begin_s, last_gain, last_waves = begin_s + span_s, episode.gain, next_waves
+        begin_s = begin_s + span_s
+        last_gain = episode.gain
+        last_waves = next_waves
     rate = 2.0 * np.pi * figures.frequency_hz * waves / figures.waves
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(at))])
     return at, gain, phase, heading

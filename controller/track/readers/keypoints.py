@@ -140,7 +140,8 @@ class Keypoints:
             InputError: scores are missing, or too few points are left.
 
         """
-        file, least = self.file, self.least_score
+        file = self.file
+        least = self.least_score
         places = self.places[:, order]
         if len(places) < 2:
             raise InputError(f"{file}: holds {len(places)} frame; two or more are needed")

@@ -81,7 +81,8 @@ def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     if len(rows) < 6:
         raise InputError(f"{file}: expected the five head lines of a TRC, then rows")
     about = dict(zip((cell.strip() for cell in rows[1]), rows[2], strict=False))
-    unit, stated = about.get("Units", "").strip().lower(), number_or_none(about.get("DataRate", ""))
+    unit = about.get("Units", "").strip().lower()
+    stated = number_or_none(about.get("DataRate", ""))
     if unit not in UNITS:
         raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
     names = [cell.strip() for cell in rows[3][2:] if cell.strip()]

@@ -26,7 +26,8 @@ _UNLABELLED = re.compile(
 """Names that programs give to markers without a label: ``*17``, ``uname*4``, ``New 0012``."""
 _STILL = 0.02
 """Part of the others' usual way in which a marker counts as one that does not move (ours)."""
-_JOINED, _NEAR = 0.1, 3.0
+_JOINED = 0.1
+_NEAR = 3.0
 """Largest change of the distance to a neighbour on a body, and largest distance, in spacings of
 markers (ours)."""
 _FIRST_WORDS = {"NO_OF_FRAMES", "NO_OF_MARKERS", "FREQUENCY", "MARKER_NAMES", "DATA_INCLUDED"}
@@ -134,7 +135,8 @@ def projected(
                 f"{file}: {len(kept)} markers have a label and move, a body needs {FEWEST}; say "
                 f"--keypoints with those of the midline, head first, of {', '.join(names)}"
             )
-        names, places = [names[k] for k in kept], places[:, kept]
+        names = [names[k] for k in kept]
+        places = places[:, kept]
     return Keypoints(
         file,
         names,

@@ -53,7 +53,9 @@ def load_table(
         raise InputError(f"{file}: frame_idx must be given in every row")
     names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
     mine = np.array([name or _NO_TRACK for name in whose]) == choice.animal(file, names, names)
-    frame, xy, scores = frame[mine], xy[mine], None if scores is None else scores[mine]
+    frame = frame[mine]
+    xy = xy[mine]
+    scores = None if scores is None else scores[mine]
     order = _one_a_frame(file, frame, scores)
     return Keypoints(
         file,
@@ -154,7 +156,8 @@ def load_project(
             for one in about["skeletons"]
         ]
         tracks = [str(parse_json(_text(one))[1]) for one in held["tracks_json"][:]]
-        frames, instances = held["frames"][:], held["instances"][:]
+        frames = held["frames"][:]
+        instances = held["instances"][:]
         tables = {False: held["points"][:], True: held["pred_points"][:]}
         stated = _rate(held)
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:

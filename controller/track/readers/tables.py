@@ -84,7 +84,8 @@ def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, Fra
     """Status of each frame by its number; empty if the table does not state it."""
     if "status" not in column:
         return {}
-    frame, at = column["frame"], column["status"]
+    frame = column["frame"]
+    at = column["status"]
     words = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
     numbers = [float(row[frame]) for row in rows[1:]]
     found = statuses_named(words)

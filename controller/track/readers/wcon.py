@@ -190,12 +190,17 @@ _WORDS = {
     **{"kilo": 1e3, "mega": 1e6, "giga": 1e9},
 }
 _SHORT = {"m": ("m", 1.0), "in": ("m", 0.0254), "s": ("s", 1.0), "sec": ("s", 1.0)} | {
-    "min": ("s", 60.0), "h": ("s", 3600.0), "d": ("s", 86400.0)
-}  # fmt: skip
+    "min": ("s", 60.0),
+    "h": ("s", 3600.0),
+    "d": ("s", 86400.0),
+}
 _LONG = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
-    "micron": ("m", 1e-6), "second": ("s", 1.0), "minute": ("s", 60.0), "hour": ("s", 3600.0),
+    "micron": ("m", 1e-6),
+    "second": ("s", 1.0),
+    "minute": ("s", 60.0),
+    "hour": ("s", 3600.0),
     "day": ("s", 86400.0),
-}  # fmt: skip
+}
 
 
 def si_value(unit: str, dimension: str) -> float | None:
