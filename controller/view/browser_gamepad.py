@@ -111,7 +111,8 @@ def read_state(message: str | bytes) -> PadState | None:
     try:
         axes = [float(value) for value in row["axes"][: len(STICK)]]
         pressed = frozenset(k for k, down in enumerate(row["buttons"]) if down == 1)
-        name, standard = str(row["name"]), row["mapping"] == "standard"
+        name = str(row["name"])
+        standard = row["mapping"] == "standard"
     except (TypeError, KeyError, ArithmeticError) as fault:
         raise ValueError("no state of a gamepad") from fault
     if not all(math.isfinite(value) for value in axes):
@@ -178,14 +179,17 @@ class BrowserGamepad:
                 state = read_state(message)
             except ValueError:
                 return False
-            before, browser.state = browser.state, state
+            before = browser.state
+            browser.state = state
             was_down = before.pressed if before is not None else frozenset[int]()
             stops = state is not None and not (state.pressed - was_down).isdisjoint(STOP)
             is_first = state is not None and self._is_free
             if not is_late and (source == self._steers or is_first):
                 self._keys += _pressed(before, state)
                 self._steers = source if state is not None else None
-                self.state, self._told_s, self._is_new = state, now_s, True
+                self.state = state
+                self._told_s = now_s
+                self._is_new = True
         if stops:
             self.on_stop()
         return True
@@ -195,7 +199,9 @@ class BrowserGamepad:
         with self._lock:
             self._sources.pop(source, None)
             if source == self._steers:
-                self._steers, self.state, self._is_new = None, None, True
+                self._steers = None
+                self.state = None
+                self._is_new = True
 
     def commands(self) -> list[str]:
         """Keys pressed since the last call; then, if a state has come, whether it is held."""

@@ -33,7 +33,8 @@ class Dashboard:
     """Panels of one run."""
 
     def __init__(self, server: viser.ViserServer, header: Header) -> None:
-        self._robot, self._run = header.robot, header.run
+        self._robot = header.robot
+        self._run = header.run
         safety = header.run.safety
         self._limit_a = safety.current_limit_of_a(header.robot)
         self._evidence = header.pose_evidence
@@ -69,7 +70,8 @@ class Dashboard:
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):
             self.joint = gui.add_dropdown("joint", tuple(self._names))
-            goal, measured = colours.GOAL, colours.MEASURED
+            goal = colours.GOAL
+            measured = colours.MEASURED
             self._angle = _plot(gui, "angle, rad", {"goal": goal, "measured": measured})
             joints = _of_joints(self._names)
             self._current = _plot(gui, "current of all joints, A", joints, legend=False)
@@ -99,8 +101,10 @@ class Dashboard:
 
     def show_state(self, record: RunRecord, cycle: int, pose: int, text: str) -> None:
         """Show how the run is doing, in words."""
-        where, time_s = record.pose, float(record.cycle.time_s[cycle])
-        waypoints, reached = len(record.waypoints_at(time_s)), int(where.target[pose])
+        where = record.pose
+        time_s = float(record.cycle.time_s[cycle])
+        waypoints = len(record.waypoints_at(time_s))
+        reached = int(where.target[pose])
         facts = []
         if waypoints:
             facts.append(f"waypoint {min(reached + 1, waypoints)} of {waypoints}")
@@ -126,10 +130,12 @@ class Dashboard:
         """Show a row of bars for each servo; a check of a pose knows none."""
         if self._checks_pose:
             return
-        rows, period_s = record.cycle, 1.0 / self._run.cycle_hz
+        rows = record.cycle
+        period_s = 1.0 / self._run.cycle_hz
         heat, volts = np.full((2, self._robot.joint_count), np.nan)
         if slow is not None:
-            heat, volts = record.slow.temperature_c[slow], record.slow.voltage_v[slow]
+            heat = record.slow.temperature_c[slow]
+            volts = record.slow.voltage_v[slow]
         lines = []
         for joint, name in enumerate(self._names):
             age_s = rows.age_s[cycle, joint]
@@ -224,7 +230,8 @@ def _plot(
 
 def _apart_a(record: RunRecord, rows: np.ndarray) -> Floats:
     """Currents (n, J) of some cycles less those of the shadow; NaN where it has no row."""
-    time_s, shadow = record.cycle.time_s[rows], record.shadow
+    time_s = record.cycle.time_s[rows]
+    shadow = record.shadow
     at = np.minimum(np.searchsorted(shadow.time_s, time_s), len(shadow.time_s) - 1)
     same = (shadow.time_s[at] == time_s)[:, np.newaxis]
     return np.where(same, record.cycle.current_a[rows] - shadow.current_a[at], np.nan)
@@ -282,7 +289,8 @@ def _angle_bar(measured_rad: float, goal_rad: float, limit_rad: float) -> str:
         50.0 + 50.0 * min(max(value / limit_rad, -1.0), 1.0) if np.isfinite(value) else 50.0
         for value in (measured_rad, goal_rad)
     )
-    left, width = min(here, 50.0), abs(here - 50.0)
+    left = min(here, 50.0)
+    width = abs(here - 50.0)
     return _box(
         f"<div style='position:absolute;left:{left:.1f}%;width:{width:.1f}%;height:100%;"
         f"background:{_GOOD};opacity:.55'></div><div style='position:absolute;left:{goal:.1f}%;"

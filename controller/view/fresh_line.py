@@ -44,7 +44,8 @@ class Freshness:
 
     def take(self) -> float:
         """Earliest beginning of the messages since the last call; now without messages."""
-        since_s, self._since_s = self._since_s, None
+        since_s = self._since_s
+        self._since_s = None
         return self.now_s() if since_s is None else since_s
 
 
@@ -56,7 +57,8 @@ class FreshConnection(ServerConnection):
     ) -> None:
         """Open a connection; on ``late_paths`` late messages pass, and the receiver checks them."""
         super().__init__(*args, **options)
-        self._freshness, self._late_paths = freshness, late_paths
+        self._freshness = freshness
+        self._late_paths = late_paths
         self._pings_s: dict[bytes, float] = {}
         self._since_s = freshness.now_s()
         self._closing: asyncio.Task[None] | None = None

@@ -47,7 +47,8 @@ class GaitPanel:
     def show(self, name: str, values: dict[str, Any]) -> None:
         """Show what runs: the gait's name and its parameters."""
         changed = name != self._name
-        self._name, self._values = name, values
+        self._name = name
+        self._values = values
         if changed:
             self._collect()
             self._waiting.clear()  # they were of another gait
@@ -66,7 +67,8 @@ class GaitPanel:
         if not self._waiting or now_s - self._sent_s < _EVERY_S:
             return []
         self._sent_s = now_s
-        taken, self._waiting = self._waiting, {}
+        taken = self._waiting
+        self._waiting = {}
         return [f"{name}={value}" if value else name for name, value in taken.items()]
 
     def _build(self) -> None:
@@ -81,7 +83,8 @@ class GaitPanel:
             shown.on_update(self._command_of(name))
 
     def _input(self, name: str, span: Range) -> Any:
-        value, hint = _shown(self._values[name]), span.description or None
+        value = _shown(self._values[name])
+        hint = span.description or None
         if span.kind is bool:
             return self._gui.add_checkbox(name, bool(value), hint=hint)
         wide = span.high - span.low

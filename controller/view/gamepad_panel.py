@@ -39,7 +39,8 @@ class GamepadPanel:
 
     def show(self, *, steers: bool) -> None:
         """Show what the gamepad does: it stops the run, and where that is so steers it."""
-        state, stale = self._gamepad.state, self._gamepad.is_stale
+        state = self._gamepad.state
+        stale = self._gamepad.is_stale
         if state is None:
             text = (
                 _NONE if not self._needed else "The gamepad is gone: the body stands in its shape."

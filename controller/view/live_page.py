@@ -54,7 +54,8 @@ def serve(line: socket.socket, host: str, port: int) -> None:
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
     give_way()
     try:
-        gamepad, freshness = BrowserGamepad(), Freshness()
+        gamepad = BrowserGamepad()
+        freshness = Freshness()
         stop = StopElement(freshness)
         server, url = open_page(host, port, gamepad, stop, freshness=freshness)
     except OSError as fault:
@@ -84,11 +85,14 @@ class _LivePage:
         stop: StopElement,
         freshness: Freshness,
     ) -> None:
-        self._server, self._end, self._gamepad = server, end, gamepad
+        self._server = server
+        self._end = end
+        self._gamepad = gamepad
         gamepad.on_stop = lambda: self._stop.show(self._press("E-STOP of a gamepad"))
         self._gamepad_panel: GamepadPanel | None = None
         self._clock = WallClock()
-        self._stop, self._freshness = stop, freshness
+        self._stop = stop
+        self._freshness = freshness
         stop.press = self._press
         self._collected_s = freshness.now_s()
         self._button: PressedButton | None = None
@@ -209,7 +213,9 @@ class _LivePage:
             self._waypoint_panel = WaypointPanel(self._server, self._dashboard.tabs, self._scene)
 
     def _draw(self) -> None:
-        scene, dashboard, now_s = self._scene, self._dashboard, self._told_s
+        scene = self._scene
+        dashboard = self._dashboard
+        now_s = self._told_s
         if scene is None or dashboard is None:
             return
         names = (table.topic.name for table in (CycleTable, PoseTable, SlowTable))

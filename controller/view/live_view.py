@@ -64,7 +64,8 @@ class LiveView(ObserverProcess):
     def on_row(self, topic: str, row: bytes) -> None:
         """Accept a row of the log; returns at once."""
         if topic == PoseTable.topic.name and self._picture is not None:
-            picture, self._picture = self._picture, None
+            picture = self._picture
+            self._picture = None
             self._end.add(PICTURE, picture)
         self._end.add(topic, row)
 
@@ -105,7 +106,8 @@ def host_and_port(at: str) -> tuple[str, int]:
     """
     host, colon, port = at.rpartition(":")
     if not colon:
-        host, port = at, "8080"
+        host = at
+        port = "8080"
     if not host or not port.isdigit() or not 0 <= int(port) <= 65_535:
         raise InputError(f"--view-at {at}: expected HOST or HOST:PORT, e.g. 127.0.0.1:8080")
     return host, int(port)

@@ -34,13 +34,16 @@ class _Shown:
     drawn: tuple[object, ...] = ()
 
     def draw(self, since_s: float, *, curves: bool, again: bool = False) -> None:
-        record, board, scene = self.record, self.board, self.scene
+        record = self.record
+        board = self.board
+        scene = self.scene
         at_s = min(_begin_s(record) + since_s, float(record.cycle.time_s[-1]))
         state = (at_s, board.follow.value, board.goals.value, board.joint.value)
         if state == self.drawn and not again:
             return
         self.drawn = state
-        cycle, pose = _row(record.cycle.time_s, at_s), _row(record.pose.time_s, at_s)
+        cycle = _row(record.cycle.time_s, at_s)
+        pose = _row(record.pose.time_s, at_s)
         slow = _row(record.slow.time_s, at_s) if len(record.slow.time_s) else None
         follow = board.follow.value
         if not follow:
@@ -139,7 +142,8 @@ class LogPage:
         """Put the second log next to the first, or onto it; return whether that has changed."""
         if self._apart is None:
             return False
-        apart, other = self._apart.value, self._shown[1].scene
+        apart = self._apart.value
+        other = self._shown[1].scene
         if apart == self._is_apart:
             return False
         self._is_apart = apart

@@ -47,7 +47,8 @@ _LINE: Final = 3.0
 _FLOOR_M: Final = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
 _TRAIL_POINTS: Final = 400
-_SEEN_M, _RAY_STEP_M = 60.0, 0.02
+_SEEN_M = 60.0
+_RAY_STEP_M = 0.02
 """Reach of a click, and the steps in which the ground is searched (ours)."""
 
 
@@ -56,13 +57,16 @@ class BodyScene:
 
     def __init__(self, server: viser.ViserServer, header: Header, number: int = 0) -> None:
         """Draw ground and waypoints; ``number`` is that of the run in its page."""
-        self._server, self._scene, self._header = server, server.scene, header
+        self._server = server
+        self._scene = server.scene
+        self._header = header
         self._is_measured = header.pose_evidence.is_measured
         self._frames_body = False
         self._root = f"/run{number}"
         self.aside_m: Floats = np.zeros(3)
         """(3,) offset of all objects: for another run that is drawn next to it."""
-        self._robot, self._ground = header.robot, header.ground
+        self._robot = header.robot
+        self._ground = header.ground
         self._limit_a = header.run.safety.current_limit_of_a(header.robot)
         self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._paths = 0
@@ -96,7 +100,8 @@ class BodyScene:
 
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
         """Draw the body at a row of the cycles and of the poses."""
-        where, rows = record.pose, record.cycle
+        where = record.pose
+        rows = record.cycle
         spine = self._robot.link_count - 1
         head = BodyPose(0.0, where.head_m[pose], where.rotation[pose])
         if not np.isfinite(head.head_in_world_m).all():
@@ -206,7 +211,8 @@ class BodyScene:
         return self._cylinders(name, share * lengths_m, radii_m, colors)
 
     def _leg_links(self) -> viser.BatchedMeshHandle:
-        joints, limbs = self._robot.limb_joints, self._robot.limbs
+        joints = self._robot.limb_joints
+        limbs = self._robot.limbs
         lengths_m = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
         radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
         colors = self._colors[1 + np.arange(len(joints)) % 2].astype(np.uint8)

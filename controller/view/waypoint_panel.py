@@ -70,7 +70,8 @@ class WaypointPanel:
         return pressed
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
-        word, self._armed = ADD if event.modifier == "shift" else self._armed, ""
+        word = ADD if event.modifier == "shift" else self._armed
+        self._armed = ""
         if not word:
             return
         point_m = self._scene.ground_m(event.ray_origin, event.ray_direction)
