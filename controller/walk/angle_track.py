@@ -63,7 +63,8 @@ class AngleTrack:
         """
         if not self.points <= head <= self.end:
             raise ValueError(f"head at {head:.2f}; the track serves {self.points} to {self.end}")
-        first, part = int(head) - self.points, head % 1.0
+        first = int(head) - self.points
+        part = head % 1.0
         body = self._samples[first : int(head)][::-1]
         if part == 0.0:
             return body.copy()

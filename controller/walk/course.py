@@ -122,11 +122,13 @@ class Course:
         """(k, 2) in order."""
         self._goals_m: list[list[float]] = self.waypoints_m.tolist()  # plain numbers, for speed
         self._radius_m, self._length_m = radius_m, length_m
-        self._per_body, self._feedback = travel_per_body, feedback
+        self._per_body = travel_per_body
+        self._feedback = feedback
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._along_m = np.zeros(2)
         """Place of the body's centre on the path, and of its head."""
-        self._travel, self._replan_after = travel, 0.0
+        self._travel = travel
+        self._replan_after = 0.0
         self._gained_m, self._gained_at = 0.0, travel
         self._stalls_m: list[Floats] = []
         self._missed_before = -1
@@ -253,7 +255,8 @@ class Course:
         replanning = self._replanning
         if replanning is None or not replanning.carry_on():
             return
-        self._replanning, request = None, replanning.request
+        self._replanning = None
+        request = replanning.request
         self._replan_after = self._travel + _REPLAN_AFTER_BODIES * self._per_body
         if request.is_miss:
             self.replanned = request.why
@@ -275,7 +278,8 @@ class Course:
         If that piece is not clear (test of points (n, 2)), the new path begins at the head, in the
         body's direction. Without a new path the old one stays.
         """
-        path, along_m = self.path, float(self._along_m[1])
+        path = self.path
+        along_m = float(self._along_m[1])
         join_m = min(along_m + _KEPT_M, path.length_m)
         if self._passed_m[-1] <= join_m:
             return
@@ -291,7 +295,9 @@ class Course:
                     found.append(self._onward(at_m))
         best = min(found, key=lambda each: each.length_m, default=None)
         if best is not None and best.path is not path:
-            self.path, self._passed_m, self.replanned = best.path, best.passed_m, why
+            self.path = best.path
+            self._passed_m = best.passed_m
+            self.replanned = why
 
     @property
     def off_path_m(self) -> float:
@@ -312,7 +318,8 @@ class Course:
             InputError: as the planner; then nothing has changed.
 
         """
-        before, self._replanning = (self.waypoints_m, self._goals_m), None
+        before = (self.waypoints_m, self._goals_m)
+        self._replanning = None
         kept = self.waypoints_m[self.reached :]
         if np.array_equal(kept, left_m):
             return
@@ -322,7 +329,8 @@ class Course:
         try:
             if goes_on:
                 onward = self._onward(self.path.length_m)
-                self.path, self._passed_m = onward.path, onward.passed_m
+                self.path = onward.path
+                self._passed_m = onward.passed_m
             elif len(left_m):
                 self._lay(self._followers_m[1].copy(), heading_rad())
                 self._missed_before = -1
@@ -383,7 +391,8 @@ class Course:
 
     def _has_passed(self, centre_m: Floats) -> bool:
         """Whether the body is beyond the next waypoint on the path, which it did not come near."""
-        path, end_m = self.path, self.path.length_m
+        path = self.path
+        end_m = self.path.length_m
         along_m = float(self._along_m[0])
         if (
             along_m >= end_m - 1e-6
@@ -395,7 +404,8 @@ class Course:
 
     def _request(self, why: str, heading_rad: Callable[[], float], *, is_miss: bool) -> None:
         points_m = np.vstack([self._followers_m[1], self.waypoints_m[self.reached :]])
-        stalls_m, number = np.array(self._stalls_m).reshape(-1, 2), self.reached + 1
+        stalls_m = np.array(self._stalls_m).reshape(-1, 2)
+        number = self.reached + 1
         request = PathRequest(why, points_m, heading_rad(), stalls_m, number, is_miss)
         self._replanning = Replanning(request, self._plan)
 
@@ -420,7 +430,8 @@ class Course:
 
         A path on a partial map may end before a waypoint.
         """
-        passes, on = path.passes(waypoints_m), True
+        passes = path.passes(waypoints_m)
+        on = True
         for k, (waypoint, at) in enumerate(zip(waypoints_m, passes, strict=True)):
             on = on and float(np.hypot(*(path.position(at) - waypoint))) <= self._radius_m
             passes[k] = at if on else math.inf

@@ -52,10 +52,12 @@ class JointTrack:
 
         Its heads count from the start of the remaining track.
         """
-        other, first = copy.copy(self), max(first, self.first)
+        other = copy.copy(self)
+        first = max(first, self.first)
         left_out = first - self.track.points
         other.track = self.track.without(left_out)
-        other._q, other.first = self._q[first - self.first :].copy(), first - left_out
+        other._q = self._q[first - self.first :].copy()
+        other.first = first - left_out
         return other, left_out
 
     def restart(self) -> None:
@@ -94,7 +96,8 @@ class JointTrack:
         q = self._q[low:]
         if len(q) < 2:
             return np.zeros(1), np.zeros(1)
-        slope, turn = np.empty(len(q)), np.empty(len(q))
+        slope = np.empty(len(q))
+        turn = np.empty(len(q))
         _bends(q, slope, turn)
         skip = start - self.first - low
         return slope[skip:], turn[skip:]
@@ -123,7 +126,9 @@ def _spline(q: Floats, at: float, goal: Floats) -> None:
     last = len(q) - 1
     middle = int(min(max(np.rint(at), 0.0), float(last)))
     t = at - middle + 0.5
-    before, here, after = 0.5 * (1.0 - t) ** 2, 0.5 + t - t * t, 0.5 * t * t
+    before = 0.5 * (1.0 - t) ** 2
+    here = 0.5 + t - t * t
+    after = 0.5 * t * t
     for joint in range(len(goal)):
         own = q[middle, joint]
         low, high = q[max(middle - 1, 0), joint], q[min(middle + 1, last), joint]

@@ -38,7 +38,9 @@ class Landing(MotionWrapper, OnCourse):
         """
         OnCourse.__init__(self, swim.course)
         self._swim: SteeredGait | None = swim
-        self._make_walk, self._headway, self._on_ashore = make_walk, headway, on_ashore
+        self._make_walk = make_walk
+        self._headway = headway
+        self._on_ashore = on_ashore
         self._switch = SourceSwitch(robot, swim)
         MotionWrapper.__init__(self, self._switch)
         self._before: BodyView | None = None

@@ -67,7 +67,9 @@ class LiveCourse(MotionWrapper, OnCourse):
         """
         OnCourse.__init__(self, motion.course)
         MotionWrapper.__init__(self, motion)
-        self._motion, self._commands, self._check = motion, commands, check
+        self._motion = motion
+        self._commands = commands
+        self._check = check
         self._on_event = on_event
         self._refusals = Refusals(lambda why: on_event("refused", why))
         self._time_s = 0.0

@@ -36,9 +36,14 @@ class MapWalk(MotionWrapper, OnCourse):
         """
         OnCourse.__init__(self, pilot.course)
         MotionWrapper.__init__(self, pilot)
-        self._pilot, self._map, self._planner = pilot, ground_map, planner
-        self._change_ground, self._replan_m = change_ground, replan_m
-        self._pictures, self._planned_m, self._travel_m = ground_map.pictures, 0.0, 0.0
+        self._pilot = pilot
+        self._map = ground_map
+        self._planner = planner
+        self._change_ground = change_ground
+        self._replan_m = replan_m
+        self._pictures = ground_map.pictures
+        self._planned_m = 0.0
+        self._travel_m = 0.0
 
     @property
     def pulse_m_s(self) -> float:

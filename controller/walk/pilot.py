@@ -230,7 +230,9 @@ class Pilot(OnCourse):
         if self._asker is not None:
             self._asker.forget()
         self._time_law.restart()
-        self._pitch_rad, self._at_rest, self._decides = None, True, True
+        self._pitch_rad = None
+        self._at_rest = True
+        self._decides = True
         self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
         self._last_rad = self._earlier_rad = self._goal_rad
         self._last_s = self._earlier_s = self._saved_s = 0.0
@@ -325,9 +327,11 @@ class Pilot(OnCourse):
         return self._coasting_from(now, piece_rad)
 
     def _coasting_from(self, state: Coasting, piece_rad: Floats) -> "Pilot":
-        other, track = copy.copy(self), state.time_law.joints.track.with_piece(piece_rad)
+        other = copy.copy(self)
+        track = state.time_law.joints.track.with_piece(piece_rad)
         other._time_law, other._roll = state.time_law.on(track), copy.copy(state.roll)
-        other._pitch_rad, other._coasts = state.pitch_rad, True
+        other._pitch_rad = state.pitch_rad
+        other._coasts = True
         return other
 
     def _try_piece(self, pose: PathPose, piece_rad: Floats) -> Rolled:
@@ -374,7 +378,8 @@ class Pilot(OnCourse):
 
         Goals for the ground under the body now would be late.
         """
-        track, head_m = self._time_law.joints.track, view.link_m[0, :2]
+        track = self._time_law.joints.track
+        head_m = view.link_m[0, :2]
         headings_rad = view.headings_rad
         pulse = min(self._pitch_lead_s * self._time_law.speed_segments_s, track.end - self.head)
         if pulse <= 0.0:
@@ -395,7 +400,8 @@ class Pilot(OnCourse):
         return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
 
     def _path_table(self) -> TabulatedPath:
-        path, course = self.path, self.course
+        path = self.path
+        course = self.course
         made_of = path, course.reached
         if self._table is None or self._table_of != made_of:
             whole = np.arange(0.0, path.length_m, PATH_STEP_M)
@@ -407,7 +413,9 @@ class Pilot(OnCourse):
 
     def _aim(self, view: BodyView) -> tuple[float, float]:
         """Offset from track to world, and the aim's direction in the world."""
-        headings_rad, head_m, centre_m = view.headings_rad, view.link_m[0, :2], view.centre_m[:2]
+        headings_rad = view.headings_rad
+        head_m = view.link_m[0, :2]
+        centre_m = view.centre_m[:2]
         believed_rad = self._at_links(self._chooser.track.body_rad(self.head))
         offset = offset_rad(headings_rad, believed_rad)
         if self._start is None:

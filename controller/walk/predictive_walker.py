@@ -94,7 +94,9 @@ class PredictiveWalker:
         """
         if len(shapes_rad) == 0:
             raise ValueError("the walk needs at least one shape")
-        self._shapes, self._walk, self._accept = shapes_rad, walk, accept
+        self._shapes = shapes_rad
+        self._walk = walk
+        self._accept = accept
         self._star = StarVisits(len(shapes_rad))
         self.track = AngleTrack(shapes_rad[0])
         self.steering = make_steering(self.track)
@@ -133,7 +135,8 @@ class PredictiveWalker:
 
     def think_anew(self) -> None:
         """Discard the current thoughts and state."""
-        self._thinking, self._until = None, self._at
+        self._thinking = None
+        self._until = self._at
 
     def use_friction(self, friction: FrictionConfig) -> None:
         """Roll out with this friction from the next decision."""
@@ -155,7 +158,8 @@ class PredictiveWalker:
         if self._thinking is None:
             pose = look()
             self.steering.observe(pose)
-            self._tried, self._asked = [], []
+            self._tried = []
+            self._asked = []
             self._thinking = self._judge(pose)
         return next(self._thinking, False)
 
@@ -168,11 +172,13 @@ class PredictiveWalker:
         self._thinking = None
         best = self._answered_best(self._tried_best(pose, self._best()))
         self.outlook = best.progress
-        option, keep = best.option, self._keep
+        option = best.option
+        keep = self._keep
         if self._is_new:
             if option.state != SERPENOID:
                 self._star.take(option.state)
-            self._at, self._option = 0, option
+            self._at = 0
+            self._option = option
             wide = option.carrier if option.carrier in CLIMBING else None
             self._carrier_rad = 0.0 if wide is None else wide.amplitude_rad
             self._until = self._walked
@@ -182,7 +188,8 @@ class PredictiveWalker:
         self._at += keep
         self._bends = best.bends
         error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
-        near, seen = option.near, self._star.distinct
+        near = option.near
+        seen = self._star.distinct
         return Decision(option.state, error, float(bend), near, seen, self._carrier_rad)
 
     @property
@@ -346,7 +353,8 @@ class PredictiveWalker:
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
         """Possible next pieces: the rest of the current state, or new states."""
         if self._option is not None and not self._is_new:
-            state, going_on = self._option.state, self._option.wave_rad[self._at :]
+            state = self._option.state
+            going_on = self._option.wave_rad[self._at :]
             return [_Option(state, self._option.near, self._base_rad, going_on)]
         return self._new_options(pose, carrier)
 
@@ -354,7 +362,8 @@ class PredictiveWalker:
         self, pose: PathPose, carrier: SerpenoidParameters | None = None
     ) -> list[_Option]:
         """Other states: the smoothest of the first of W; serpenoids as a fallback."""
-        points, walk = self.track.points, self._walk
+        points = self.track.points
+        walk = self._walk
         if self._lost:
             return [self._serpenoid(each) for each in SERPENOIDS]
         share, at = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
@@ -373,7 +382,8 @@ class PredictiveWalker:
         ]
 
     def _serpenoid(self, carrier: SerpenoidParameters) -> _Option:
-        points, at = self.track.points, self._phase(carrier)
+        points = self.track.points
+        at = self._phase(carrier)
         waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
         base = self.track.last_rad - waves[0]
         return _Option(SERPENOID, 1, float(base), waves[1:], carrier, at)
@@ -412,7 +422,8 @@ def _bend(
     half = points // 2
     for c in range(len(pieces_rad)):
         for k in range(pieces_rad.shape[1]):
-            first, second = min(k + 1, half) / points, max(k + 1 - half, 0) / points
+            first = min(k + 1, half) / points
+            second = max(k + 1 - half, 0) / points
             turn = limit_rad * (bends[c, 0] * first + bends[c, 1] * second)
             pieces_rad[c, k] = bases_rad[c] + pieces_rad[c, k] + turn
 
@@ -428,7 +439,8 @@ def _roughness(tail_rad: Floats, angles_rad: Floats, span: int, rough: Floats) -
     row[: len(tail_rad)] = tail_rad
     for n in range(len(angles_rad)):
         row[len(tail_rad) :] = angles_rad[n]
-        slope, total = 0.0, 0.0
+        slope = 0.0
+        total = 0.0
         for k in range(len(row) - 2 * span):
             step = row[k + 2 * span] - 2.0 * row[k + span] + row[k]  # of the joint
             total += (step - slope) ** 2 if k > 0 else 0.0

@@ -71,8 +71,10 @@ class Replanning:
 
 
 def _steps(request: PathRequest, plan: PathPlanner) -> Steps[SplinePath | None]:
-    points_m, heading_rad = request.points_m, request.heading_rad
-    avoid_m, number = request.avoid_m, request.number
+    points_m = request.points_m
+    heading_rad = request.heading_rad
+    avoid_m = request.avoid_m
+    number = request.number
     try:
         if isinstance(plan, PlansInSteps):
             return (yield from plan.in_steps(points_m, heading_rad, avoid_m=avoid_m, number=number))

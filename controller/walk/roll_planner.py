@@ -66,7 +66,9 @@ class RollPlanner:
         safe: Callable[[Floats], bool] = lambda point_m: True,
     ) -> None:
         """``safe`` returns whether the body's centre (2,) may be at a place."""
-        self._robot, self._ground, self._safe = robot, ground, safe
+        self._robot = robot
+        self._ground = ground
+        self._safe = safe
         self.turn_m = 2.0 * np.pi * robot.body_radius_m
         """Way of one turn, without slip."""
 
@@ -114,7 +116,8 @@ class RollPlanner:
     def _plans(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, turn_rad: float = 0.0
     ) -> list[RollPlan]:
-        points, plans = walker.track.points, list[RollPlan]()
+        points = walker.track.points
+        plans = list[RollPlan]()
         ramp = np.arange(1, points + 1) / points
         arcs = walker.track.last_rad + ARCS_RAD[:, None] * ramp
         if turn_rad > 0.0:

@@ -89,8 +89,12 @@ class SideRolls(MotionWrapper, OnCourse):
         ``pulse_m_s``. ``on_event`` is called with the kind of an event, and a line of text.
         """
         OnCourse.__init__(self, pilot.course)
-        self._pilot, self._walker, self._robot, self._planner = pilot, walker, robot, planner
-        self._climb_progress, self._pulse_m_s = climb_progress, pulse_m_s
+        self._pilot = pilot
+        self._walker = walker
+        self._robot = robot
+        self._planner = planner
+        self._climb_progress = climb_progress
+        self._pulse_m_s = pulse_m_s
         self._on_event = on_event
         self._switch = SourceSwitch(robot, pilot)
         MotionWrapper.__init__(self, self._switch)
@@ -156,7 +160,8 @@ class SideRolls(MotionWrapper, OnCourse):
 
     def _consider(self, view: BodyView) -> None:
         """Plan a roll after the latest decision, if it climbs better."""
-        course, progress = self.course, self._walker.outlook
+        course = self.course
+        progress = self._walker.outlook
         if (
             course.complete
             or not course.astray
@@ -188,7 +193,8 @@ class SideRolls(MotionWrapper, OnCourse):
 
     def _best(self, view: BodyView, target_m: Floats) -> RollPlan | None:
         """Return the fastest roll to a target: on the twin if there is one, else on paper."""
-        pose, twin = self._pilot.path_pose(view), self._pilot.twin
+        pose = self._pilot.path_pose(view)
+        twin = self._pilot.twin
         if twin is None:
             return self._planner.best(pose, self._walker, target_m)
         if self._walker.outlook >= _SLOW:
@@ -207,7 +213,9 @@ class SideRolls(MotionWrapper, OnCourse):
             at_once=plan.at_once,
         )
         begin_m = least_m = float(np.hypot(*(view.centre_m[:2] - plan.target_m)))
-        time_s, best_m_s, turns = 0.0, 0.0, 1
+        time_s = 0.0
+        best_m_s = 0.0
+        turns = 1
         bodies = twin.bodies(roll.move, _LAID_S + JOIN_S + plan.turns / FREQUENCY_HZ)
         try:
             for body in bodies:
@@ -220,7 +228,8 @@ class SideRolls(MotionWrapper, OnCourse):
                     break
                 speed_m_s = (begin_m - to_go_m) / (time_s + _WALK_ON_S)
                 if speed_m_s > best_m_s and roll.turns > 0.0:
-                    best_m_s, turns = speed_m_s, max(1, round(roll.turns))
+                    best_m_s = speed_m_s
+                    turns = max(1, round(roll.turns))
         except RuntimeError:  # the twin diverged
             best_m_s = 0.0
         return replace(plan, speed_m_s=best_m_s, turns=turns)
@@ -264,7 +273,9 @@ class _RollOnTwin:
         self, pilot: Pilot, cycle: GaitCycle, robot: RobotConfig, *, at_once: bool
     ) -> None:
         """Accept a coasting pilot; ``at_once`` skips the track."""
-        self._pilot, self._cycle, self._robot = pilot, cycle, robot
+        self._pilot = pilot
+        self._cycle = cycle
+        self._robot = robot
         self._at_once = at_once
         self._roll: Blend | None = None
         self._rolled_s = 0.0
@@ -290,10 +301,13 @@ class _Rolling:
     """A roll under way."""
 
     def __init__(self, plan: RollPlan, frequency_hz: float, view: BodyView) -> None:
-        self._plan, self._hz, self._turns = plan, frequency_hz, plan.turns
+        self._plan = plan
+        self._hz = frequency_hz
+        self._turns = plan.turns
         self._start_m = view.centre_m
         self._highest_m = float(view.centre_m[2])
-        self._least_m, self._gained_s = np.inf, 0.0
+        self._least_m = np.inf
+        self._gained_s = 0.0
         self._roll_rad = body_roll_rad(view)
         self._turned_rad = self._time_s = 0.0
 
@@ -306,7 +320,8 @@ class _Rolling:
         self._highest_m = max(self._highest_m, float(view.centre_m[2]))
         to_target_m = float(np.hypot(*(view.centre_m[:2] - self._plan.target_m)))
         if to_target_m < self._least_m - _GAIN_M:
-            self._least_m, self._gained_s = to_target_m, self._time_s
+            self._least_m = to_target_m
+            self._gained_s = self._time_s
         if to_target_m > self._least_m + _LOST_M or self._time_s > self._gained_s + _GAIN_S:
             return True
         if view.centre_m[2] < self._highest_m - _DROP_M:

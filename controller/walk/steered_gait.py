@@ -63,7 +63,9 @@ class SteeredGait(OnCourse):
         super().__init__(course)
         assert gait.steered_by is not None
         self._key = gait.steered_by
-        self._gait, self._robot, self._carrot_m = gait, robot, carrot_m
+        self._gait = gait
+        self._robot = robot
+        self._carrot_m = carrot_m
         cycle = GaitCycle(gait, robot)
         self._rate_rad_s = cycle.rate_rad_s * rate_beside_turn(gait, self._key, robot, cycle.pace())
         self._turn = RateLimiter(np.zeros(1), TURN_RATE_PER_S, TURN_PER_S2)
@@ -102,7 +104,8 @@ class SteeredGait(OnCourse):
 
     def velocity_rad_s(self) -> Floats:
         """(J,) central difference over 4e-4 s of phase and turn."""
-        rate, half_s = self._rate_rad_s * self._stop_profile.rate, 2e-4
+        rate = self._rate_rad_s * self._stop_profile.rate
+        half_s = 2e-4
         turning = float(self._turn.speed_rad_s[0])
         before, after = (
             self._joints_rad(self._phase_rad + at_s * rate, self.turn + at_s * turning)
@@ -116,7 +119,8 @@ class SteeredGait(OnCourse):
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
         """Advance by ``dt_s`` and return the new targets (J,)."""
-        course, centre_m = self.course, view.centre_m[:2]
+        course = self.course
+        centre_m = view.centre_m[:2]
         heading_rad = view.heading_rad
         course.follow(centre_m, view.link_m[0, :2], lambda: heading_rad, self.cycles)
         course.continue_planning()

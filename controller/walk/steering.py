@@ -103,7 +103,8 @@ class Steering:
 
     def observe(self, pose: PathPose) -> None:
         """Compare the motion over the last span of pulse with its prediction."""
-        past, self._tree_of = self._past, None
+        past = self._past
+        self._tree_of = None
         past.append(pose)
         while len(past) > 2 and past[1].head <= pose.head - _SPAN_SEGMENTS:
             past.popleft()
@@ -129,7 +130,8 @@ class Steering:
         The common part of the pieces is rolled out once per pose.
         """
         if self._tree is None or self._tree_of is not pose:
-            self._tree, self._tree_of = self._begin(pose, self.drift, self._tree), pose
+            self._tree = self._begin(pose, self.drift, self._tree)
+            self._tree_of = pose
         return self._tree.roll(pieces_rad)
 
     def is_steep(self, pose: PathPose) -> bool:
@@ -157,7 +159,8 @@ class Steering:
 
     def cost(self, rolled: Rolled) -> tuple[Floats, Floats]:
         """Cost and progress of rollouts, as ``judge`` returns them."""
-        cost, progress = np.empty(len(rolled.columns)), np.empty(len(rolled.columns))
+        cost = np.empty(len(rolled.columns))
+        progress = np.empty(len(rolled.columns))
         _cost(rolled.columns, self._weights, self._cruise_m_s, cost, progress)
         return cost, progress
 
@@ -182,12 +185,18 @@ def _cost(
     columns: Floats, weights: Floats, cruise_m_s: float, cost: Floats, progress: Floats
 ) -> None:
     """Write the cost (C,) of ``Rolled``, and the progress relative to the cruise speed."""
-    off_path, end, head, heading_m = weights[0], weights[1], weights[2], weights[3]
-    pass_by, near_m, delay_m2 = weights[4], weights[5], weights[6]
+    off_path = weights[0]
+    end = weights[1]
+    head = weights[2]
+    heading_m = weights[3]
+    pass_by = weights[4]
+    near_m = weights[5]
+    delay_m2 = weights[6]
     for k in range(len(columns)):
         row = columns[k]
         progress[k] = row[ALONG] / (row[TIME] * cruise_m_s)
-        heading, beyond = heading_m * row[HEADING], max(row[PASSED] - near_m, 0.0)
+        heading = heading_m * row[HEADING]
+        beyond = max(row[PASSED] - near_m, 0.0)
         cost[k] = (
             off_path * row[OFF_PATH] * row[OFF_PATH]
             + end * row[END_OFF] * row[END_OFF]

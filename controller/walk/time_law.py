@@ -60,7 +60,8 @@ class TimeLaw:
         """
         other = copy.copy(self)
         other.joints, left_out = self.joints.recent(int(self.head) - segments)
-        other.head, other._first = self.head - left_out, self._first - left_out
+        other.head = self.head - left_out
+        other._first = self._first - left_out
         return other
 
     def restart(self) -> None:

@@ -68,7 +68,8 @@ class TwinAsker:
     """Asks about one robot, and stores the results of the last question."""
 
     def __init__(self, robot: RobotConfig, answers: TwinAnswers, friction: FrictionConfig) -> None:
-        self._robot, self._answers = robot, answers
+        self._robot = robot
+        self._answers = answers
         self.friction = friction
         """Friction of the ground that the twin is laid on."""
         self._seen: list[BodyView] = []
@@ -78,20 +79,28 @@ class TwinAsker:
 
     def observe(self, view: BodyView, dt_s: float) -> None:
         """Store the measured body, ``dt_s`` after the last."""
-        self._seen, self._cycle_s = [*self._seen[-1:], view], dt_s
+        self._seen = [*self._seen[-1:], view]
+        self._cycle_s = dt_s
 
     def forget(self) -> None:
         """Discard bodies and results, because the robot did not follow its track."""
-        self._seen, self._results = [], {}
+        self._seen = []
+        self._results = {}
 
     def ask(self, pose: PathPose, coasting: Coasting, pieces_rad: Sequence[Floats]) -> None:
         """Ask about pieces (n,) of track, from the robot's last two bodies."""
-        self._number, self._results = self._number + 1, {}
+        self._number = self._number + 1
+        self._results = {}
         bodies = tuple(seen_state(self._robot, view) for view in self._seen)
         if len(bodies) == 2:
             self._answers.ask(
                 TwinQuestion(
-                    *(self._number, bodies, self._cycle_s, self.friction, pose, coasting),
+                    self._number,
+                    bodies,
+                    self._cycle_s,
+                    self.friction,
+                    pose,
+                    coasting,
                     tuple(pieces_rad),
                 )
             )

@@ -36,7 +36,8 @@ class TwinRollout:
         self, robot: RobotConfig, make_twin: Callable[[], Twin], friction: FrictionConfig
     ) -> None:
         """``make_twin`` is called before each rollout; it may return the same twin."""
-        self._robot, self._make_twin = robot, make_twin
+        self._robot = robot
+        self._make_twin = make_twin
         self.friction = friction
         """Friction of the ground that the twin is laid on."""
         self._seen: list[BodyView] = []
@@ -67,7 +68,8 @@ class TwinRollout:
             move: called with the length of a cycle and the body; returns goals (J,).
 
         """
-        followed, view = Followed(pose.path, pose.path_at), self._seen[-1]
+        followed = Followed(pose.path, pose.path_at)
+        view = self._seen[-1]
         bodies = self.bodies(move, _LONGEST_S)
         while not is_over():
             found = next(bodies, None)
@@ -84,7 +86,9 @@ class TwinRollout:
 
         ``move`` as in ``roll``.
         """
-        twin, robot, view = self._make_twin(), self._robot, self._seen[-1]
+        twin = self._make_twin()
+        robot = self._robot
+        view = self._seen[-1]
         twin.use_friction(self.friction)
         before, before_rad = seen_state(robot, self._seen[0])
         now, now_rad = seen_state(robot, view)

@@ -35,7 +35,8 @@ class Walker:
 
         ``offset_rad`` rotates the track's angles to the world, the frame of ``aim_rad``.
         """
-        walk, track = self._walk, self.track
+        walk = self._walk
+        track = self.track
         placed = self._shapes + (track.last_rad - self._shapes[:, -1])[:, None]
         error = wrap(placed.mean(axis=1) + offset_rad - aim_rad)
         ranks, near = self._star.order(error, walk.heading_tolerance_rad, walk.nearest_count)
