@@ -276,7 +276,7 @@ class RolloutTree:
         before = self._make_room(count, length, steps)
         self._pieces[before : self._count] = pieces_rad
         out = np.empty((count, COLUMNS))
-        roll_pieces(
+        arguments = (
             self._samples,
             self._pieces[: self._count],
             before,
@@ -287,6 +287,7 @@ class RolloutTree:
             self._moving,
             out,
         )
+        roll_pieces(*arguments)
         return Rolled(out)
 
     def _make_room(self, count: int, length: int, steps: int) -> int:
