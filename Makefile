@@ -52,7 +52,7 @@ quick: setup
 	PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m tests.tiers
 
 slow: loops
-	$(PYTEST) -m slow --most-expensive 30
+	$(PYTEST) -m "slow and not nightly" --most-expensive 30
 
 # Each of them, with the reason that keeps it out of CI, is in docs/how-to/test-a-change.md.
 nightly: loops

@@ -11,7 +11,7 @@ from hypothesis import settings
 
 from snakewalk.controller.cli.main import leave_out_avx512
 
-pytest_plugins = ["tests.tiers.costs"]
+pytest_plugins = ["tests.tiers.cases", "tests.tiers.costs"]
 
 # numpy is not imported yet: tests and the programs that they start compute the same bits, on a
 # processor with AVX-512, too

@@ -2,13 +2,14 @@
 
 import ast
 from collections import Counter
-from pathlib import Path
+from collections.abc import Iterable
 
 import pytest
 
+from tests.helpers.library import library
+
 pytestmark = pytest.mark.costs("reads every source file")
 
-ROOT = Path(__file__).resolve().parents[2]
 PROPERTIES = ("needs", "done")
 METHODS = ("goal_rad", "velocity_rad_s", "pace")
 BASE = "MotionWrapper"
@@ -33,10 +34,10 @@ def forwarded(method: ast.FunctionDef) -> str | None:
     return None
 
 
-def by_hand(source: str) -> list[str]:
+def by_hand(nodes: Iterable[ast.AST]) -> list[str]:
     """Return the classes that forward two or more of the five to one attribute."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes:
         if not isinstance(node, ast.ClassDef) or node.name == BASE:
             continue
         methods = [each for each in node.body if isinstance(each, ast.FunctionDef)]
@@ -47,12 +48,7 @@ def by_hand(source: str) -> list[str]:
 
 
 def test_no_class_forwards_a_motion_source_by_hand() -> None:
-    files = sorted((ROOT / "controller").rglob("*.py"))
-    found = {
-        str(file.relative_to(ROOT)): names
-        for file in files
-        if (names := by_hand(file.read_text(encoding="utf-8")))
-    }
+    found = {module.name: names for module in library() if (names := by_hand(module.nodes))}
     assert found == {}, f"derive these classes from {BASE}"
 
 
@@ -68,5 +64,5 @@ class Copy:
         """(J,)"""
         return self._motion.goal_rad()
 '''
-    assert by_hand(planted) == ["Copy"]
-    assert by_hand(planted.replace("Copy", BASE)) == []
+    assert by_hand(ast.walk(ast.parse(planted))) == ["Copy"]
+    assert by_hand(ast.walk(ast.parse(planted.replace("Copy", BASE)))) == []

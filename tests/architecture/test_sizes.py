@@ -4,14 +4,13 @@ import ast
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
 import pytest
 
-from tests.architecture.layout import TOPS
+from tests.helpers.library import library
 
 pytestmark = pytest.mark.costs("reads every source file")
 
@@ -42,24 +41,14 @@ KERNELS: Final[dict[str, str]] = {
 """Compiled loops (file:function) that exceed the limit, each with its reason."""
 
 
-def files() -> Iterator[Path]:
-    for top in TOPS:
-        yield from sorted((ROOT / top).rglob("*.py"))
+def nodes_of(text: str) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(text)))
 
 
-def name(file: Path) -> str:
-    return file.relative_to(ROOT).as_posix()
-
-
-def text(file: Path) -> str:
-    return file.read_text(encoding="utf-8")
-
-
-@cache
-def functions(source: str) -> list[tuple[str, int, int]]:
+def functions(nodes: Iterable[ast.AST]) -> list[tuple[str, int, int]]:
     """Return name, lines and parameters of each function; ``self`` and ``cls`` do not count."""
     found = []
-    for node in ast.walk(ast.parse(source)):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             given = node.args
             named = [*given.posonlyargs, *given.args, *given.kwonlyargs]
@@ -69,24 +58,24 @@ def functions(source: str) -> list[tuple[str, int, int]]:
     return found
 
 
-def wide(source: str) -> list[str]:
+def wide(nodes: Iterable[ast.AST]) -> list[str]:
     """Return the functions with too many parameters."""
-    return [function for function, _, parameters in functions(source) if parameters > PARAMETERS]
+    return [function for function, _, parameters in functions(nodes) if parameters > PARAMETERS]
 
 
-def long(place: str, source: str) -> Iterator[str]:
+def long(place: str, text: str, nodes: Iterable[ast.AST]) -> Iterator[str]:
     """Yield what is longer than a reader likes, with its length."""
-    if (lines := len(source.splitlines())) > FILE_LINES:
+    if (lines := len(text.splitlines())) > FILE_LINES:
         yield f"{place}: {lines} lines"
-    for function, lines, _ in functions(source):
+    for function, lines, _ in functions(nodes):
         if lines > FUNCTION_LINES:
             yield f"{place}:{function}: {lines} lines"
 
 
-def function_imports(source: str) -> list[tuple[int, str]]:
+def function_imports(text: str, nodes: Iterable[ast.AST]) -> list[tuple[int, str]]:
     """Return line and reason of each import inside a function; an empty reason is missing."""
-    lines, found = source.splitlines(), {}
-    for function in ast.walk(ast.parse(source)):
+    lines, found = text.splitlines(), {}
+    for function in nodes:
         if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
             for node in ast.walk(function):
                 if isinstance(node, ast.Import | ast.ImportFrom):
@@ -97,25 +86,25 @@ def function_imports(source: str) -> list[tuple[int, str]]:
 
 def test_no_package_holds_over_a_fifth_of_the_library() -> None:
     lines: Counter[str] = Counter()
-    for file in files():
-        parts = file.relative_to(ROOT).parts
-        lines[".".join(parts[:2]) if len(parts) > 2 else parts[0]] += len(text(file).splitlines())
+    for module in library():
+        parts = module.name.split("/")
+        lines[".".join(parts[:2]) if len(parts) > 2 else parts[0]] += len(module.text.splitlines())
     crowded = {package: count / lines.total() for package, count in lines.items()}
     assert {p: round(s, 3) for p, s in crowded.items() if s > PACKAGE_SHARE} == {}
 
 
 def test_long_files_and_functions_are_warnings() -> None:
-    for file in files():
-        for found in long(name(file), text(file)):
+    for module in library():
+        for found in long(module.name, module.text, module.nodes):
             warnings.warn(found, stacklevel=1)
 
 
 def test_no_function_has_too_many_parameters() -> None:
     found = {
-        f"{name(file)}:{function}"
-        for file in files()
-        if file.parent.name != "commands"
-        for function in wide(text(file))
+        f"{module.name}:{function}"
+        for module in library()
+        if "/commands/" not in module.name
+        for function in wide(module.nodes)
     }
     assert found - set(KERNELS) == set()
     assert set(KERNELS) <= found, "an exempted loop is within the limit: remove it from the list"
@@ -124,7 +113,7 @@ def test_no_function_has_too_many_parameters() -> None:
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_only_compiled_loops_are_exempt(kernel: str) -> None:
     path, function = kernel.split(":")
-    for node in ast.walk(ast.parse(text(ROOT / path))):
+    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef) and node.name == function:
             decorators = {ast.unparse(each).split("(")[0] for each in node.decorator_list}
             assert decorators & {"compiled", "njit", "inlined", "wp.kernel"}
@@ -134,9 +123,9 @@ def test_only_compiled_loops_are_exempt(kernel: str) -> None:
 
 def test_few_imports_inside_functions_and_each_has_a_reason() -> None:
     found = {
-        f"{name(file)}:{line}": reason
-        for file in files()
-        for line, reason in function_imports(text(file))
+        f"{module.name}:{line}": reason
+        for module in library()
+        for line, reason in function_imports(module.text, module.nodes)
     }
     assert [place for place, reason in found.items() if not reason] == []
     assert len(found) <= FUNCTION_IMPORTS
@@ -144,9 +133,10 @@ def test_few_imports_inside_functions_and_each_has_a_reason() -> None:
 
 def test_planted_excesses_are_found() -> None:
     body = "\n".join(f"    x{k} = {k}" for k in range(FUNCTION_LINES))
-    assert list(long("a.py", f"def f():\n{body}\n")) == [f"a.py:f: {FUNCTION_LINES + 1} lines"]
+    text = f"def f():\n{body}\n"
+    assert list(long("a.py", text, nodes_of(text))) == [f"a.py:f: {FUNCTION_LINES + 1} lines"]
     many = ", ".join(f"p{k}" for k in range(PARAMETERS + 1))
-    assert wide(f"def wide({many}):\n    pass\n") == ["wide"]
-    assert wide(f"def method(self, {many[4:]}):\n    pass\n") == []
+    assert wide(nodes_of(f"def wide({many}):\n    pass\n")) == ["wide"]
+    assert wide(nodes_of(f"def method(self, {many[4:]}):\n    pass\n")) == []
     lazy = "def f():\n    import av  # noqa: PLC0415  an extra\n    import cv2  # noqa: PLC0415\n"
-    assert function_imports(lazy) == [(2, "an extra"), (3, "")]
+    assert function_imports(lazy, nodes_of(lazy)) == [(2, "an extra"), (3, "")]

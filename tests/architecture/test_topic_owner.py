@@ -2,27 +2,25 @@
 
 import ast
 from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 
 import pytest
 
 from snakewalk.controller.exchange import foxglove_scene, ros_messages
 from snakewalk.controller.runlog import row_line
 from snakewalk.controller.runlog.topics import TABLES
+from tests.helpers.library import library
 
 pytestmark = pytest.mark.costs("reads every source file")
 
-ROOT = Path(__file__).resolve().parents[2]
 
-
-def texts(tree: ast.AST) -> Iterator[str]:
-    for node in ast.walk(tree):
+def texts(nodes: Iterable[ast.AST]) -> Iterator[str]:
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.value
 
 
-def repeated(sources: dict[str, str]) -> set[str]:
+def repeated(texts_of_library: list[str]) -> set[str]:
     """Topics that are typed more than once in the library."""
     names = {table.topic.name for table in TABLES}
     for module in (foxglove_scene, ros_messages, row_line):
@@ -31,26 +29,20 @@ def repeated(sources: dict[str, str]) -> set[str]:
             for key, value in vars(module).items()
             if key.isupper() and isinstance(value, str) and value.startswith("/")
         }
-    found = Counter(
-        text for source in sources.values() for text in texts(ast.parse(source)) if text in names
-    )
+    found = Counter(text for text in texts_of_library if text in names)
     assert names == set(found), "each is typed somewhere"
     return {name for name, count in found.items() if count > 1}
 
 
 @pytest.fixture(scope="module")
-def library() -> dict[str, str]:
-    return {
-        str(file): file.read_text(encoding="utf-8")
-        for top in ("config", "drivers", "sim", "controller")
-        for file in (ROOT / top).rglob("*.py")
-    }
+def typed() -> list[str]:
+    return [text for module in library() for text in texts(module.nodes)]
 
 
-def test_no_topic_is_typed_a_second_time(library: dict[str, str]) -> None:
-    assert repeated(library) == set()
+def test_no_topic_is_typed_a_second_time(typed: list[str]) -> None:
+    assert repeated(typed) == set()
 
 
-def test_a_second_copy_is_found(library: dict[str, str]) -> None:
-    planted = library | {"copy.py": 'rows = {"/friction": []}'}
-    assert repeated(planted) == {"/friction"}
+def test_a_second_copy_is_found(typed: list[str]) -> None:
+    planted = texts(ast.walk(ast.parse('rows = {"/friction": []}')))
+    assert repeated([*typed, *planted]) == {"/friction"}

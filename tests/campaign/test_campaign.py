@@ -30,14 +30,16 @@ from tests.helpers.tiers import slow_after
 from tests.oracles.raw_positions import raw_positions
 
 
-@pytest.mark.parametrize("kind", slow_after(14, KINDS))
+@pytest.mark.slow_cases(8, "the campaign plays all kinds at night")
+@pytest.mark.parametrize("kind", slow_after(6, KINDS))
 def test_each_kind_of_fault(kind: str) -> None:
     whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)
     assert whole.complaints == []
     assert whole.violations == 0
 
 
-@pytest.mark.parametrize("kind", slow_after(4, CHANGES))
+@pytest.mark.slow_cases(4, "the campaign plays all changes at night")
+@pytest.mark.parametrize("kind", slow_after(2, CHANGES))
 def test_a_change_by_another_program_is_noticed_in_motion(kind: str) -> None:
     tally = run_scenario((kind,), 1, 130)
     assert tally.noticed
@@ -121,7 +123,7 @@ def test_only_what_names_a_change_counts_as_noticed(*, other: bool) -> None:
     assert (rig.changes.noticed, rig.changes.ended_otherwise) == ((0, 1) if other else (1, 0))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("the campaign plays all pairs at night")
 def test_some_pairs_of_faults() -> None:
     pairs = [kinds for kinds in SCENARIOS if len(kinds) == 2][::31]
     whole, by_kind = campaign([(kinds, k) for k, kinds in enumerate(pairs)], cycles=70)

@@ -130,7 +130,7 @@ def test_each_table_has_its_place_on_a_page(name: str) -> None:
     assert text.index(f"<!-- {mark} begins -->") < text.index(f"<!-- {mark} ends -->")
 
 
-@pytest.mark.costs("starts a program for each row")
+@pytest.mark.slow
 def test_a_command_that_prints_no_json_stops_the_table() -> None:
     with pytest.raises(SystemExit, match="snakewalk animal track nothing"):
         run_tables.snakewalk("animal", "track", "nothing.csv")

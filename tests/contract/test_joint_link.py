@@ -214,6 +214,7 @@ def tamper(lines: tuple[Line, ...], change: Callable[[bytes], list[bytes]] | Non
         line.tamper = change
 
 
+@pytest.mark.fast_cases(5)
 def test_enable_moves_nothing(backend: Backend) -> None:
     found = backend.link.enable()
     later = backend.cycles(25)
@@ -223,6 +224,7 @@ def test_enable_moves_nothing(backend: Backend) -> None:
     assert all(line.firmware.drive.torque_on.all() for line in backend.lines)
 
 
+@pytest.mark.fast_cases(5)
 def test_goals_are_followed(backend: Backend) -> None:
     start = backend.link.enable().position_rad
 
@@ -234,6 +236,7 @@ def test_goals_are_followed(backend: Backend) -> None:
     assert np.abs(state.velocity_rad_s).max() < 0.3
 
 
+@pytest.mark.fast_cases(5)
 def test_state_is_whole_and_read_only(backend: Backend) -> None:
     state = backend.link.enable()
     joints = backend.link.joint_count
@@ -250,6 +253,7 @@ def test_state_is_whole_and_read_only(backend: Backend) -> None:
     assert (state.voltage_v > 3.0).all()
 
 
+@pytest.mark.fast_cases(5)
 def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
     first = backend.link.enable()
     second = backend.cycles(5)
@@ -260,6 +264,7 @@ def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
     assert second.age_s.max() < PERIOD_S
 
 
+@pytest.mark.fast_cases(5)
 def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
     goal = backend.link.enable().position_rad.copy()
     goal[0] = np.nan
@@ -271,6 +276,7 @@ def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
     assert [line.bank["Goal Position"].tolist() for line in backend.lines] == sent
 
 
+@pytest.mark.fast_cases(5)
 def test_disable_may_come_at_any_time(backend: Backend) -> None:
     backend.link.disable()
     backend.link.enable()
@@ -280,6 +286,7 @@ def test_disable_may_come_at_any_time(backend: Backend) -> None:
     assert not any(line.firmware.drive.torque_on.any() for line in backend.lines)
 
 
+@pytest.mark.fast_cases(5)
 def test_enable_again_after_disable(backend: Backend) -> None:
     backend.link.enable()
     backend.cycles(5)
@@ -289,6 +296,7 @@ def test_enable_again_after_disable(backend: Backend) -> None:
     assert np.abs(later.position_rad - found.position_rad).max() < 0.02
 
 
+@pytest.mark.fast_cases(5)
 def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -307,6 +315,7 @@ def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
     assert backend.link.read().valid.all()
 
 
+@pytest.mark.fast_cases(5)
 def test_a_bent_answer_is_never_taken_for_a_value(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -326,6 +335,7 @@ def test_a_servo_with_an_alarm_is_not_enabled(backend: Backend) -> None:
     assert not any(each.firmware.drive.torque_on.any() for each in backend.lines)
 
 
+@pytest.mark.fast_cases(5)
 def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -340,6 +350,7 @@ def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -
             assert (line.bank["Bus Watchdog"] == 0xFF).all()
 
 
+@pytest.mark.fast_cases(5)
 def test_a_lost_port_is_an_error_that_says_so(backend: Backend) -> None:
     simulated(backend)
     backend.link.enable()

@@ -17,6 +17,7 @@ def test_the_page_describes_every_public_name_and_no_other() -> None:
     assert sorted(described) == sorted(snakewalk.__all__)
 
 
+@pytest.mark.slow
 def test_the_examples_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

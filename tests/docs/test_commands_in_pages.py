@@ -4,6 +4,7 @@ import ast
 import re
 import shlex
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from typer.core import TyperGroup
 from typer.testing import CliRunner
 
 from snakewalk.controller.cli.command_line import app
+from tests.helpers.library import library
 
 pytestmark = pytest.mark.costs("reads the help of every command")
 
@@ -42,6 +44,14 @@ LINES = sorted({(page.name, line) for page in PAGES for line in printed(page)})
 PROGRAM = typer.main.get_command(app)
 UsageError: Any = typer.BadParameter.__base__
 CONTEXT = PROGRAM.make_context("snakewalk", [], resilient_parsing=True)
+
+
+@cache
+def subcommand(group: Any, name: str) -> Any:
+    """Return a command of a group, which typer makes anew in each call."""
+    return group.get_command(CONTEXT, name)
+
+
 FAMILIES = [
     name
     for name in PROGRAM.list_commands(CONTEXT)  # type: ignore[attr-defined]
@@ -67,7 +77,7 @@ def take(line: str) -> None:
     context = command.make_context("snakewalk", [], resilient_parsing=True)
     while isinstance(command, TyperGroup) and words and not words[0].startswith("-"):
         name, *words = words
-        command = command.get_command(context, name)
+        command = subcommand(command, name)
         if command is None:
             raise UsageError(f"No such command {name!r}.")
     with suppress(typer.Exit):  # of --help and --version
@@ -100,7 +110,7 @@ def exists(words: str) -> bool:
     command: Any = PROGRAM
     for word in words.split():
         if isinstance(command, TyperGroup):
-            command = command.get_command(CONTEXT, word)  # type: ignore[arg-type]
+            command = subcommand(command, word)
     return command is not None
 
 
@@ -118,9 +128,10 @@ def test_every_command_that_a_page_names_exists() -> None:
 
 def test_every_command_that_a_help_or_a_message_names_exists() -> None:
     names = {
-        (file.name, words)
-        for file in (ROOT / "controller").rglob("*.py")
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        (module.name, words)
+        for module in library()
+        if module.name.startswith("controller/")
+        for node in module.nodes
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
         for words in named(node.value)
     }

@@ -2,6 +2,7 @@
 
 import re
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,13 @@ def added(page: Path) -> set[str]:
     return set(re.findall(r"^```python\n# (\S+\.py)$", text, re.MULTILINE))
 
 
+@cache
+def modules() -> set[str]:
+    """Return the names of all files of Python."""
+    return {file.name for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")}
+
+
+@cache
 def is_defined(dotted: str) -> bool:
     """Whether a dotted name is a module, a package, or a name that one of these holds."""
     parts = dotted.removeprefix("snakewalk.").split(".")
@@ -53,8 +61,7 @@ def test_files_and_modules_exist(page: Path) -> None:
     text = quoted(page)
     wrong = {path for path in PATH.findall(text) if not (ROOT / path).exists()} - added(page)
     files = (".toml", ".md", ".csv", ".npz", ".py")
-    modules = {file.name for folder in FOLDERS for file in (ROOT / folder).rglob("*.py")}
-    wrong |= set(re.findall(r"(?<![\w/.-])\w+\.py\b", text)) - modules - STANDARD - added(page)
+    wrong |= set(re.findall(r"(?<![\w/.-])\w+\.py\b", text)) - modules() - STANDARD - added(page)
     wrong |= {
         name for name in DOTTED.findall(text) if not name.endswith(files) and not is_defined(name)
     }

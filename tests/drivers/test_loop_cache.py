@@ -50,7 +50,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.costs("two interpreters that import and compile")
+@pytest.mark.slow
 def test_loops_go_to_the_folder_for_temporary_files(folder: Path) -> None:
     (folder / "__pycache__").touch()
     temporary = folder / "tmp"
@@ -65,6 +65,7 @@ def test_loops_go_to_the_folder_for_temporary_files(folder: Path) -> None:
     assert start(folder, TMPDIR=str(temporary)) == ["4.0 6.0 0"]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("an interpreter that imports and compiles")
 @pytest.mark.parametrize("case", ["a file", "others may write"])
 def test_without_any_folder_loops_are_compiled_at_each_start(folder: Path, case: str) -> None:
@@ -80,7 +81,7 @@ def test_without_any_folder_loops_are_compiled_at_each_start(folder: Path, case:
     assert "each start compiles them again; name a writable folder by NUMBA_CACHE_DIR" in told
 
 
-@pytest.mark.costs("three interpreters that import and compile")
+@pytest.mark.slow
 def test_stored_loops_serve_accounts_that_cannot_write_next_to_them(folder: Path) -> None:
     """Two accounts: with the folder for temporary files, and without any."""
     assert start(folder)[:2] == ["compiled", "4.0 6.0 1"]

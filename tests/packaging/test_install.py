@@ -34,6 +34,7 @@ case "$*" in *nosuch*) exit 1;; esac
 CONSTRAINED = "global.constraint='/etc/constraints.txt'"
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("told", "package", "by", "code"),
     [

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import typer
 
-from tests.architecture.layout import TOPS
+from tests.helpers.library import library
 
 ROOT = Path(__file__).resolve().parents[2]
 NOT_PROSE = ("CHANGELOG.md", "docs/decisions/")
@@ -55,17 +55,6 @@ def pages() -> Iterator[tuple[str, str]]:
                 yield name, paragraph
 
 
-@cache
-def sources() -> tuple[tuple[str, str, list[ast.AST]], ...]:
-    """Name, text and nodes of every file of the library."""
-    return tuple(
-        (file.relative_to(ROOT).as_posix(), text, list(ast.walk(ast.parse(text))))
-        for top in TOPS
-        for file in sorted((ROOT / top).rglob("*.py"))
-        for text in [file.read_text(encoding="utf-8")]
-    )
-
-
 def docstring_paragraphs(text: str) -> Iterator[str]:
     """Paragraphs and list items of a docstring, without code blocks and names of arguments."""
     block: list[str] = []
@@ -90,7 +79,7 @@ def docstring_paragraphs(text: str) -> Iterator[str]:
 
 def docstrings() -> Iterator[tuple[str, str]]:
     """Place and paragraph of docstrings, strings below attributes, and comments."""
-    for name, source, nodes in sources():
+    for name, source, _, nodes in library():
         for node in nodes:
             value = node.value if isinstance(node, ast.Expr) else None
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
@@ -103,7 +92,7 @@ def docstrings() -> Iterator[tuple[str, str]]:
 
 def messages() -> Iterator[tuple[str, str]]:
     """Place and text of the other strings of the library that have four words or more."""
-    for name, _, nodes in sources():
+    for name, _, _, nodes in library():
         skipped = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
         for node in nodes:
             if isinstance(node, ast.JoinedStr):

@@ -6,7 +6,7 @@ other tests too.
 
 ``--most-expensive N`` prints the N most expensive tests. ``--limit-costs`` fails if a test without
 ``@pytest.mark.costs("reason")`` is above ``LIMIT_S``. ``--write-costs FILE`` writes the CPU time of
-each test file that is above a second.
+each test file that needs a second or more; files that did not run keep their entry.
 """
 
 import builtins
@@ -169,10 +169,11 @@ class Table:
             files_s: Counter[str] = Counter()
             for name, spent_s in (*self._tests_s.items(), *self._shared_s.items()):
                 files_s[name.partition("::")[0]] += spent_s
-            files_s = Counter(
-                {name: round(s) for name, s in sorted(files_s.items()) if s > 1 and "/" in name}
-            )
-            Path(self._file).write_text(json.dumps(files_s, indent=1) + "\n", encoding="utf-8")
+            file = Path(self._file)
+            known_s = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+            new_s = {name: round(s) for name, s in (known_s | files_s).items()}
+            kept_s = {name: s for name, s in sorted(new_s.items()) if s >= 1 and "/" in name}
+            file.write_text(json.dumps(kept_s, indent=1) + "\n", encoding="utf-8")
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         out = terminalreporter

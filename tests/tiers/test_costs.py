@@ -75,12 +75,19 @@ def test_only_a_test_clearly_above_the_limit_fails_and_only_without_a_reason() -
         assert exit_status(costs) == expected
 
 
-def test_costs_of_files_above_a_second_are_written(tmp_path: Path) -> None:
-    costs = table(tmp_path / "cpu_s.json")
-    for cost_s in (0.6, 1.7):
+@pytest.mark.parametrize(("costs_s", "expected_s"), [((0.6, 1.7), 2), ((0.2, 0.1), None)])
+def test_costs_are_written_and_those_of_other_files_kept(
+    costs_s: tuple[float, ...], expected_s: int | None, tmp_path: Path
+) -> None:
+    file = tmp_path / "cpu_s.json"
+    file.write_text('{"tests/test_x.py": 7, "tests/test_z.py": 3}')
+    costs = table(file)
+    for cost_s in costs_s:
         costs.pytest_runtest_logreport(report(cost_s))
     exit_status(costs)
-    assert json.loads((tmp_path / "cpu_s.json").read_text()) == {"tests/test_x.py": 2}
+    written_s = json.loads(file.read_text())
+    assert written_s.pop("tests/test_z.py") == 3
+    assert written_s == ({} if expected_s is None else {"tests/test_x.py": expected_s})
 
 
 @pytest.mark.parametrize("arguments", [(), ("",), (3,)])

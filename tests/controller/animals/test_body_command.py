@@ -47,6 +47,7 @@ def refused(*words: str) -> str:
     return " ".join(done.stderr.split())
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("name", shipped("skins"))
 def test_every_shipped_skin_is_closed_and_mirrored(name: str) -> None:
     skin = body_skin(name, Cut(curves=20)).skin
@@ -148,7 +149,7 @@ def test_on_the_ground_the_skin_lies_as_deep_as_the_robots_belly(log: Path, tmp_
     assert bind - rest[:, 2].min() == pytest.approx(record.header.robot.body_radius_m, abs=1e-6)
 
 
-@pytest.mark.costs("deforms a mesh")
+@pytest.mark.slow
 def test_a_mesh_keeps_its_corners_and_colours_and_moves(tmp_path: Path) -> None:
     """Written, read back along other axes, animated: at rest the mesh is what was given."""
     made("trout", "-o", str(tmp_path / "trout.glb"))
@@ -187,6 +188,7 @@ def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) ->
     np.testing.assert_allclose(given.mean(axis=(0, 1)), copied.mean(axis=(0, 1)), atol=25.0)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("words", "fault"),
     [

@@ -442,6 +442,7 @@ def doctor(line: TestLine, kind: Kind | None = None, robot: RobotConfig = ROBOT)
     )
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_the_doctor_names_what_is_broken(kind: Kind) -> None:
     line = TestLine(**kind.line)  # type: ignore[arg-type]
@@ -452,6 +453,7 @@ def test_the_doctor_names_what_is_broken(kind: Kind) -> None:
     assert named[0].remedy
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("into_s", [0.0, 0.011, 0.024, 0.04])
 def test_a_supply_that_sags_is_named_whenever_the_wiggle_begins(into_s: float) -> None:
     """Simulated servos measured their voltage every 50 ms: half of all wiggles missed the sag."""

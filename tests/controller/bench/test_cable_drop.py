@@ -124,6 +124,7 @@ def test_a_simulated_chain_with_a_bad_plug_is_found_over_the_bus() -> None:
     assert "the one between servos 7 and 8 has 0." in found.found
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("name", ["yaw16", "xl330-16", "horcrux14", "printed12"])
 def test_shipped_robots_give_no_alarm(name: str) -> None:
     robot = load_robot(name)

@@ -137,7 +137,7 @@ class Bench:
         return calibrate(self.line, LIKE, self.onlooker, name="found", **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a complete calibration: 7 s of CPU")
 def test_a_chain_is_found_out_completely_and_then_walks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -110,6 +110,8 @@ def register(name: str, value: int) -> Callable[[FeetechLine], None]:
     return plant
 
 
+@pytest.mark.slow_cases(3, "a complete examination each: 1.4 s of CPU")
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("the doctor examines a chain")
 @pytest.mark.parametrize(
     ("plant", "check", "found"),

@@ -84,8 +84,9 @@ def trio(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
     return Trio(robot, line, like)
 
 
+@pytest.mark.slow_cases(1, "a complete calibration each: 10 to 30 s of CPU")
 @pytest.mark.slow
-@pytest.mark.parametrize("trio", ["STS3215", "SCS0009", "HLS3606"], indirect=True)
+@pytest.mark.parametrize("trio", ["HLS3606", "SCS0009", "STS3215"], indirect=True)
 def test_calibrate_finds_joints_signs_and_zeros(trio: Trio) -> None:
     result = trio.calibrate()
     assert result.exit_code == 0, result.output
@@ -128,7 +129,7 @@ def test_servos_without_homing_offset_keep_their_zeros_in_the_file(trio: Trio) -
     assert load_robot(str(trio.out)).zeros_rad == pytest.approx(trio.robot.zeros_rad, abs=0.01)
 
 
-@pytest.mark.costs("identifies servos at all rates")
+@pytest.mark.slow
 def test_bus_identify_lists_the_servos_and_writes_a_robot_file(trio: Trio) -> None:
     words = ["bus", "inventory", "--baud", "1000000", "--json", "-o", str(trio.out)]
     result = trio(*words)
@@ -142,6 +143,7 @@ def test_bus_identify_lists_the_servos_and_writes_a_robot_file(trio: Trio) -> No
     assert (robot.servo_ids, robot.servo.model) == ((4, 9, 30), "STS3215")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("servos", "feetech", "model"),
     [("1-3:STS3215", False, "STS3215"), ("1-3:XL330-M288", True, "XL330-M288")],

@@ -341,6 +341,7 @@ BESIDES = (
 """Kinds with a test of their own."""
 
 
+@pytest.mark.fast_cases(11)
 @pytest.mark.parametrize("kind", FURTHER, ids=lambda kind: kind.name)
 def test_the_doctor_names_further_faults(kind: Kind) -> None:
     line = TestLine(**kind.line)  # type: ignore[arg-type]
@@ -460,6 +461,7 @@ def test_the_page_lists_every_further_kind() -> None:
     assert [name for name, of in kinds if f"| {name} | `{of}`" not in page] == []
 
 
+@pytest.mark.fast_cases(10)
 @pytest.mark.parametrize("seed", range(20))
 def test_a_sound_bus_gives_no_alarm(seed: int) -> None:
     """Poses, temperatures and voltages as they may be, on a computer that is busy or not.

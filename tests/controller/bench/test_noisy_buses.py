@@ -53,6 +53,7 @@ NOISE = [
 ]
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("fault", NOISE, ids=lambda fault: "-".join(map(str, fault.values())))
 def test_noise_is_named_within_a_bounded_time_and_nothing_for_it(
@@ -103,6 +104,7 @@ def test_a_few_bytes_of_noise_are_a_warning() -> None:
     assert noise.remedy
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("of", ["answers", "both"])
 @pytest.mark.parametrize("kind", slow_after(2, ["corrupt", "truncate", "drop"]))
 def test_a_scan_of_a_bad_line_finds_nearly_all_and_each_at_its_own_rate(kind: str, of: str) -> None:

@@ -93,6 +93,7 @@ def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_pa
         )
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("the doctor examines two chains")
 @pytest.mark.parametrize(("servo_id", "limit"), [(2, "PWM Limit(36)"), (5, "PWM Limit(16)")])
 def test_the_doctor_names_the_registers_of_the_port(
@@ -125,7 +126,7 @@ def test_a_setting_is_written_on_the_port_of_its_servo(service: TwoMakes) -> Non
         assert line.bank["Return Delay Time"].tolist() == [0, 10, 0]
 
 
-@pytest.mark.costs("the doctor examines two chains")
+@pytest.mark.slow
 def test_identify_writes_a_robot_of_two_makes(service: TwoMakes, tmp_path: Path) -> None:
     file = tmp_path / "found.toml"
     done = service("bus", "inventory", "--baud", 1_000_000, "-o", file)

@@ -62,6 +62,7 @@ def call(*words: str) -> tuple[int, dict[str, object]]:
     return done.exit_code, found
 
 
+@pytest.mark.slow
 def test_the_simulated_camera_is_a_frame_late(tmp_path: Path) -> None:
     """The planted latency is the period of a frame: 50 ms; 4 s of it tell it within some 10."""
     run = tmp_path / "marked.toml"

@@ -67,6 +67,7 @@ def test_a_box_that_stays_becomes_floor() -> None:
     assert off_m(learnt, THERE, box=True) < 0.005
 
 
+@pytest.mark.slow
 def test_a_box_that_became_floor_and_is_taken_away_leaves_none_behind() -> None:
     learnt = watched(picture(HERE, box=True), HERE, 5.0, LEARN_S)
     assert off_m(learnt, THERE, box=False) < 0.005
@@ -78,6 +79,7 @@ def test_a_floor_that_is_not_to_be_learnt_stays_as_it_was_pictured() -> None:
     assert watched(picture(HERE, box=True), HERE, 2.0, 0.0) is FRESH
 
 
+@pytest.mark.slow
 def test_a_robot_that_stands_still_never_becomes_floor() -> None:
     image = picture(HERE, box=False)
     robot = np.abs(image.astype(int) - FLOOR).max(axis=2) > 25
@@ -87,6 +89,7 @@ def test_a_robot_that_stands_still_never_becomes_floor() -> None:
     assert off_m(learnt, HERE, box=False) < 0.005
 
 
+@pytest.mark.slow
 def test_nothing_is_learnt_while_the_robot_is_not_where_it_is_believed() -> None:
     gone = picture(THERE, box=True)
     assert watched(gone, HERE, 5.0, 5.0) is FRESH

@@ -65,6 +65,7 @@ def tracked(effect: Effect, seed: int) -> list[tuple[Floats, TrackedPose]]:
     return results
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     "effect",
     [shadow(0.2), cloth, hand, bands(0.6, hard=True), jpeg(20)],
@@ -164,6 +165,7 @@ def test_a_compressed_frame_shows_its_quality_and_is_closer_without_blocks(quali
     assert after < 0.97 * before
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("quality", [8, 10, 14, 18])
 def test_no_pose_of_a_strongly_compressed_frame_is_used_and_wrong(quality: int) -> None:
     """Rejected frames state the compression, its quality and the remedy."""

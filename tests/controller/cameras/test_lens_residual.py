@@ -49,6 +49,7 @@ def distortion_of(picture: Image, places: dict[int, tuple[float, float]]) -> flo
     return found.error_m if found.is_certain else 0.0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("places", [FIVE, FOUR], ids=["five", "four"])
 @pytest.mark.parametrize("width_px", [320, 640])
 def test_a_sound_lens_gives_no_warning(

@@ -67,7 +67,7 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     assert float(str(stated)) == pytest.approx(float(str(found["head_sigma_median_m"])), rel=0.5)
 
 
-@pytest.mark.costs("draws and searches a picture in every cycle of a run")
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn")
 def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_path: Path) -> None:
     small = SMALL | {"centre_m": (-0.62, 0.0), "field_width_m": 1.4}
@@ -195,6 +195,7 @@ def _gone(camera: DeviceCamera) -> str:
     return camera_text
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("change", "line"),
     [

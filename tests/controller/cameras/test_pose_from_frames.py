@@ -44,6 +44,7 @@ def state_at(time_s: float, joints: np.ndarray) -> JointState:
     return JointState(time_s, joints, still, still, still, still, none, none, still, read, still)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("heading", [0.0, 1.3, -2.6])
 @pytest.mark.parametrize("bend", [wave(0.45, 0.3), wave(0.3, 2.0, 0.45), np.full(16, 0.12)])
 def test_head_and_heading_are_found_to_a_third_of_a_pixel(heading: float, bend: np.ndarray) -> None:

@@ -37,6 +37,7 @@ def visited(scene: SnakeScene, present: range) -> tuple[list[Image], Floats]:
     return list(film(scene, np.where(seen[:, None, None], truth, truth + away))), truth
 
 
+@pytest.mark.slow_cases(1, "a film each: 5 s of CPU")
 @pytest.mark.costs("a film that the detector has to see as a whole")
 @pytest.mark.parametrize("kind", slow_except(["dark, rarely seen"], FILMS))
 def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None:

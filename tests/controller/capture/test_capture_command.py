@@ -121,7 +121,7 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
 
 
-@pytest.mark.costs("a film from its frames to the pictures")
+@pytest.mark.slow
 def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
     swim = write_film(tmp_path / "short.avi", film(replace(SCENE, frames=6)))
     track = tmp_path / "t.npz"

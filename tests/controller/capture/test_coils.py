@@ -80,7 +80,7 @@ def test_a_coil_with_which_the_film_ends_is_not_guessed(
     assert np.isnan(found.expected_px).all()
 
 
-@pytest.mark.costs("a film of a coil")
+@pytest.mark.slow
 def test_what_the_body_does_not_explain_is_told_apart(
     images: list[Image], coils: list[int]
 ) -> None:

@@ -49,6 +49,8 @@ def errors_px(scene: SnakeScene, seen: Capture) -> tuple[np.ndarray, np.ndarray]
     return np.array(off), seen.expected_px[used]
 
 
+@pytest.mark.slow_cases(2, "a film each: 2 s of CPU")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_except(["small, stained"], FILMS))
 def test_the_whole_body_is_found_and_its_expected_error_holds(name: str) -> None:
     scene = FILMS[name]
@@ -71,6 +73,7 @@ def test_a_shade_larger_than_the_animal_and_joined_to_it_is_not_the_animal() -> 
     assert abs(shaded.area_px - alone.area_px) < 0.1 * alone.area_px
 
 
+@pytest.mark.slow
 def test_a_background_that_shows_the_animal_is_refused_and_if_given_told() -> None:
     scene = replace(FILMS["camera that follows"], noise=1.0)
     frames = list(film(scene))

@@ -152,6 +152,7 @@ TAILS: dict[str, tuple[dict[str, Any], bool]] = {
 }
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", TAILS)
 def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
     change, expected = TAILS[kind]
@@ -190,6 +191,7 @@ CHANCE: dict[str, tuple[list[FrameStatus], int, bool]] = {
 }
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", CHANCE)
 def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_path: Path) -> None:
     used, count, rejected = CHANCE[kind]

@@ -50,7 +50,7 @@ def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capturing, "PART_FRAMES", 10)
 
 
-@pytest.mark.costs("a film in parts")
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_parts")
 def test_an_interrupted_capture_is_continued(
     frames: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -93,7 +93,7 @@ def test_an_interrupted_capture_is_continued(
         capture_recording(replace(options, resume=True))
 
 
-@pytest.mark.costs("a film in parts")
+@pytest.mark.slow
 @pytest.mark.usefixtures("short_parts")
 def test_parts_are_joined_with_the_head_first_in_all(frames: Path, tmp_path: Path) -> None:
     facts = capture_recording(options_of(frames, tmp_path))

@@ -33,6 +33,7 @@ def filmed(change: dict[str, Any]) -> tuple[Capture, list[float]]:
     return seen, off
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", HIDDEN)
 def test_the_expected_error_contains_a_hidden_tip(kind: str) -> None:
     seen, off = filmed(HIDDEN[kind])
@@ -46,6 +47,7 @@ def test_frames_with_a_hidden_tail_are_rough() -> None:
     assert set(seen.status) == {FrameStatus.ROUGH}
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", SEEN)
 def test_tips_that_are_seen_leave_frames_good(kind: str) -> None:
     seen, off = filmed(SEEN[kind])

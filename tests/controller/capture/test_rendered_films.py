@@ -41,6 +41,7 @@ def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     assert seen.head_by == "travel"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length_px", slow_except([130.0], [50.0, 130.0]))
 def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
     scene = replace(HARSH, length_px=length_px)
@@ -93,6 +94,7 @@ def test_the_user_may_say_where_the_head_is() -> None:
     assert all(swapped(found, true) for found, true in zip(seen.points_px, truth, strict=True))
 
 
+@pytest.mark.slow
 def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
     scene = replace(CLEAN, length_px=100.0)
     # the window's edge runs through the circle on which the animal swims
@@ -107,6 +109,7 @@ def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
     assert "cut by the edge of the image" in seen.counts
 
 
+@pytest.mark.slow
 def test_what_cannot_be_used_is_refused_in_one_line() -> None:
     scene = replace(CLEAN, length_px=80.0, frames=6)
     frames = list(film(scene))

@@ -153,6 +153,7 @@ def test_the_page_shows_all_animals(dish: tuple[Path, AnimalsFacts]) -> None:
     assert len(data["images"]) == 24
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("name", "wide"), [("t.csv", False), ("t.csv", True), ("t.wcon", False)])
 def test_tables_of_all_animals_are_read_back_identically(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path, name: str, wide: bool
@@ -187,7 +188,7 @@ def test_two_animals_in_a_film_of_one_are_rejected() -> None:
         capture(images, make_detector(images), 15.0)
 
 
-@pytest.mark.costs("rejects films after they are read")
+@pytest.mark.slow
 def test_what_does_not_fit_several_animals_is_rejected(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path
 ) -> None:

@@ -13,7 +13,7 @@ They are run as printed, in this process, with a budget that the pages do not sh
 What a line takes from its reader, a film or a map, is a small one under the printed name. A line
 that stood on an earlier page, and reads nothing of its own page, is not run again: its files are
 put there. ``NOT_RUN`` names what is left out. README is
-run always, commands.md and docs/start by ``make slow``, the other pages by ``make nightly``.
+run always, docs/start by ``make slow``, the other pages by ``make nightly``.
 """
 
 import re
@@ -409,7 +409,7 @@ def _parameter(page: Path) -> Any:
     name = str(page.relative_to(ROOT))
     if name == "README.md":
         return pytest.param(page, id=name)
-    if name == "docs/commands.md" or page.parent.name == "start":
+    if page.parent.name == "start":
         marks = pytest.mark.slow
     else:
         marks = pytest.mark.nightly("runs the commands of every page, with films and sweeps")

@@ -72,7 +72,7 @@ def avx512_loops() -> str:
     return " ".join(name for name in multiarray.__cpu_dispatch__ if _FOR_AVX512.search(name))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("four runs with other kernels of the processor: 14 s of CPU")
 @pytest.mark.skipif(
     platform.machine() not in {"x86_64", "AMD64"}, reason="the kernels are those of x86-64"
 )
@@ -99,7 +99,7 @@ def test_a_run_over_hills_leaves_the_same_bytes_whatever_kernel_multiplies(tmp_p
     assert all(log == logs[0] for log in logs)
 
 
-@pytest.mark.costs("starts two interpreters")
+@pytest.mark.slow
 @pytest.mark.skipif(
     platform.machine() not in {"x86_64", "AMD64"}, reason="other processors have no AVX-512"
 )

@@ -23,6 +23,7 @@ def completed(line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     return capsys.readouterr().out.split()
 
 
+@pytest.mark.fast_cases(7)
 @pytest.mark.parametrize(
     ("line", "offered"),
     [

@@ -49,6 +49,7 @@ def plain(info: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.fast_cases(12)
 @pytest.mark.parametrize("listed", COMMANDS, ids=lambda each: each.name)
 def test_the_declaration_equals_that_of_the_function(listed: Any) -> None:
     declared, function = declaration(listed.target), listed.load()

@@ -34,7 +34,8 @@ MODEL = f"""<mujoco><compiler angle="radian"/><worldbody><body pos="0 0 0.1"><fr
 GAIT = "lateral-undulation"
 SHORT = ("--seconds", "5", "--seeds", "1", "--workers", "1")
 PAGE = ("--view", "--view-at", "127.0.0.1:0")
-SLOW = pytest.mark.slow  # each needs a run or the pool of trials
+SLOW = pytest.mark.slow
+NIGHTLY = pytest.mark.nightly("trials in processes that all import planted files: 65 s of CPU")
 COMMANDS = [
     pytest.param(("robot", "import", "model.xml", "-o", "robot.toml"), id="import"),
     pytest.param(
@@ -42,14 +43,16 @@ COMMANDS = [
     ),
     pytest.param(("trials", "run", GAIT, *SHORT), id="trials", marks=SLOW),
     pytest.param(
-        ("gait", "sweep", GAIT, "--robot", "yaw16", "--points", "1"), id="sweep", marks=SLOW
+        ("gait", "sweep", GAIT, "--robot", "yaw16", "--points", "1"), id="sweep", marks=NIGHTLY
     ),
-    pytest.param(("gait", "tune", GAIT, "--budget", "16", "--seeds", "1"), id="tune", marks=SLOW),
-    pytest.param(("trials", "policy", GAIT, *SHORT), id="policy-trials", marks=SLOW),
+    pytest.param(
+        ("gait", "tune", GAIT, "--budget", "16", "--seeds", "1"), id="tune", marks=NIGHTLY
+    ),
+    pytest.param(("trials", "policy", GAIT, *SHORT), id="policy-trials", marks=NIGHTLY),
     pytest.param(
         ("gait", "policy", "learn", "-o", "p.toml", "--generations", "1", "--steps", "50"),
         id="policy-learn",
-        marks=SLOW,
+        marks=NIGHTLY,
     ),
 ]
 
@@ -104,7 +107,7 @@ def test_a_command_executes_no_file_of_the_working_folder(
     assert ended.returncode == 0, ended.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a whole run that imports planted files: 11 s of CPU")
 def test_the_ros_node_executes_no_file_of_the_working_folder(folder: Folder) -> None:
     pytest.importorskip("rclpy")
     ended = folder.run(folder.script, "ros", "--seconds", "0.1", "--out", "run")
@@ -112,7 +115,7 @@ def test_the_ros_node_executes_no_file_of_the_working_folder(folder: Folder) -> 
     assert ended.returncode == 0, ended.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a run, its shadow and an identification: 60 s of CPU")
 def test_studies_of_logs_execute_no_file_of_the_working_folder(folder: Folder) -> None:
     words = ["lateral-undulation", "--seconds", "6", "--no-film", "--out", "run"]
     assert folder.run(folder.script, "gait", "run", *words).returncode == 0
@@ -143,7 +146,7 @@ def test_the_drawing_of_a_served_bus_executes_no_file_of_the_working_folder(
     assert "drawn" in ended.stderr
 
 
-@pytest.mark.costs("starts a program in a folder of planted files")
+@pytest.mark.slow
 def test_the_main_process_drops_the_working_folder(folder: Folder) -> None:
     """``python -c`` puts it first; what is imported before the command runs is Python's matter."""
     code = (
@@ -199,7 +202,7 @@ def test_starting_a_child_leaves_the_environment_as_it_was(
     assert dict(os.environ) == before
 
 
-@pytest.mark.costs("starts a program in a folder of planted files")
+@pytest.mark.slow
 def test_numba_takes_no_cache_from_a_file_of_the_working_folder(tmp_path: Path) -> None:
     pytest.importorskip("yaml")
     (tmp_path / ".numba_config.yaml").write_text("cache_dir: /nowhere\n")

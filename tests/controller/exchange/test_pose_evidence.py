@@ -62,6 +62,7 @@ def test_parquet_states_it(known: RunRecord, tmp_path: Path) -> None:
     assert row["pose_heading_sd_rad"] == evidence.heading_rad
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("write", [write_foxglove_scene, write_ros_bag])
 def test_files_for_other_programs_state_it(known: RunRecord, write: object, tmp_path: Path) -> None:
     pytest.importorskip("rosbags")

@@ -44,6 +44,7 @@ def files_and_output(folder: Path, arguments: list[str]) -> dict[str, bytes]:
     return {"output": done.stdout.encode(), **files}
 
 
+@pytest.mark.slow_cases(2, "each command twice: 1 s of CPU")
 @pytest.mark.costs("runs commands twice")
 @pytest.mark.parametrize("command", slow_after(2, COMMANDS))
 def test_a_command_gives_the_same_bytes(

@@ -62,6 +62,7 @@ def test_a_bend_to_the_left_and_one_upwards_have_our_signs() -> None:
     assert (up[list(robot.pitch_joints)] > 0.1).all()
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(("name", "most_m"), [("alternating16", 0.011), ("alternating32", 0.003)])
 @pytest.mark.parametrize("hand", [1.0, -1.0])
 @pytest.mark.parametrize("roll_rad", [0.0, 0.7])
@@ -94,6 +95,7 @@ def test_first_step_is_the_closed_form_of_a_helix() -> None:
         assert np.hypot(*weights) == pytest.approx(amplitude, rel=2e-3)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_links_keep_their_length_and_joints_their_limits_on_any_curve(name: str) -> None:
     robot = load_robot(name)

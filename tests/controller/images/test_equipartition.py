@@ -161,6 +161,7 @@ def smooth(seed: int) -> Floats:
     return np.vstack([[0.0, 0.0], np.cumsum(step, axis=0)])
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("seed", [4, 10, 35, 37, 39, 47, 49, 50, 60, 79])
 def test_three_chords_are_found_on_every_smooth_body(seed: int) -> None:
     """By counted crossings none of these was divided: 18 of the first 150 seeds were refused."""
@@ -182,6 +183,7 @@ def test_the_path_of_the_proof_ends_at_an_equipartition(seed: int, n: int) -> No
     assert (np.diff(places) > 0.0).all()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
 def test_few_chords_divide_every_smooth_body(n: int) -> None:
     for seed in range(2000, 2012):
@@ -203,7 +205,7 @@ def test_a_hundred_chords_divide_a_zigzag(seed: int) -> None:
     assert on_curve(curve, found.points) < 1e-9
 
 
-@pytest.mark.costs("the hardest zigzag")
+@pytest.mark.slow
 def test_a_hundred_chords_divide_a_zigzag_with_too_many_branches_to_visit() -> None:
     """Turns of 1.5 rad: no branch was found for 13 of 60 before."""
     for seed in (3002, 3019):

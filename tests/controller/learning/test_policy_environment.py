@@ -56,7 +56,7 @@ def test_it_keeps_gymnasiums_form() -> None:
         _ = SnakeEnvironment().view
 
 
-@pytest.mark.costs("a search over generations")
+@pytest.mark.slow
 def test_a_search_gives_the_same_wave_for_the_same_seed() -> None:
     pytest.importorskip("cma")
 

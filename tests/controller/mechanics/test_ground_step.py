@@ -175,6 +175,7 @@ def trench(width_m: float) -> HeightField:
     )
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("radius_m", [0.07, 0.2])
 def test_a_bridged_trench_is_as_deep_as_the_ball_sinks_in(radius_m: float) -> None:
     found = bridged(trench(0.08), radius_m)
@@ -193,6 +194,7 @@ def test_bridging_never_digs_and_bridges_nothing_twice(seed: int, radius_m: floa
     np.testing.assert_allclose(bridged(once, radius_m).z_m, once.z_m, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_bridging_leaves_slopes_and_crests_as_they_are() -> None:
     plane = slope(0.3)
     inner = slice(1, -1)  # beyond its border a field goes on level

@@ -99,6 +99,7 @@ def test_the_other_assumptions_are_listed_with_their_source(record: RunRecord) -
     assert assumed["supply_v"]["source"] == f"robot {header.robot.name}"
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("words", "code", "source"),
     [

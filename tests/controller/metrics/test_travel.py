@@ -32,6 +32,7 @@ def climbing(record: RunRecord, gait: GaitConfig) -> RunRecord:
     return replace(record, header=header, pose=pose, events=())
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("name", "speed_m_s"), [("helix-pole", RISE_M_S), ("lateral-undulation", DRIFT_M_S)]
 )

@@ -191,7 +191,8 @@ def worst(robot: RobotConfig, seen: list[np.ndarray]) -> tuple[float, float]:
     )
 
 
-@pytest.mark.costs("joins every pair of motion sources")
+@pytest.mark.slow_cases(1, "joins every pair of motion sources of a robot: 10 s of CPU")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_all_pairs_of_sources_join_within_the_limits(name: str) -> None:
     robot = ROBOTS[name]
@@ -228,6 +229,7 @@ def test_chains_of_joins_at_any_time_stay_within_the_limits(data: st.DataObject)
     assert acceleration < STEP_TOLERANCE
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(data=st.data())
 def test_jumps_of_a_gaits_parameters_become_smooth(data: st.DataObject) -> None:

@@ -65,6 +65,7 @@ def test_the_wave_runs_as_fast_and_to_the_side_that_the_velocity_says() -> None:
     assert fast.events == [("command", "velocities, by gait lateral-undulation")]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("forward", [0.08, -0.08])
 def test_the_axis_bends_so_that_the_body_turns_at_the_rate(forward: float) -> None:
     bench, turn_rad_s = Bench(), 0.05

@@ -74,6 +74,7 @@ FAULTS: dict[str, tuple[Change, str]] = {
 }
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", FAULTS)
 def test_a_source_that_fails_is_named(kind: str) -> None:
     change, said = FAULTS[kind]
@@ -104,6 +105,7 @@ def test_a_pose_that_never_changes_is_stale() -> None:
     assert scene.pose.fault() is not None
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("change", "said"),
     [

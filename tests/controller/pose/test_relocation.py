@@ -53,6 +53,7 @@ def walked() -> Scene:
     return scene
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("rest_s", [np.inf, BEFORE_S, BEFORE_S + SLIDE_S])
 def test_a_body_that_slides_down_is_found_again(rest_s: float) -> None:
     scene, slide = walked(), Slide()
@@ -102,7 +103,7 @@ def test_markers_that_swap_after_a_slide_change_nothing() -> None:
     slide.assert_found(scene)
 
 
-@pytest.mark.costs("a simulated run")
+@pytest.mark.slow
 @pytest.mark.parametrize("gap_s", slow_after(1, [0.0, 0.3, 2.0]))
 def test_markers_that_swap_for_ever_are_never_believed(gap_s: float) -> None:
     """The run holds after a second, so the joints rest."""
@@ -122,6 +123,7 @@ def mirrored_place(time_s: float, sample: PoseSample) -> list[ArrivedPose | Pose
     return [moved(sample, MIRROR @ sample.position_m - sample.position_m)]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("a simulated run")
 @pytest.mark.parametrize("rest_s", [np.inf, 4.5])
 def test_a_mirrored_feed_is_never_believed(rest_s: float) -> None:

@@ -65,7 +65,7 @@ def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
     return run
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("two complete rehearsals: 34 s of CPU")
 def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> None:
     first, truth, _ = rehearsed(NOISY)
     second, again, _ = rehearsed(NOISY, name="again")

@@ -86,7 +86,7 @@ def test_bodies_lie_on_the_ground_and_near_ones_keep_their_length(
             np.testing.assert_allclose(steps, flat.mean(), rtol=1e-6)
 
 
-@pytest.mark.costs("plans a crowd")
+@pytest.mark.slow
 def test_they_wander_within_the_field_apart_from_each_other_and_alike_for_a_seed(
     repertoire: Repertoire, hills: HeightField
 ) -> None:
@@ -111,7 +111,7 @@ def test_a_ground_that_is_all_steep_is_refused(repertoire: Repertoire) -> None:
         Wandering(repertoire, steep, np.ones(3))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a film of many bodies: 11 s of CPU")
 def test_a_film_is_drawn(repertoire: Repertoire, hills: HeightField, tmp_path: Path) -> None:
     robot, world = load_robot("yaw16"), load_world("jacksboro-basin")
     scene = CrowdScene(repertoire, robot, hills, 8)

@@ -38,6 +38,7 @@ def test_plan_save_and_refuse_to_overwrite(repertoire: Repertoire, tmp_path: Pat
     assert [row["name"] for row in rows] == [segment.name for segment in repertoire.segments]
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -157,7 +157,7 @@ def test_no_turn_changes_the_direction_of_travel(
     assert control.missing(*asked) == missing
 
 
-@pytest.mark.costs("records the actions of a body")
+@pytest.mark.slow
 def test_slow_turns_and_turns_of_a_body_that_goes_backward(repertoire: Repertoire) -> None:
     slow = tuple(one for one in ACTIONS if one.frequency_hz == 0.4)
     robot, world = load_robot("yaw16"), load_world("flat")

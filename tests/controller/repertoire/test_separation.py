@@ -26,7 +26,7 @@ def gap_m(one: Floats, other: Floats) -> float:
     return float(np.linalg.norm(a[:, None] - b[None], axis=2).min())
 
 
-@pytest.mark.costs("a crowd wanders")
+@pytest.mark.slow
 def test_two_bodies_that_meet_head_on_stop_before_they_touch(repertoire: Repertoire) -> None:
     fast = repertoire.index("forward-fast")
     free, apart = (Crowd(repertoire, 2) for _ in range(2))

@@ -104,7 +104,7 @@ class _Blank:
         return self._black
 
 
-@pytest.mark.costs("draws a film")
+@pytest.mark.slow
 def test_film_and_page_come_from_the_log_alone(make: Make, tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     log = make(tmp_path / "run.mcap", seconds=0.7, ground="hills")

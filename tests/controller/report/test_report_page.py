@@ -86,7 +86,7 @@ def test_a_run_that_never_began_has_a_page(make: Make, tmp_path: Path) -> None:
     assert "0 of 4" in page_path.read_text(encoding="utf-8")
 
 
-@pytest.mark.costs("draws a whole report")
+@pytest.mark.slow
 def test_a_run_that_hardly_began_has_a_page_and_always_the_same(make: Make, tmp_path: Path) -> None:
     log = make(tmp_path / "run.mcap", seconds=0.02, ground="hills")
     first = build_report(read_log(log), tmp_path / "a").read_bytes()

@@ -98,6 +98,7 @@ def texts(finished: RunResult, kind: str) -> list[str]:
     return [event.text for event in finished.record.events if event.kind == kind]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("pose", "frame", "variance"),
     [("simulator", "world", 1e-6), ("joints", "odom", 1e6)],
@@ -167,7 +168,7 @@ def test_velocities_move_the_body_and_stop_it_when_they_are_stale(
     assert moved_m[0] > 0.1
 
 
-@pytest.mark.costs("starts a ROS client in another process")
+@pytest.mark.slow
 def test_a_goal_pose_leads_a_live_run_elsewhere(client: Client, tmp_path: Path) -> None:
     graph = Graph(goals=True)
     goals = client.node.create_publisher(PoseStamped, "/goal_pose", 10)

@@ -498,7 +498,7 @@ def test_servos_on_a_port_are_moved_and_switched_off(
     assert bus["Goal Position"][1] - 2048 == pytest.approx(0.4 * 4096 / (2 * np.pi), abs=40)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("starts the node and a served bus: 12 s of CPU")
 def test_the_command_moves_servos_on_a_port_and_the_service_switches_them_off(
     servo_bus: Callable[..., ServoBus], client: Client, tmp_path: Path
 ) -> None:

@@ -24,7 +24,7 @@ def ran(folder: Path, *, compliance: bool | None, name: str = "pegs-undulation")
     )
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_joints_yield_and_the_log_tells_by_how_much(tmp_path: Path) -> None:
     stiff, soft = ran(tmp_path / "a", compliance=False), ran(tmp_path / "b", compliance=None)
     assert stiff.summary.yield_max_rad is None

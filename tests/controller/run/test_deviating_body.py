@@ -27,7 +27,7 @@ def current_a(folder: Path, **told: float) -> float:
     return float(np.sqrt((cycle.current_a[cycle.time_s > cycle.time_s[0] + 1.5] ** 2).mean()))
 
 
-@pytest.mark.costs("runs of two bodies")
+@pytest.mark.slow
 def test_friction_of_a_heavier_body_takes_current_in_proportion(tmp_path: Path) -> None:
     """Coulomb friction is all that counts; a weaker servo needs as much more current."""
     nominal = current_a(tmp_path / "nominal")

@@ -28,6 +28,7 @@ def slalom(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecord, RunSumm
     return walked(tmp_path_factory.mktemp("slalom"), "flat-slalom", **PLANTED)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("a walk until the friction is known")
 @pytest.mark.parametrize("run", ["flat-slalom", "jacksboro-traverse"])
 def test_what_was_planted_is_found_told_and_summarised(
@@ -62,7 +63,7 @@ def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> N
         assert not [event for event in other.events if event.kind == "friction"]
 
 
-@pytest.mark.costs("a walk until the friction is known")
+@pytest.mark.slow
 def test_the_same_run_finds_the_same(slalom: tuple[RunRecord, RunSummary], tmp_path: Path) -> None:
     one, _ = slalom
     two, _ = walked(tmp_path / "two", "flat-slalom", **PLANTED)
@@ -77,7 +78,7 @@ def test_a_pose_by_the_joints_tells_nothing_of_friction(tmp_path: Path) -> None:
     assert summary.friction_found is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a camera's picture in every cycle of a walk: 13 s of CPU")
 def test_a_camera_measures_it_on_paper(tmp_path: Path) -> None:
     _, summary = walked(tmp_path / "run", "flat-square", pose="camera", **PLANTED)
     found = summary.friction_found

@@ -15,7 +15,7 @@ from snakewalk.controller.runlog.reader import read_log
 from tests.oracles.compiled_bodies import CompiledBodies
 
 
-@pytest.mark.costs("compares a batch with runs on a bus")
+@pytest.mark.slow
 def test_robots_of_a_batch_move_as_robots_on_a_bus(tmp_path: Path) -> None:
     runs = [
         prepare_gait(gait, robot="alternating16", world="isotropic", seconds=3.0)
@@ -38,6 +38,7 @@ def test_robots_of_a_batch_move_as_robots_on_a_bus(tmp_path: Path) -> None:
             assert getattr(numbers, key) == pytest.approx(expected, rel=within), key
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("key", "value", "why"),
     [("temperature_limit_c", 20.0, "25 C: too hot"), ("current_limit_a", 0.05, " A")],

@@ -50,7 +50,7 @@ def test_list_names_every_gait_with_its_source_and_the_shipped_sets() -> None:
     assert "sidewinding" in runner.invoke(app, ["gait", "list"]).output
 
 
-@pytest.mark.costs("a command and its run")
+@pytest.mark.slow
 def test_show_tells_ranges_and_draws_the_body(tmp_path: Path) -> None:
     picture = tmp_path / "side.png"
     found = call("gait", "show", "sidewinding", "--picture", str(picture), "--json")
@@ -67,6 +67,7 @@ def test_help_gives_an_example(command: str) -> None:
     assert f"snakewalk gait {command}" in runner.invoke(app, ["gait", command, "--help"]).output
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -68,6 +68,7 @@ def test_help_gives_an_example() -> None:
     assert "snakewalk gait fit CURVE.csv" in runner.invoke(app, ["gait", "fit", "--help"]).output
 
 
+@pytest.mark.fast_cases(7)
 @pytest.mark.parametrize(
     ("text", "words", "said"),
     [

@@ -13,6 +13,7 @@ from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.run.factory import prepare_walk
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("words", "run_like", "robot_like", "world_like"),
     [

@@ -107,7 +107,7 @@ def serve(line: socket.socket) -> None:
         return
 
 
-@pytest.mark.costs("another process observes")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_after(1, ["SIGKILL", "SIGSTOP"]))
 def test_a_process_that_is_killed_or_stopped_is_lost(name: str) -> None:
     now_s = 0.0

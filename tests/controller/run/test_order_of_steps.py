@@ -91,7 +91,7 @@ def served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
         yield SimulatedPort(robot)
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_a_run_keeps_the_order_of_its_steps(tmp_path: Path) -> None:
     prepared = prepare_job("flat-square", pose="joints", time_limit_s=0.2)
     with served(prepared, tmp_path) as port, calls_of(ORDER) as calls:

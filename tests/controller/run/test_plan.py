@@ -12,6 +12,7 @@ from snakewalk.controller.run.factory import prepare_walk
 from tests.helpers.command import snakewalk
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("run", ["flat-square", "flat-slalom"])
 @pytest.mark.parametrize("motion", ["walk", "serpenoid"])
 def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motion: str) -> None:
@@ -41,6 +42,7 @@ def test_a_plan_as_json() -> None:
     assert found["waypoints_reached"] == found["waypoints"] == 5
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("plans a route")
 @pytest.mark.parametrize(("program", "warnings"), [("/nosuch/relay", 1), (sys.executable, 0)])
 def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warnings: int) -> None:

@@ -136,6 +136,7 @@ def test_a_command_is_listed_and_runs(folder: Path) -> None:
     assert snakewalk("hello").stdout == "hello from another package\n"
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("a whole run")
 @pytest.mark.parametrize("motion", ["zigzag", "demo-gait"])
 def test_a_motion_and_a_kind_of_run_run(folder: Path, motion: str) -> None:
@@ -158,6 +159,7 @@ def test_a_pose_source_and_an_observer_are_used(folder: Path) -> None:
     assert int(Path("rows.txt").read_text()) > 100
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -26,7 +26,7 @@ def test_the_gain_of_a_walk_lies_within_those_of_its_shapes() -> None:
     assert prepared.gain == pytest.approx(gains.mean(), rel=0.01)
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_a_simulated_body_on_level_ground_comes_near_its_prediction_without_an_alarm(
     tmp_path: Path,
 ) -> None:

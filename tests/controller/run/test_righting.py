@@ -18,6 +18,7 @@ from tests.helpers.tiers import slow_except
 SECONDS = 20.0
 
 
+@pytest.mark.slow_cases(1, "20 s of a walk each: 7 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("pose", slow_except(["imu"], ["simulator", "imu"]))
 def test_a_body_on_its_back_turns_home_on_hills_and_says_so(

@@ -58,7 +58,7 @@ def on_core(core: int) -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
     finished, tmp_path: Path
 ) -> None:
@@ -69,7 +69,7 @@ def test_same_seed_and_configuration_give_byte_identical_logs_on_every_core(
         assert again.log.read_bytes() == finished.log.read_bytes()
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_another_seed_gives_other_commands(finished, tmp_path: Path) -> None:
     other = run_robot(RunRequest(short(seed=5), tmp_path / "other"))
     sent = [read_log(f.log).cycle.sent_rad[200:500] for f in (finished, other)]

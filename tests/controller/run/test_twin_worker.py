@@ -165,7 +165,7 @@ def test_an_answer_counts_for_the_decision_it_was_asked_for_and_not_later(
     assert made[-1] >= 2
 
 
-@pytest.mark.costs("another process simulates")
+@pytest.mark.slow
 def test_a_worker_process_answers_and_ends(
     prepared: WalkRun, trial: TwinTrial, question: TwinQuestion
 ) -> None:

@@ -57,7 +57,7 @@ def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path)
     assert "STS3215-C018 (yaw_05, pitch_06, yaw_07, pitch_08)" in lacking[0]
 
 
-@pytest.mark.costs("a run on two ports")
+@pytest.mark.slow
 def test_plan_names_the_joints_without_a_watchdog(robot_file: Path) -> None:
     done = snakewalk("plan", "flat-slalom", "--motion", "serpenoid", "--robot", str(robot_file))
     assert done.returncode == 0, done.stderr

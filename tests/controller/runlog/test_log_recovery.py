@@ -137,7 +137,7 @@ def test_a_complete_mcap_of_another_program_is_named(
         read_log(path)
 
 
-@pytest.mark.costs("cuts a log at many places")
+@pytest.mark.slow
 def test_a_killed_process_loses_less_than_a_second(tmp_path: Path) -> None:
     conftest = Path(__file__).with_name("conftest.py")
     path = tmp_path / "run.mcap"

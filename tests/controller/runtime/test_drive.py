@@ -32,7 +32,7 @@ def test_a_garbage_collection_in_motion_goes_over_what_the_run_itself_has_made(
         gc.freeze()
 
 
-@pytest.mark.costs("many runs in one process")
+@pytest.mark.slow
 def test_a_process_of_many_runs_does_not_grow(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

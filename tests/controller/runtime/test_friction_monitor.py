@@ -29,6 +29,7 @@ def watched(friction: FrictionConfig) -> tuple[list[FoundFriction], list[Frictio
     return [found for found in told if found is not None], used
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("factors", [(1.5, 0.8), (1.0, 0.5), (1.5, 1.5)])
 def test_the_friction_that_a_body_slides_by_is_found(factors: tuple[float, float]) -> None:
     """On a level floor motion tells the ratio; each friction lies within its wide interval."""

@@ -63,7 +63,7 @@ def test_the_curves_are_the_logs(record: RunRecord) -> None:
     assert np.nanmean(run.path_error_m) == pytest.approx(run.summary.path_error_mean_m, abs=1e-5)
 
 
-@pytest.mark.costs("draws two runs")
+@pytest.mark.slow
 def test_the_command_compares_and_draws(make: Make, tmp_path: Path) -> None:
     logs = [
         str(make(tmp_path / name, seconds=seconds, seed=seed))

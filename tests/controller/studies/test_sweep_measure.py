@@ -10,7 +10,7 @@ from snakewalk.controller.studies.sweep_points import Point
 from snakewalk.controller.studies.tune import Task, loss
 
 
-@pytest.mark.costs("runs a gait for three cycles")
+@pytest.mark.slow
 def test_undulation_advances_costs_and_slips_less_than_it_goes() -> None:
     point = Point("lateral-undulation", "yaw16", "flat", 0, 0, 6.0)
     row = measure(point)

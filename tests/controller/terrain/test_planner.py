@@ -301,7 +301,7 @@ def drawn_points(seed: int) -> np.ndarray:
     return np.array(orders[rng.integers(len(orders))])
 
 
-@pytest.mark.costs("80 plans")
+@pytest.mark.slow
 def test_close_waypoints_give_a_path_or_a_fault_that_says_what_to_write() -> None:
     """80 draws: next to the start or to each other, on flat ground and hills, from any heading."""
     planners = TerrainPlanner(None, CONFIG), TerrainPlanner(field(hill, spacing=0.1), CONFIG)

@@ -37,6 +37,7 @@ def cut(number: np.ndarray, rate_hz: float, noise: float = 0.0) -> Track:
     return track_from_points("cut", points[number], rate_hz, frame=number)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("gap", [37, 50])
 @pytest.mark.parametrize(("rate_hz", "noise"), [(10.0, 0.0), (25.0, 0.002), (30.0, 0.0)])
 def test_four_gaps_do_not_change_the_wave(gap: int, rate_hz: float, noise: float) -> None:
@@ -75,6 +76,7 @@ def test_parts_shorter_than_a_cycle_tell_no_wave() -> None:
     assert "the longest part without a gap has 0.7" in str(wave.unknown_reason)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("every", [2, 5])
 def test_a_table_of_every_nth_frame_is_a_recording_at_that_rate(tmp_path: Path, every: int) -> None:
     points = wave_points(240, 30.0)[::every, ::10]
@@ -118,7 +120,7 @@ def test_figures_just_below_a_limit_have_the_digits_that_show_it() -> None:
     assert "2.0 cycles" not in str(brief.unknown_reason)
 
 
-@pytest.mark.costs("analyses a recording several times")
+@pytest.mark.slow
 def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: Path) -> None:
     track = cut(four_gaps(37), 25.0)
     rows = ["t,frame,point,x_m,y_m"]

@@ -169,6 +169,7 @@ def test_closed_form_of_a_wave() -> None:
     assert facts["energy_kept"] > 0.99
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("travel", [0.4, 0.7, 1.0])
 def test_travel_and_sliding_weight_of_a_slipping_wave(travel: float) -> None:
     """The head's speed is exact; points behind it slip sideways too, so theirs is near."""
@@ -178,6 +179,7 @@ def test_travel_and_sliding_weight_of_a_slipping_wave(travel: float) -> None:
     assert found.sliding < 0.02  # it slips; nothing glides
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("sliding", [0.0, 0.2, 0.5, 0.8])
 def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     """[PT] 2.6.4 forwards, 2.4 backwards: what w_d did is what is found."""
@@ -191,6 +193,7 @@ def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     assert found.sliding == pytest.approx(sliding, abs=0.02)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("travel", [0.0, -0.6])
 def test_who_holds_station_in_a_flow_has_no_sliding_told(travel: float) -> None:
     """Swimming at 0.8 against water of 0.8 or of 1.4: the ground knows nothing of the water."""
@@ -267,7 +270,7 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
     assert found.travel is None
 
 
-@pytest.mark.costs("starts a program and draws a picture")
+@pytest.mark.slow
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     save_track(tmp_path / "mine.npz", wave_track(0.8))
     words = [

@@ -49,6 +49,7 @@ def test_a_pure_wave_comes_back(waves: float, hz: float, noise: float, within: f
     assert wave.unknown_reason is None
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", ["worm-like", "lamprey-like"])
 def test_neither_noise_nor_fewer_frames_move_the_frequency(name: str) -> None:
     track = load_track(name)

@@ -474,7 +474,7 @@ FAKE_PAD = """
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a browser at a running gait: 16 s of CPU")
 @IN_A_BROWSER
 def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")

@@ -33,6 +33,7 @@ def body_at(x_m: float):
     return body_in_world(ROBOT, pose_at(at, 0.0), np.zeros(ROBOT.joint_count))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("left", "ashore"), [(0.6, False), (0.4, True)])
 def test_it_walks_after_a_cycle_with_less_than_half_of_the_best_way(left, ashore) -> None:
     told: list[str] = []
@@ -47,6 +48,7 @@ def test_it_walks_after_a_cycle_with_less_than_half_of_the_best_way(left, ashore
         assert told[0].endswith("m before: the ground is met")
 
 
+@pytest.mark.slow
 def test_legs_unfold_without_a_step_within_the_limits_of_the_servos() -> None:
     motion, view = landing([]), body_at(-1.0)
     goals = [motion.begin(view)]
@@ -63,7 +65,7 @@ def test_legs_unfold_without_a_step_within_the_limits_of_the_servos() -> None:
     assert hardest <= 1.05 * ROBOT.joint_acceleration_limit_rad_s2
 
 
-@pytest.mark.costs("a whole run through water and over a beach")
+@pytest.mark.slow
 def test_a_run_swims_to_the_beach_and_walks_over_it(tmp_path: Path) -> None:
     job = prepare_job("water-to-land", keys={"run.waypoint_radius_m": 0.25})
     job = replace(

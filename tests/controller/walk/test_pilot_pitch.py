@@ -35,6 +35,7 @@ def pitch_goals(lead_s: float) -> np.ndarray:
     return np.array(goals)
 
 
+@pytest.mark.slow
 def test_goals_with_a_lead_are_those_of_later_without() -> None:
     """The lead is found again as the shift at which both agree best."""
     now, early = pitch_goals(0.0), pitch_goals(0.24)

@@ -103,6 +103,7 @@ def at_once(bend_rad: float) -> RollPlan:
     return RollPlan(bend_rad, np.empty(0), 2, np.zeros(2), 0.1)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("plan", [arc(2.0), arc(-1.6), at_once(2.0), at_once(-2.6)])
 def test_walk_and_roll_are_joined_within_the_joints_limits(plan: RollPlan) -> None:
     scene, bend_rad = Scene(plan), plan.bend_rad
@@ -130,6 +131,7 @@ def test_walk_and_roll_are_joined_within_the_joints_limits(plan: RollPlan) -> No
     assert hard <= 1.5 * scene.prepared.robot.joint_acceleration_limit_rad_s2
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("plan", "progress", "astray"),
     [(None, 0.0, True), (arc(2.0), 0.7, True), (arc(2.0), 0.0, False)],
@@ -197,6 +199,7 @@ def test_a_roll_is_as_fast_as_on_the_twin_and_ends_where_that_is_nearest() -> No
     assert scene.rolls._walks_until > scene.rolls._pilot.head
 
 
+@pytest.mark.slow
 def test_an_arc_is_laid_before_turns_are_counted() -> None:
     found, _ = considered(Carried(0.1), 0.0, np.linspace(0.0, 1.0, 100))
     assert found is not None
@@ -205,6 +208,7 @@ def test_an_arc_is_laid_before_turns_are_counted() -> None:
     assert found.speed_m_s == pytest.approx(1.0 / 11.5, rel=0.02)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("twin", "tried"), [(Carried(-0.2), 2), (Carried(0.2, diverges=True), 2), (Carried(0.2), 0)]
 )

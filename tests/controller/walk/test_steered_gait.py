@@ -43,6 +43,7 @@ def body_at(heading_rad: float):
     return body_in_world(ROBOT, pose_at(np.zeros(2), heading_rad), np.zeros(ROBOT.joint_count))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("name", "values"), [("trot", {}), ("trot", {"mirror": True})])
 def test_it_turns_towards_its_path_and_a_body_on_it_goes_straight(name, values) -> None:
     for heading_rad, sign in ((0.0, 0.0), (0.4, -1.0), (-0.4, 1.0)):
@@ -55,6 +56,7 @@ def test_it_turns_towards_its_path_and_a_body_on_it_goes_straight(name, values) 
         assert 1.0 <= max(left, right) < 1.1  # two strides of 0.5 rad, and to slow down in the air
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", ["trot", "lateral-walk", "subcarangiform"])
 def test_joints_keep_within_their_limits_however_it_is_steered(name: str) -> None:
     motion, rng = steered(name), np.random.default_rng(3)
@@ -78,6 +80,7 @@ def test_its_speed_is_that_of_its_goals() -> None:
     np.testing.assert_allclose(motion.velocity_rad_s(), (after - before) / 1e-3, atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path) -> None:
     job = prepare_job("salamander-square", keys={"run.waypoint_radius_m": 0.25})
     near = job.run.model_copy(update={"waypoints_m": ((0.4, 0.1), (0.7, 0.35))})
@@ -93,6 +96,7 @@ def test_a_salamander_trots_past_a_waypoint_to_another_and_rests(tmp_path: Path)
     assert 2.0 < finished.summary.electrical_cost_of_transport < 10.0
 
 
+@pytest.mark.slow
 def test_a_run_out_of_time_is_told_by_its_way_not_by_a_pulse(tmp_path: Path) -> None:
     job = prepare_job("salamander-square", keys={"run.time_limit_s": 8.0})
     ended = failure(run_robot(RunRequest(job, tmp_path)).record)

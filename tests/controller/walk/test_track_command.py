@@ -15,6 +15,7 @@ from tests.helpers.travelling import S, ends, wave_angles
 pytestmark = pytest.mark.usefixtures("legible_figures")
 
 
+@pytest.mark.slow
 def test_a_file_and_a_shipped_name_as_json_with_a_picture(tmp_path: Path) -> None:
     np.savez(tmp_path / "mine.npz", points=ends(wave_angles(), 0.3), rate_hz=20.0, length_m=0.3)
     done = snakewalk(

@@ -106,6 +106,7 @@ def test_fast_answers_are_never_unstuffed(compiled: bool, data: list[bytes]) -> 
         assert reply.flawless
 
 
+@pytest.mark.fast_cases(1)
 @both_ways
 @settings(derandomize=True)  # one damage in 65536 has a right CRC
 @given(blocks, st.booleans(), st.data())

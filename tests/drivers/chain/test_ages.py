@@ -52,6 +52,7 @@ def cycles(chain: ServoChain | SafeLink, line: SimLine, count: int) -> JointStat
     return state
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(("joints", "baud"), [(4, 1_000_000), (60, 57_600)])
 @pytest.mark.parametrize("usb_latency_s", [0.0, 0.003])
 def test_an_age_counts_from_when_the_servo_measured(

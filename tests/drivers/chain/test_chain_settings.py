@@ -63,6 +63,7 @@ class Rig:
         return list(self.line.bank[name].tolist())
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(
     ("register", "left", "then", "told"),
     [
@@ -194,6 +195,7 @@ CHANGES = (
 )
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("change", CHANGES)
 def test_a_servo_that_is_not_as_it_was_set_stops_the_run(change: Callable[[Rig], None]) -> None:
     """A servo that rebooted with torque on had no watchdog, no current limit, and no trip."""
@@ -206,6 +208,7 @@ def test_a_servo_that_is_not_as_it_was_set_stops_the_run(change: Callable[[Rig],
     assert rig.registers("Torque Enable") == [0] * 4
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(
     "change", [c for c in CHANGES if c is not _boots_with_torque_on_its_next_goal]
 )
@@ -240,6 +243,7 @@ FINGERPRINT_CHANGES = [
 ]
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(("register", "value", "said"), FINGERPRINT_CHANGES)
 def test_a_setting_of_the_eeprom_that_changes_in_motion_stops_the_run(
     register: str, value: int, said: str
@@ -256,6 +260,7 @@ def test_a_setting_of_the_eeprom_that_changes_in_motion_stops_the_run(
     assert said in str(rig.link.tripped)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("register", "value", "said"), FINGERPRINT_CHANGES)
 def test_a_setting_of_the_eeprom_that_changes_in_a_pause_is_not_gone_on_with(
     register: str, value: int, said: str
@@ -273,6 +278,7 @@ def test_a_setting_of_the_eeprom_that_changes_in_a_pause_is_not_gone_on_with(
     assert rig.link.recoveries == 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("policy", ["stop", "resume"])
 def test_ids_exchanged_in_motion_stop_the_run_for_good(policy: Policy) -> None:
     """Each servo follows the goals of its new ID: nothing that is measured is wrong."""

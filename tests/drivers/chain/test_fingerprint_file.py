@@ -47,6 +47,7 @@ def test_a_missing_file_is_created_and_reported_once(line: SimLine, file: Finger
     assert start(line, file) == []
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("register", "value", "said"),
     [

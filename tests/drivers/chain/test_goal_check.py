@@ -165,6 +165,7 @@ def test_a_servo_that_refuses_goals_is_named_with_the_register_that_is_the_reaso
     assert "joint yaw_02 (ID 2): Max Position Limit is 2000" in str(rig.link.tripped)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("joints", "baud", "period_s"),
     [(16, 1_000_000, 0.02), (64, 4_000_000, 0.02), (16, 57_600, 0.2), (64, 57_600, 0.8)],

@@ -48,6 +48,7 @@ class Rig:
         return cycles
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("model", ["AX-12A", "AX-18A"])
 def test_a_sound_bus_gives_no_alarm(model: str) -> None:
     rig = Rig(model=model)
@@ -72,6 +73,7 @@ def test_a_servo_that_ignores_sync_writes_is_named() -> None:
     assert rig.line.clock.now_s() < 0.5 + (OWN_READS + 1) * 1.3 * PERIOD_S
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", ["drop", "corrupt", "truncate", "delay", "late", "duplicate"])
 def test_a_bad_line_gives_no_alarm(kind: str) -> None:
     """A reply that is lost, damaged or late is no goal, and not that of the next request."""

@@ -68,6 +68,7 @@ def driven(robot: RobotConfig, plant: Plant, cycles: int) -> tuple[list[Floats],
     return shafts, states
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(robot=scrambled())
 def test_a_scrambled_chain_moves_the_shafts_to_the_bit_as_the_plain_one(robot: RobotConfig) -> None:
@@ -76,6 +77,7 @@ def test_a_scrambled_chain_moves_the_shafts_to_the_bit_as_the_plain_one(robot: R
         assert np.array(ours).tobytes() == np.array(theirs).tobytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(robot=scrambled())
 def test_a_scrambled_chain_moves_a_body_to_the_bit_as_the_plain_one(robot: RobotConfig) -> None:

@@ -771,6 +771,7 @@ def test_ids_that_are_exchanged_between_two_runs_are_told_at_the_start(
     assert not [event for event in events if "exchanged" in event]
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("place", range(17))
 def test_a_cycle_in_which_nobody_is_read_asks_for_nothing_else(place: int) -> None:
     """Three time-outs in one call, of 20 ms and as much draining, made the state stale at once."""

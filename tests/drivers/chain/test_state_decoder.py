@@ -19,6 +19,7 @@ small = st.integers(-(2**15), 2**15 - 1)
 large = st.integers(-(2**31), 2**31 - 1)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     "loop", [decode_state, decode_state.py_func], ids=["compiled", "interpreted"]
 )

@@ -107,6 +107,7 @@ def test_the_joints_of_both_ports_follow_their_goals(body: Body) -> None:
     assert not body.lines[0].bank["Bus Watchdog"].any()
 
 
+@pytest.mark.slow
 def test_a_chain_without_faults_is_checked_for_many_rounds(body: Body) -> None:
     with body.safe() as link:
         link.enable()
@@ -143,6 +144,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_on_one_port_stops_both(body: Body, port: int, fault: str) -> None:
@@ -158,6 +160,7 @@ def test_a_fault_on_one_port_stops_both(body: Body, port: int, fault: str) -> No
         body.clock.sleep_until_s(body.clock.now_s() + 1.0)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 def test_a_second_master_on_one_port_stops_both(body: Body, port: int) -> None:
     goals = body.lines[port].bank["Goal Position"]
@@ -176,6 +179,7 @@ def test_a_second_master_on_one_port_stops_both(body: Body, port: int) -> None:
         assert body.torque_on() == [False, False]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 def test_torque_off_reaches_both_ports_before_the_next_cycle(body: Body, port: int) -> None:
     off_s: list[float] = []
@@ -199,6 +203,7 @@ def test_torque_off_reaches_both_ports_before_the_next_cycle(body: Body, port: i
     assert max(off_s[:2]) - detected_s < 2 * PERIOD_S
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 def test_a_port_that_vanishes_stops_the_other(body: Body, port: int) -> None:
     hold = ("hold after the bus watchdog", "hold their last goals")[port]
@@ -215,6 +220,7 @@ def test_a_port_that_vanishes_stops_the_other(body: Body, port: int) -> None:
         body.lines[port].reconnect()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 def test_a_chain_resumes_after_an_interruption_of_one_port(body: Body, port: int) -> None:
     body.chain.enable()

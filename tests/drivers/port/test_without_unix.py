@@ -52,7 +52,7 @@ print("serial_fast_path" in str(list(sys.modules)))
 """
 
 
-@pytest.mark.costs("starts a program that imports all of the library")
+@pytest.mark.slow
 def test_what_is_offline_needs_no_unix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setenv("TMPDIR", str(tmp_path))

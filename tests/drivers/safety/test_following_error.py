@@ -152,6 +152,7 @@ def test_a_swing_within_the_plan_follows() -> None:
     assert swing(None, 0).tripped is None
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("joint", [0, 1])
 @pytest.mark.parametrize("amplitude_rad", [0.8, 0.36, 0.15])
 def test_a_joint_without_power_behind_healthy_registers_stops_the_run(

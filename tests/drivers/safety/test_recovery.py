@@ -255,6 +255,7 @@ def test_without_an_operator_confirm_means_no() -> None:
     assert rig.torque() == [0] * 4
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -500,6 +501,7 @@ def test_a_shaft_that_is_held_overloads_as_often_as_it_may() -> None:
     assert patient.torque() == [0] * 4
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("alarm", "servos", "said"),
     [

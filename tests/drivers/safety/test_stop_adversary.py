@@ -75,6 +75,7 @@ def _move_folder(path: Path) -> None:
     path.parent.rename(path.parent.with_name("elsewhere"))
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("change", "said"),
     [

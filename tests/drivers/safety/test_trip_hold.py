@@ -219,6 +219,7 @@ def _break(rig: Rig, fault: str) -> None:
     rig.line.firmware.apply_registers()
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_ends_the_hold_at_once(rig: Rig, fault: str) -> None:
     rig.link.request_stop("first", may_hold=True)

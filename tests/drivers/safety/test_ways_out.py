@@ -82,6 +82,7 @@ def test_a_killed_program_leaves_servos_that_stop_within_the_watchdogs_time(
     assert servos.torque() == [1] * 3  # they hold, and take no goal
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     "number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP]
 )

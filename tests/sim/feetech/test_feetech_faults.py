@@ -175,6 +175,7 @@ NOISE = {
 }
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("kind", "seed"), slow_after(2, [(kind, seed) for seed, kind in enumerate(NOISE)])
 )

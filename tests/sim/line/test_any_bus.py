@@ -147,6 +147,7 @@ def test_a_sync_write_beyond_one_servos_limit_moves_the_others(line: SimLine) ->
     assert line.shown("Present Position")[2] == pytest.approx(2_048, abs=2)
 
 
+@pytest.mark.fast_cases(16)
 @pytest.mark.parametrize("code", [Instruction.SYNC_READ, Instruction.FAST_SYNC_READ])
 @pytest.mark.parametrize("block", [(126, 10), (0, 147), (144, 3), (116, 4)])
 def test_the_vectorised_way_says_what_the_general_one_says(

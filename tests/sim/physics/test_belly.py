@@ -52,6 +52,7 @@ def test_the_ends_of_a_capsule_are_gauss_points_unless_it_is_slender() -> None:
     assert np.diff(row).max() <= 1.4 * 0.03  # no hole between the balls that meet a field
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("belly", "sinks"), [(BELLIES[0], True), (BELLIES[1], False)], ids=NAMES[:2]
 )
@@ -80,6 +81,7 @@ def test_on_a_side_slope_a_round_body_rolls_and_one_on_rails_stays() -> None:
     assert abs(down["rails"]) < 0.02
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("belly", BELLIES, ids=NAMES)
 def test_without_torque_motion_dies_and_never_grows(belly: BellyConfig) -> None:
     body, drive = MujocoPlant(robot(belly), FLAT), a_drive()
@@ -95,6 +97,7 @@ def test_without_torque_motion_dies_and_never_grows(belly: BellyConfig) -> None:
     assert all(after <= before + 1e-9 for before, after in pairwise(kinetic))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("the steps in plain numpy")
 @pytest.mark.parametrize("belly", BELLIES, ids=NAMES)
 def test_compiled_and_numpy_steps_agree_on_hills(belly: BellyConfig) -> None:

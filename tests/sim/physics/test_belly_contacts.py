@@ -70,6 +70,8 @@ def assert_as_mujoco(m: Mechanics, qpos: Floats) -> None:
     np.testing.assert_array_equal(found.frame[:, :3], expected.frame[:, :3])
 
 
+@pytest.mark.slow_cases(4, "a moving body each: 1 s of CPU")
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("ground", GROUNDS.values(), ids=GROUNDS)
 @pytest.mark.parametrize("robot", BODIES.values(), ids=BODIES)
 def test_a_moving_body_has_the_contacts_that_mujoco_finds(
@@ -88,6 +90,7 @@ def test_a_moving_body_has_the_contacts_that_mujoco_finds(
     assert max(numbers) > 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("ground", GROUNDS.values(), ids=GROUNDS)
 def test_a_run_by_parts_is_the_run_by_whole_steps_to_the_bit(
     ground: HeightField | None, mocker: MockerFixture
@@ -106,7 +109,7 @@ def test_a_run_by_parts_is_the_run_by_whole_steps_to_the_bit(
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.costs("builds bodies with contacts")
+@pytest.mark.slow
 def test_links_that_touch_each_other_are_found_by_mujoco() -> None:
     """A body that closes to a ring, and beyond."""
     plant, drive = MujocoPlant(ROBOT, FLAT), a_drive(ROBOT)

@@ -13,7 +13,7 @@ from tests.sim.physics.test_gear_friction import FLAT, TERMS, drive_of, robot_wi
 DEGREE = math.radians(1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("MuJoCo's public steps in Python: 14 s of CPU")
 @pytest.mark.parametrize("terms", [{}, TERMS])
 def test_the_public_steps_have_the_same_bits(terms: dict[str, float]) -> None:
     robot = robot_with("yaw16", **terms, backlash_rad=DEGREE)

@@ -4,6 +4,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pytest
 
 from snakewalk.config.loader import load_robot, load_world, with_keys
 from snakewalk.config.robot import RobotConfig
@@ -52,6 +53,7 @@ def waved(body: MujocoPlant, robot: RobotConfig) -> ServoDrive:
     return drive
 
 
+@pytest.mark.slow
 def test_loops_agree_and_what_the_motors_do_is_somewhere() -> None:
     robot = robot_with("yaw16", **TERMS)
     bodies = [make(robot, FLAT) for make in (MujocoPlant, numpy_plant)]

@@ -95,6 +95,7 @@ def test_it_stands_still_on_four_feet_that_bear_all_of_it() -> None:
     assert load[feet] @ ground_x == pytest.approx(lever, rel=2e-3)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("direction_rad", [0.0, 0.8, 1.57])
 def test_feet_hold_up_to_their_friction_in_every_direction(direction_rad: float) -> None:
     """A push of a share of mu m g: under 1 it creeps less than a millimetre a second."""
@@ -127,6 +128,7 @@ ROBOT_SHARES = np.array(
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("the steps in plain numpy")
 @pytest.mark.parametrize("world", ["isotropic", "pool"])
 def test_compiled_and_numpy_steps_agree_with_legs(world: str) -> None:

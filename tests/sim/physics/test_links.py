@@ -72,7 +72,7 @@ def test_each_link_floats_by_its_own_weight() -> None:
     np.testing.assert_allclose(body.link_positions_m, before, atol=1e-6)
 
 
-@pytest.mark.costs("the steps in plain numpy")
+@pytest.mark.slow
 def test_compiled_and_numpy_steps_agree_on_links_that_differ() -> None:
     for ground in (None, HILLS):
         world = FLAT if ground is None else WorldConfig(name="hills")

@@ -36,6 +36,7 @@ def swim(step_s: float) -> tuple[float, float, float]:
     return creep, way, swung
 
 
+@pytest.mark.slow
 def test_on_ice_no_motion_of_the_joints_moves_the_centre_of_mass() -> None:
     """But for the error of Euler's step, which is of first order: half the step, half of it."""
     long, short = np.array(swim(0.002)), np.array(swim(0.001))
@@ -83,6 +84,7 @@ def test_without_torque_motion_dies_and_never_grows() -> None:
     assert kinetic[-1] < 0.02 * kinetic[0]  # the rest is in the rotors, which only the gears brake
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("step_s", [0.001, 0.002])
 @pytest.mark.parametrize("hold_s", [0.002, 0.02])
 @pytest.mark.parametrize("mu", [(0.1, 0.7), (0.4, 0.4)])

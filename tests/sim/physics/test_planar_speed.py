@@ -50,6 +50,8 @@ def reference(mu: tuple[float, ...], time_s: Floats, joints: Floats, at_s: Float
     return simulate(body, lambda t: (shape(t), rate(t)), at_s).centre_m
 
 
+@pytest.mark.slow_cases(1, "a planar model of each body: 3 s of CPU")
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("compares with an independent model over whole cycles")
 @pytest.mark.parametrize(
     ("mu", "step_s"),
@@ -74,6 +76,7 @@ def test_speed_is_that_of_the_independent_model(mu: tuple[float, float], step_s:
     assert np.hypot(*(made - way)) < 0.02 * np.hypot(*way) + 0.003
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("compares with an independent model over whole cycles")
 @pytest.mark.parametrize("mu", [(0.11, 0.2, 0.14), (0.4, 0.4, 0.8)])
 def test_friction_backward_of_its_own_too(mu: tuple[float, float, float]) -> None:

@@ -29,6 +29,7 @@ def contacts(ground: HeightField, centre_m: Floats) -> list[tuple[Floats, float]
     return [((centre_m - row[:3]) / row[3], float(row[3])) for row in met]
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("spacing", [0.01, 0.03, 0.1])
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.15, 0.0), (-0.3, 0.2), (1.5, -1.0)])
 def test_on_a_plane_there_is_one_contact_and_its_normal_is_the_planes(

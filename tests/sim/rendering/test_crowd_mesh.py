@@ -41,7 +41,7 @@ def test_a_tube_is_closed_faces_outward_and_has_the_volume_of_its_body(
     assert {corner for edge in open_edges for corner in edge} <= ends
 
 
-@pytest.mark.costs("renders a crowd")
+@pytest.mark.slow
 def test_levels_look_alike_and_the_sun_casts_a_shadow() -> None:
     robot, world = load_robot("yaw16"), load_world("jacksboro-basin")
     flat = HeightField(np.zeros((5, 5)), 1.0, -2.0, -2.0)

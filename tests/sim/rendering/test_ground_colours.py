@@ -23,6 +23,7 @@ def seen_from_above(ground: HeightField, x_m: float, y_m: float) -> list[int]:
     return [int(each) for each in picture[round(100 - 50 * y_m), round(100 + 50 * x_m)]]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("x_m", "y_m", "channel"), [(-1.0, -1.0, 0), (1.0, -1.0, 1), (-1.0, 1.0, 2)]
 )
@@ -37,7 +38,7 @@ def test_a_colour_is_drawn_at_its_place(x_m: float, y_m: float, channel: int) ->
     assert sum(seen) - seen[channel] < 60
 
 
-@pytest.mark.costs("renders ground")
+@pytest.mark.slow
 def test_high_ground_has_the_colour_of_high_ground() -> None:
     rise = np.linspace(0.0, 0.3, 41)[:, None] * np.ones(41)
     ground = HeightField(rise, 0.1, -2.0, -2.0)

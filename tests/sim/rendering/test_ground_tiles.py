@@ -86,7 +86,7 @@ def test_every_sample_in_the_picture_is_in_a_tile_that_is_shown(azimuth_deg: flo
     assert not shown.all()
 
 
-@pytest.mark.costs("renders a whole field")
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_complete_field() -> None:
     robot, world, ground = load_robot("yaw16"), load_world("flat"), hills()
     shot = CrowdShot(np.array([0.5, 0.2, 0.1]), 2.0, 70.0, -25.0, [], "")

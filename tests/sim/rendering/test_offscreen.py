@@ -38,7 +38,7 @@ def shows_the_body(top: TopView) -> bool:
     return bool(cv2.absdiff(top.picture(AT_REST), top.empty_floor()).max() > 100)
 
 
-@pytest.mark.costs("opens several renderers")
+@pytest.mark.slow
 def test_a_view_still_draws_after_another_was_collected_unclosed() -> None:
     unclosed, kept = view(), view()
     assert shows_the_body(kept)
@@ -48,6 +48,7 @@ def test_a_view_still_draws_after_another_was_collected_unclosed() -> None:
     kept.close()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("opens several renderers")
 @pytest.mark.parametrize("closed_first", [0, 1])
 def test_two_views_draw_by_turns_and_one_outlives_the_other(closed_first: int) -> None:
@@ -58,6 +59,7 @@ def test_two_views_draw_by_turns_and_one_outlives_the_other(closed_first: int) -
     views[0].close()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("start_m", [(0.4, 0.3), (2.6, 0.2), (9.0, 0.0)])
 def test_the_part_round_the_robot_is_drawn_as_in_the_whole_picture(
     start_m: tuple[float, float], monkeypatch: pytest.MonkeyPatch

@@ -35,6 +35,7 @@ def test_the_edge_is_soft_and_the_border_is_clear() -> None:
     assert alpha[:30].max() == alpha[-30:].max() == 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("hills", [False, True])
 def test_a_ball_in_the_air_darkens_the_ground_where_the_sun_puts_it(hills: bool) -> None:
     ground = None

@@ -31,6 +31,7 @@ pytestmark = pytest.mark.usefixtures("patient_sdk")
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
 
 
+@pytest.mark.slow
 def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path) -> None:
     record = tmp_path / "exchange.jsonl"
     link = tmp_path / "tty"
@@ -57,6 +58,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     assert lines[1]["values"]["model"] == "XL330-M288"
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

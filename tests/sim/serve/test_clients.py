@@ -160,6 +160,7 @@ def test_lerobots_bus_with_two_models(servo_bus: Make, lerobot_motors: ModuleTyp
     assert not bus["Torque Enable"].any()
 
 
+@pytest.mark.slow
 def test_lerobots_feetech_bus(
     servo_bus: Make, lerobot_motors: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:

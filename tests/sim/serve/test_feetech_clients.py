@@ -39,6 +39,7 @@ def client(folder: str, script: str, *args: str) -> Any:
     return json.loads(ran.stdout)
 
 
+@pytest.mark.slow
 def test_ftservo_python_sdk(servo_bus: Make) -> None:
     bus = servo_bus("1-3:STS3215")
     found = client("clients-ftservo", "ftservo_client.py", bus.path)
@@ -53,6 +54,7 @@ def test_ftservo_python_sdk(servo_bus: Make) -> None:
     assert bus["Lock"].tolist() == [1, 1, 1]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("model", ["STS3215", "SCS0009", "HLS3606"])
 def test_feetech_servo_sdk(servo_bus: Make, model: str) -> None:
     bus = servo_bus(f"1-2:{model}", start_rad=0.1)

@@ -145,6 +145,7 @@ LIGHT = {
 """Packages that a light install has; all others must wait until a feature needs them."""
 
 
+@pytest.mark.slow
 def test_the_fixture_imports_only_packages_of_the_light_install() -> None:
     done = subprocess.run(
         [sys.executable, "-c", IMPORTS], capture_output=True, text=True, check=True, timeout=120

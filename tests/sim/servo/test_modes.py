@@ -31,6 +31,7 @@ def wait(line: SimLine, seconds: float) -> None:
     line.settle()
 
 
+@pytest.mark.fast_cases(17)
 @pytest.mark.parametrize(
     "model", [name for name in simulated_models() if servo_model(name).ram_from == 64]
 )

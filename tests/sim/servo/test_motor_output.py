@@ -54,6 +54,7 @@ def test_a_stuck_servo_trips_at_the_output_that_it_may_give() -> None:
     assert read(line, 1, 70, 1) == 0x20
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("profile", [0, 200])
 def test_a_stuck_servo_is_stuck_for_group_writes_and_profiles_too(profile: int) -> None:
     line = scripted(fault("stuck", ids=[1], at_s=0.5), joints=2)

@@ -38,7 +38,7 @@ def refused(*words: object) -> str:
     return done.exception.faults[0]
 
 
-@pytest.mark.costs("a film of a fish")
+@pytest.mark.slow
 def test_film_match_and_picture(tmp_path: Path) -> None:
     tank = tmp_path / "tank"
     assert snakewalk("film", tank, "--frames", 6, "--length-px", 60)["frames"] == 6

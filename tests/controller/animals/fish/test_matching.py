@@ -66,6 +66,7 @@ def test_spine_angles_of_a_rendered_film_are_found() -> None:
     assert np.median(errors.skeleton) < 0.035
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.costs("fits a body to each frame")
 @pytest.mark.parametrize("fins", [0.0, 0.12])
 def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:

@@ -168,7 +168,7 @@ def test_every_join_is_within_one_class_and_seeds_repeat(seed: int) -> None:
 POINTS = np.array([[3.0, 0.0], [5.0, 3.0], [2.0, 5.0], [-2.0, 2.0]])
 
 
-@pytest.mark.costs("searches a path")
+@pytest.mark.slow
 def test_control_points_are_passed_in_order() -> None:
     stock = piece_graph(TRUTH, segment_motion(TRUTH), mirror=True)
     made = sequence_through(stock, POINTS, radius=0.5)

@@ -18,6 +18,7 @@ TRUTH = swim()
 POINTS = [(3.0, 0.8, 0.3), (5.5, 2.6, -0.1)]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("dimensions", [2, 3])
 def test_control_points_are_passed_within_a_tenth_of_a_length_by_default(dimensions: int) -> None:
     points = np.array(POINTS)[:, :dimensions]
@@ -86,7 +87,7 @@ def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
         synthesise_motion(TRUTH, SynthesisOptions(avoid=(tmp_path / "x.npz",)))
 
 
-@pytest.mark.costs("a fish swims for a minute")
+@pytest.mark.slow
 def test_a_fish_stays_in_its_tank() -> None:
     tank = (-2.0, -2.0, 4.0, 3.0)
     options = {"seconds": 9.0, "mirror": True, "seed": 0}

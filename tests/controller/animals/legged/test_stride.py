@@ -31,6 +31,7 @@ pytestmark = pytest.mark.usefixtures("legible_figures")
 TRACKER_FILES = Path(__file__).parents[3] / "oracles" / "tracked_lizard.zip"
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("frames", [12, 40])
 @pytest.mark.parametrize("name", ANIMALS)
@@ -84,6 +85,8 @@ def walker(
     return spine, feet, height + rng.normal(0.0, noise, height.shape)
 
 
+@pytest.mark.slow_cases(2, "a further seed each")
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", slow_after(3, range(20)))
 def test_contact_is_known_to_a_fiftieth_of_a_cycle(seed: int) -> None:
     """One fixed shape of the way in the air was 0.05 to 0.14 wrong for two of these four."""
@@ -99,6 +102,7 @@ def test_contact_is_known_to_a_fiftieth_of_a_cycle(seed: int) -> None:
         assert abs((off + 0.5) % 1.0 - 0.5) < 0.02
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_the_view_from_the_side_gives_contact_and_height_of_a_step(mirrored: bool) -> None:
     """On level ground, to either side; places and turns to the side are not seen."""
@@ -169,6 +173,7 @@ def square() -> WalkRun:
     return prepared
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("name", "individual"),
     [

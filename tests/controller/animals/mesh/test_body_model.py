@@ -142,6 +142,7 @@ def test_the_command_writes_reports_and_does_not_overwrite(tmp_path: Path) -> No
     assert snakewalk(*words, "--force", "--posed").returncode == 0
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -75,6 +75,7 @@ def body(name: str) -> tuple[SkinConfig, Tube]:
     return config, Tube.through(sections.curves_m, sections.stations)
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("name", shipped("skins"))
 def test_a_fins_first_curve_lies_on_the_skin_and_its_tip_outside(name: str) -> None:
     config, tube = body(name)

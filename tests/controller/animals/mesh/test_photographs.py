@@ -156,7 +156,7 @@ def write_views(folder: Path) -> list[str]:
     return ["animal", "body", "top.npz", "--side", "side.npz", "--json"]
 
 
-@pytest.mark.costs("segments photographs")
+@pytest.mark.slow
 def test_the_command_reports_what_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     words = [*write_views(tmp_path), "--image", "top.png", "--image", "left=left.png"]

@@ -106,6 +106,7 @@ def test_readers_are_plug_ins() -> None:
     assert {"csv", "lerobot", "ros2"} <= set(names("joints"))
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(
     ("header", "factor", "unit"),
     [
@@ -133,6 +134,7 @@ def test_a_table_that_states_no_unit_is_asked_about_with_the_likely_one(tmp_path
         plays(tmp_path / "a.csv")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("trajectory", [False, True])
 def test_a_bag_of_joint_states_or_of_a_trajectory(trajectory: bool, tmp_path: Path) -> None:
     bag(tmp_path / "b.mcap", trajectory=trajectory)
@@ -151,6 +153,7 @@ def test_a_bag_without_joints_or_that_is_cut_is_one_line(tmp_path: Path) -> None
         plays(tmp_path / "b.mcap")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("version", ["v2.1", "v3.0"])
 def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
     dataset(tmp_path / "set", version, 180.0 / np.pi)

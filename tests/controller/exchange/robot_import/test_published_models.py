@@ -90,6 +90,7 @@ def urdf(
     )
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize("name", CLASSES)
 def test_each_class_is_imported_exported_and_imported_again(tmp_path: Path, name: str) -> None:
     model = CLASSES[name]
@@ -407,7 +408,7 @@ def test_the_file_of_a_robot_says_what_was_changed(tmp_path: Path) -> None:
     assert tomllib.loads(out.read_text())["joint_axes"][0] == "y"
 
 
-@pytest.mark.costs("damages a file at many places")
+@pytest.mark.slow
 def test_a_broken_file_ends_with_a_line_and_never_with_a_traceback(tmp_path: Path) -> None:
     """Cuts and changed bytes and digits in models of every class."""
     rng = np.random.default_rng(0)

@@ -226,7 +226,7 @@ def test_the_command_writes_a_file_that_loads_and_tells_what_was_left_out(tmp_pa
     assert isinstance(CliRunner().invoke(app, words).exception, InputError)  # it exists
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("fills the memory that a process is allowed: 9 s of CPU")
 def test_a_model_that_asks_for_all_memory_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -61,7 +61,7 @@ def test_flow_at_one_scale_is_worse() -> None:
     assert exact["one"] < 0.6
 
 
-@pytest.mark.costs("morphs a whole model")
+@pytest.mark.slow
 def test_the_printed_potts_term_is_less_exact() -> None:
     first = wall()
     second = nearer(first, 0.5)

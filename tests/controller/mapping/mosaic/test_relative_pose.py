@@ -57,7 +57,7 @@ def test_a_reduced_picture_has_its_pixels_where_they_belong() -> None:
         )
 
 
-@pytest.mark.costs("matches whole images")
+@pytest.mark.slow
 def test_matches_over_scale_find_what_one_scale_does_not() -> None:
     """Fig. 3: from 2.0 m to 0.9 m the wall grows by 2.2."""
     far = wall()

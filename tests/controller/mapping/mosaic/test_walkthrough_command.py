@@ -38,7 +38,7 @@ def refused(*words: object) -> str:
     return str(found.exception)
 
 
-@pytest.mark.costs("draws a film")
+@pytest.mark.slow
 def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) -> None:
     film, world = tmp_path / "film.mp4", tmp_path / "ravine.toml"
     made = call(

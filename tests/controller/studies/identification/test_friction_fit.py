@@ -77,7 +77,7 @@ def refused(*words: str | Path) -> str:
     return str(done.exception)
 
 
-@pytest.mark.costs("fits a simulated body to a run")
+@pytest.mark.slow
 def test_planted_friction_comes_back_and_goes_into_a_world(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.toml"
     words = (
@@ -157,7 +157,7 @@ def lifting(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ).log
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("fits lifts of a whole body: 12 s of CPU")
 def test_a_planted_mass_comes_back_and_goes_into_a_robot(
     lifting: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,7 @@ def alarms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Alarms:
     return run
 
 
+@pytest.mark.slow_cases(1, "a run with its shadow each: 5 s of CPU")
 @pytest.mark.costs("a run with its shadow")
 @pytest.mark.parametrize("seed", slow_except([0], range(3)))
 @pytest.mark.parametrize(("host_s", "line_s"), [(5e-3, 0.0), (0.0, 2e-3), (2e-3, 4e-3)])
@@ -92,6 +93,7 @@ def test_a_busy_computer_gives_no_alarm(
     assert alarms(seed, host_s, line_s) == []
 
 
+@pytest.mark.slow_cases(1, "a run with its shadow each: 5 s of CPU")
 @pytest.mark.costs("a run with its shadow")
 @pytest.mark.parametrize(
     ("host_s", "line_s"), slow_except([(5e-3, 0.0)], [(0.0, 0.0), (5e-3, 0.0), (3e-3, 3e-3)])

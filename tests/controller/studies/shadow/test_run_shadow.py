@@ -84,7 +84,7 @@ def test_a_stop_during_the_diagnosis_learns_that_the_run_has_ended(
     assert runs_of() == []
 
 
-@pytest.mark.costs("half a minute of a run with its shadow")
+@pytest.mark.slow
 def test_a_run_of_half_a_minute_is_judged_by_its_last_seconds(tmp_path: Path) -> None:
     finished = run_robot(
         RunRequest(short_run(30.0), tmp_path / "run", shadow=True, stoppable=False)

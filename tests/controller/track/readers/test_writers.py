@@ -17,6 +17,7 @@ from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
 KEPT = np.setdiff1d(np.arange(FRAMES), [20, 21, 22])
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("suffix", [".csv", ".wcon", ".npz"])
 @pytest.mark.parametrize("scale_m", [0.08, None])
 def test_a_track_comes_back(suffix: str, scale_m: float | None, tmp_path: Path) -> None:
