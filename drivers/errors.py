@@ -63,6 +63,10 @@ class PortError(InputError, DriverError):
     """The port is missing, denied, busy, or vanished."""
 
 
+class PortBusyError(PortError):
+    """Another program has the port open."""
+
+
 class FaultCause(Enum):
     """Kinds of faults that forbid a start or a continuation."""
 

@@ -29,7 +29,7 @@ from snakewalk.drivers.safety.stop_button import (
     stoppable_runs,
 )
 
-How = Literal["latched", "terminated", "killed", "torque off"]
+How = Literal["latched", "terminated", "killed", "torque off", "not stopped", "port in use"]
 LATCH_S: Final = 1.0
 """Longest time of a run until it latches (ours): a cycle lasts some 10 ms, the set-up longer."""
 END_S: Final = 3.0
@@ -143,7 +143,7 @@ def _button_of(holder: PortHolder) -> PressedButton | None:
         if file.endswith(BUTTON_SUFFIX):
             with suppress(OSError, ValueError, TypeError, KeyError):  # not a button, or unreachable
                 button = PressedButton(Path(file))
-                if button.run.process == holder.process:
+                if button.process == holder.process:
                     return button
                 button.close()
     return None
@@ -168,8 +168,15 @@ def _terminated(holder: PortHolder, port: str) -> StopOutcome:
     except ProcessLookupError:  # it has ended meanwhile
         pass
     except PermissionError:
-        text = f"is another user's; end it by: sudo kill {holder.process}"
-        return StopOutcome(holder.program, how, text, safe=False, process=holder.process)
+        return StopOutcome(
+            holder.program,
+            "not stopped",
+            f"process {holder.process} belongs to user {holder.user}; end it by: sudo kill "
+            f"{holder.process}",
+            safe=False,
+            process=holder.process,
+            ports=(resolved(port),),
+        )
     text = f"process {holder.process} had {port} open"
     return StopOutcome(
         holder.program, how, text, False, round(clock.now_s(), 4), holder.process, (resolved(port),)
@@ -184,9 +191,11 @@ def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
         (signal.SIGKILL, "killed", END_S),
     )
     for number, name, patience_s in signals:
-        if number is not None and button.is_held:
+        process = button.process
+        if number is not None and process is not None:
             how = name
-            os.kill(button.run.process, number)
+            with suppress(ProcessLookupError):  # it has ended meanwhile
+                os.kill(process, number)
         until_s = clock.now_s() + patience_s
         while button.end is None and button.is_held and clock.now_s() < until_s:
             clock.sleep_until_s(clock.now_s() + _LOOK_S)
@@ -233,9 +242,9 @@ class Stop:
         if held:
             outcomes = held
             devices = []
-        # a run that was killed leaves its servos with torque on
+        # a run that was killed, or may not be ended, leaves its servos with torque on
         devices += [port for each in outcomes if not each.safe for port in each.ports]
-        outcomes += _torque_off(devices, self.bauds)
+        outcomes += _torque_off(dict.fromkeys(devices), self.bauds, are_runs_ended=bool(outcomes))
         return self._report(outcomes)
 
     def _report(self, outcomes: Sequence[StopOutcome]) -> int:
@@ -289,9 +298,26 @@ def _free_ports(port: str | None) -> list[str]:
     try:
         return [import_module(_TORQUE_OFF).only_port()]
     except PortError as fault:
-        raise PortError(f"nothing to stop: no run is under way; {fault}") from None
+        raise PortError(f"nothing to stop: this user has no run here; {fault}") from None
 
 
-def _torque_off(devices: Sequence[str], bauds: Sequence[int]) -> list[StopOutcome]:
-    """Switch torque off on ports; the module is imported only if there are any."""
-    return [import_module(_TORQUE_OFF).torque_off(device, bauds) for device in devices]
+def _torque_off(
+    devices: Iterable[str], bauds: Sequence[int], *, are_runs_ended: bool
+) -> list[StopOutcome]:
+    """Switch torque off on ports; the module is imported only if there are any.
+
+    Raises:
+        PortError: no port can be opened, and no run was ended.
+
+    """
+    outcomes = []
+    faults: list[str] = []
+    for device in devices:
+        try:
+            outcomes.append(import_module(_TORQUE_OFF).torque_off(device, bauds))
+        except PortError as fault:  # the other ports still get torque off
+            faults += fault.faults
+            outcomes.append(StopOutcome(device, "not stopped", str(fault), safe=False))
+    if faults and len(faults) == len(outcomes) and not are_runs_ended:
+        raise PortError(faults)
+    return outcomes

@@ -1,11 +1,15 @@
-"""Torque off on a port that no program holds: to all servos, at every baud rate."""
+"""Torque off to all servos of a port: at every baud rate, or past a program that has it open."""
 
+import os
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
-from snakewalk.drivers.errors import BusError, ControlTableError
+from snakewalk.drivers.clock import WallClock
+from snakewalk.drivers.errors import BusError, ControlTableError, PortBusyError
 from snakewalk.drivers.port.network_port import NetworkPort, open_port
+from snakewalk.drivers.port.port_holders import holders_of
 from snakewalk.drivers.port.serial_port import SerialPort
 
 _LIKELY: Final = (1_000_000, 57_600)
@@ -17,6 +21,10 @@ _COPIES: Final = 3
 _TRIES: Final = 8
 """How often a servo is asked whether its torque is off (ours)."""
 _BITS_PER_BYTE: Final = 10
+_PAST: Final = 20
+"""Number of times that torque off is sent past another program (ours): its packets hit some."""
+_PAST_EVERY_S: Final = 7e-3
+"""Time between these; no divisor of a usual period of control (ours)."""
 DYNAMIXEL_OFF: Final = bytes.fromhex("fffffd00fe0600034000002e16")
 """Write 0 to Torque Enable(64) of all X and MX(2.0) servos; ``encode_instruction`` is slow to
 import."""
@@ -36,14 +44,18 @@ def torque_off(
     once more by its model's control table.
 
     Raises:
-        PortError: it is not there, or a program that has no stop button holds it.
+        PortError: it is not there, or may not be opened.
         ControlTableError: servos do not have a baud rate.
 
     """
     if bauds:
         _scan_module().check_bauds(bauds)
     first = tuple(bauds) or _LIKELY
-    with open_port(device, first[0]) as port:
+    try:
+        opened = open_port(device, first[0])
+    except PortBusyError:
+        return StopOutcome(device, "port in use", _send_past(device), safe=False, ports=(device,))
+    with opened as port:
         sent = _send(port, first)
         scan = _scan_module()
         known = sorted(scan.known_bauds(), reverse=True)
@@ -102,6 +114,32 @@ def _send(port: SerialPort | NetworkPort, rates: Iterable[int]) -> int:
             wire_s = len(_PACKETS) * _BITS_PER_BYTE / rate
             port.clock.sleep_until_s(port.clock.now_s() + wire_s + max(_USB_S, port.latency_s))
     return sent
+
+
+def _send_past(device: str) -> str:
+    """Send torque off on a device that another program has open, at its rate; return the result."""
+    sent = 0
+    clock = WallClock()
+    with suppress(OSError):  # an exclusive device; or a full one
+        line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            while sent < _PAST:
+                os.write(line, _PACKETS)
+                sent += 1
+                clock.sleep_until_s(clock.now_s() + _PAST_EVERY_S)
+        finally:
+            os.close(line)
+    holder = ", ".join(map(str, holders_of(device)))
+    where = "" if holder else ", outside of this container"
+    holder = holder or "a program that is hidden from here"
+    if sent == 0:
+        text = f"torque off was not sent: {holder} has the port open, and lets no other write"
+    else:
+        text = (
+            f"torque off was sent {sent} times, but no servo was asked; {holder} has the port open "
+            "and may switch torque on again"
+        )
+    return f"{text}; end that program{where}: sudo snakewalk stop --port {device}"
 
 
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:

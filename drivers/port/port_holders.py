@@ -6,6 +6,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
+try:
+    import pwd
+except ImportError:  # Windows has no /proc either
+    pwd = None  # type: ignore[assignment]
+
+PROC = "/proc"
+"""Processes and locks of all users; Linux has it."""
 _OWN: Final = "snakewalk"
 """Name of the program."""
 _MASTERS: Final = ("/dev/ptmx", "/dev/pts/ptmx")
@@ -19,8 +26,15 @@ class PortHolder:
     process: int
     program: str
     """Name: snakewalk with its command line, Python with its script or module."""
+    user: str
+    """Name of its user."""
     files: tuple[str, ...]
-    """Paths of its open files."""
+    """Paths of its open files; none if they are hidden, as those of other users are."""
+
+    def __str__(self) -> str:
+        """Return program, process and, if it is another one, the user."""
+        other = "" if self.user == _user_name(os.getuid()) else f" of user {self.user}"
+        return f"{self.program} (process {self.process}{other})"
 
     @property
     def is_ours(self) -> bool:
@@ -34,15 +48,39 @@ class PortHolder:
 
 
 def holders_of(device: str) -> list[PortHolder]:
-    """Return the programs that have a device open; those of other users are hidden."""
+    """Return the programs that have a device open.
+
+    Open files of another user's programs are hidden; those that lock the device are found by the
+    lock. Programs of another container, and outside of this one, are hidden.
+    """
     path = os.path.realpath(device)
+    lockers = lockers_of(path)
     found = []
-    for process in sorted(filter(str.isdigit, _listed("/proc")), key=int):
-        files = tuple(_open_files(process))
-        if path in files:
+    for process in sorted(filter(str.isdigit, _listed(PROC)), key=int):
+        files = tuple(open_files(process))
+        if path in files or process in lockers:
             with suppress(OSError):  # just ended
-                found.append(PortHolder(int(process), _program(process), files))
+                user = _user_name(os.stat(f"{PROC}/{process}").st_uid)
+                found.append(PortHolder(int(process), _program(process), user, files))
     return found
+
+
+def lockers_of(path: str) -> set[str]:
+    """Return the processes that lock a file; every user may see them."""
+    with suppress(OSError):
+        info = os.stat(path)
+        major = os.major(info.st_dev)
+        name = f"{major:02x}:{os.minor(info.st_dev):02x}:{info.st_ino}"
+        with open(f"{PROC}/locks", encoding="ascii") as file:
+            locks = [line.split() for line in file]
+        return {lock[-4] for lock in locks if lock[-3] == name}
+    return set()
+
+
+def _user_name(user: int) -> str:
+    with suppress(KeyError):
+        return pwd.getpwuid(user).pw_name
+    return str(user)
 
 
 def _listed(folder: str) -> list[str]:
@@ -52,20 +90,21 @@ def _listed(folder: str) -> list[str]:
         return []
 
 
-def _open_files(process: str) -> Iterator[str]:
-    folder = f"/proc/{process}/fd"
+def open_files(process: str) -> Iterator[str]:
+    """Yield the paths of a process's open files; none if it is hidden."""
+    folder = f"{PROC}/{process}/fd"
     for each in _listed(folder):
         with suppress(OSError):  # closed just now, like the listing's own
             yield os.readlink(f"{folder}/{each}")
 
 
 def _program(process: str) -> str:
-    with open(f"/proc/{process}/cmdline", encoding="utf-8", errors="replace") as file:
+    with open(f"{PROC}/{process}/cmdline", encoding="utf-8", errors="replace") as file:
         words = file.read().rstrip("\0").split("\0")
     names = [os.path.basename(word) for word in words[:2]]
     if _OWN in names:
         return " ".join([_OWN, *words[names.index(_OWN) + 1 :]])
-    with open(f"/proc/{process}/comm", encoding="utf-8", errors="replace") as file:
+    with open(f"{PROC}/{process}/comm", encoding="utf-8", errors="replace") as file:
         name = file.read().strip()
     return " ".join([name, *_script(words[1:])]) if name.startswith("python") else name
 

@@ -13,7 +13,7 @@ import serial
 from serial.tools import list_ports
 
 from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import PortError
+from snakewalk.drivers.errors import PortBusyError, PortError
 from snakewalk.drivers.port.line_port import LinePort
 from snakewalk.drivers.port.port_holders import holders_of
 
@@ -29,6 +29,8 @@ _PROGRAM_S = 0.02
 """How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
 _STUCK_S = 1.0
 """A device that accepts no bytes for this time is gone."""
+_BUSY = (errno.EBUSY, errno.EAGAIN)
+"""Another program has the device open: it is exclusive, or locked."""
 
 
 class SerialPort(LinePort):
@@ -157,7 +159,8 @@ class SerialPort(LinePort):
         return os.path.realpath(self._name).startswith("/dev/pts/")
 
     def _open_error(self, error: Exception) -> PortError:
-        return PortError(open_fault(self._name, self._baud, error))
+        kind = PortBusyError if getattr(error, "errno", None) in _BUSY else PortError
+        return kind(open_fault(self._name, self._baud, error))
 
 
 def open_fault(name: str, baud: int, error: Exception) -> str:
@@ -168,11 +171,11 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
         return f"{name}: no such port; there is {there or 'none: is it plugged in?'}"
     if number in (errno.EACCES, errno.EPERM):
         return f"{name}: no permission; join the group that owns it (often 'dialout')"
-    if number in (errno.EBUSY, errno.EAGAIN):
+    if number in _BUSY:
         holders = holders_of(name)
         is_own = any(each.is_ours for each in holders)
         remedy = f"end it, a run by: snakewalk stop --port {name}" if is_own else "close it"
-        text = ", ".join(f"{each.program} (process {each.process})" for each in holders)
+        text = ", ".join(map(str, holders))
         return f"{name}: another program has it open{text and ': '}{text}; {remedy}"
     if isinstance(error, ValueError):
         return f"{name}: {baud} bit/s is not possible here: {error}"

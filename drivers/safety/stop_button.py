@@ -23,6 +23,11 @@ from typing import Any, Final, Self
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.errors import notes_of
 from snakewalk.drivers.port.byte_port import is_url
+from snakewalk.drivers.port.port_holders import (
+    PROC,
+    lockers_of,
+    open_files,
+)
 
 try:
     import fcntl
@@ -166,6 +171,7 @@ class PressedButton:
     """
 
     def __init__(self, path: Path) -> None:
+        self._path = os.path.realpath(path)
         self._file = os.open(path, os.O_RDWR | _OPEN_FLAGS)
         try:
             info = os.fstat(self._file)
@@ -210,6 +216,15 @@ class PressedButton:
             return True
         fcntl.flock(self._file, fcntl.LOCK_UN)
         return False
+
+    @property
+    def process(self) -> int | None:
+        """Its program as this container numbers it; None if it is hidden or has ended."""
+        number = str(self.run.process)  # the number in the program's own container
+        has_no_proc = not os.path.exists(PROC)
+        if has_no_proc or self._path in open_files(number):
+            return self.run.process
+        return next(map(int, lockers_of(self._path)), None)
 
     @property
     def end(self) -> str | None:

@@ -5,6 +5,7 @@ import os
 import resource
 import subprocess
 import sys
+import tty
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
+from snakewalk.drivers.port import port_holders
 from snakewalk.drivers.protocol.feetech import FeetechInstruction
 from snakewalk.drivers.protocol.packet import (
     BROADCAST_ID,
@@ -64,6 +66,10 @@ port = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
 print("up", flush=True)
 signal.pause()
 """
+
+LOCKS_THE_PORT = OUR_COMMAND.replace(
+    "print", "import fcntl; fcntl.flock(port, fcntl.LOCK_EX)\nprint"
+)
 
 
 @pytest.fixture(autouse=True)
@@ -129,6 +135,43 @@ def test_a_program_that_is_not_ours_is_left_alone(
         code, out, _ = stop("--port", port, "--baud", "1000000")
         assert child.poll() is None
     assert (code, "terminated" in out) == (0, False)
+
+
+def test_torque_off_is_sent_past_a_program_that_is_hidden(
+    stop: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It said "close it" of a program that nobody saw, and sent nothing."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    port = os.ttyname(slave)
+    with program(LOCKS_THE_PORT, tmp_path / "snakewalk", port) as child:
+        assert port_holders.lockers_of(port) == {str(child.pid)}
+        monkeypatch.setattr(port_holders, "PROC", str(tmp_path))
+        code, out, err = stop("--port", port)
+        assert child.poll() is None
+    sent = os.read(master, 4096)
+    os.close(master)
+    os.close(slave)
+    assert (code, err) == (1, "")
+    assert sent == (DYNAMIXEL_OFF + FEETECH_OFF) * 3 * 20
+    assert out == (
+        f"{port}: port in use: torque off was sent 20 times, but no servo was asked; a program "
+        "that is hidden from here has the port open and may switch torque on again; end that "
+        f"program, outside of this container: sudo snakewalk stop --port {port}\n"
+    )
+
+
+def test_one_port_that_is_missing_does_not_keep_torque_on_at_the_others(
+    three: OpenedLine, stop: Callable[..., tuple[int, str, str]]
+) -> None:
+    three.bank["Torque Enable"][:] = 1
+    with line_port(three) as port:
+        code, out, _ = stop("--port", f"1-8=/dev/nosuch,9-16={port}", "--baud", "1000000")
+    first, second = out.splitlines()
+    assert code == 1
+    assert first.startswith("/dev/nosuch: not stopped: /dev/nosuch: no such port")
+    assert second.startswith(f"{port}: torque off: 3 servos confirm it")
+    assert three.bank["Torque Enable"].tolist() == [0] * 3
 
 
 def cpu_s(*words: str) -> float:
@@ -311,7 +354,7 @@ def test_what_is_asked_wrongly_is_one_line(
     assert stop("a", "--port", "b")[0] == 2
     code, _, err = stop()
     assert code == 2
-    assert "nothing to stop: no run is under way; --port: no USB serial adapter found" in err
+    assert "nothing to stop: this user has no run here; --port: no USB serial adapter found" in err
     code, _, err = stop("--port", str(tmp_path / "tty"), "--baud", "7")
     assert "--baud 7: servos have" in err
 

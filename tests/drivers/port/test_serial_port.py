@@ -236,10 +236,16 @@ def exclusive(descriptor: int) -> bool:
     return bool(struct.unpack("i", flag)[0])
 
 
-def test_a_device_is_taken_exclusively_and_given_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(SerialPort, "_is_pseudo_terminal", lambda port: False)
+class Adapter(SerialPort):
+    """A pseudo-terminal that is taken for an adapter."""
+
+    def _is_pseudo_terminal(self) -> bool:
+        return False
+
+
+def test_a_device_is_taken_exclusively_and_given_back() -> None:
     master, slave = os.openpty()
-    with SerialPort(os.ttyname(slave), 57_600):
+    with Adapter(os.ttyname(slave), 57_600):
         assert exclusive(slave)
     assert not exclusive(slave)
     os.close(master)
@@ -314,13 +320,10 @@ def test_a_command_of_snakewalk_that_has_the_port_open_is_named_with_its_run(
 def test_the_host_delays_bytes_by_the_adapters_timer_and_its_own_3_ms(
     timer_ms: int | None, latency_s: float
 ) -> None:
-    class Adapter(SerialPort):
+    class Timed(Adapter):
         latency_timer_ms = timer_ms  # type: ignore[assignment]
 
-        def _is_pseudo_terminal(self) -> bool:
-            return False
-
-    assert Adapter.__new__(Adapter).latency_s == pytest.approx(latency_s)
+    assert Timed.__new__(Timed).latency_s == pytest.approx(latency_s)
 
 
 def test_another_fault_of_a_terminal_is_told_as_it_is_and_nothing_stays_open() -> None:

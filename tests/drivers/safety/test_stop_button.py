@@ -190,3 +190,18 @@ def test_a_damaged_button_of_any_depth_is_no_button(own_folder: Path, text: str)
         assert [each.run.name for each in runs] == ["whole"]
         for each in runs:
             each.close()
+
+
+def test_the_program_of_another_container_is_found_by_its_lock() -> None:
+    """Its own number is another program's here, and that one was killed."""
+    with StopButton("walk") as button:
+        written = button.path.read_bytes()
+        inside = str(os.getpid()).encode()
+        with button.path.open("r+b") as file:
+            file.write(
+                written.replace(b'"process": ' + inside, b'"process": 1'.ljust(11 + len(inside)))
+            )
+        with PressedButton(button.path) as seen:
+            assert seen.run.process == 1
+            assert seen.process == os.getpid()
+    assert seen.process is None
