@@ -9,7 +9,7 @@ from snakewalk.drivers.bus.feetech_bus import FeetechBus
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import Register, model_numbers
-from snakewalk.drivers.protocol.feetech import FeetechInstruction, FeetechParser
+from snakewalk.drivers.protocol.feetech import FeetechInstruction
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
 
@@ -76,13 +76,14 @@ def find_feetech(
 
 
 def _anybody(port: BytePort) -> bool:
+    """Whether a broadcast ping is followed by any byte, an echo of the adapter included."""
     packet = frame(BROADCAST_ID, FeetechInstruction.PING)
     port.clearPort()
     port.write(packet)
     wire_s = 2 * len(packet) * BITS_PER_BYTE / port.getBaudRate()
-    raw = port.read_until(6, port.clock.now_s() + wire_s + _SETTLE_S)
+    raw = port.read_until(1, port.clock.now_s() + wire_s + _SETTLE_S)
     port.drain_until_quiet(_SETTLE_S)
-    return bool(raw) and (FeetechParser().feed(raw) != [] or raw != packet)
+    return raw != b""
 
 
 def identify_at(port: BytePort, servo_id: int, latency_s: float) -> FeetechServo | None:

@@ -8,6 +8,7 @@ names after it choose packages or modules. The exit code is 1 if a share is belo
 """
 
 import argparse
+import ast
 import os
 import resource
 import signal
@@ -23,7 +24,7 @@ import pytest
 from rich.console import Console
 from rich.progress import track
 
-from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.mutants import mutants
 from tests.mutation.packages import drawn_modules, nearest_tests, sample
 from tests.mutation.trial import ROOT, STUCK_S, WORDS, path_of, try_mutants
 
@@ -64,15 +65,15 @@ TARGETS = {
 }
 
 
-def survives(module: str, mutant: Mutant, files: list[str]) -> bool:
-    """Whether no test fails on a fresh import of ``mutant``; one that runs for ever does not."""
+def survives(module: str, tree: ast.AST, files: list[str]) -> bool:
+    """Whether no test fails on a fresh import of ``tree``; one that runs for ever does not."""
     child = os.fork()
     if child == 0:
-        os._exit(_try(module, mutant, files))
+        os._exit(_try(module, tree, files))
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
-def _try(module: str, mutant: Mutant, files: list[str]) -> int:
+def _try(module: str, tree: ast.AST, files: list[str]) -> int:
     os.environ["NUMBA_DISABLE_JIT"] = "1"  # a mutant's loops run as they stand
     resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT_S, TIME_LIMIT_S))
     signal.alarm(STUCK_S)
@@ -83,7 +84,7 @@ def _try(module: str, mutant: Mutant, files: list[str]) -> int:
     changed.__file__ = str(path_of(module))
     sys.modules[module] = changed
     try:
-        exec(compile(mutant.tree, changed.__file__, "exec"), changed.__dict__)
+        exec(compile(tree, changed.__file__, "exec"), changed.__dict__)
         parent, _, name = module.rpartition(".")
         setattr(__import__(parent, fromlist=[name]), name, changed)
     except Exception:
@@ -96,10 +97,13 @@ def try_every(modules: list[str]) -> tuple[list[str], list[str]]:
     explained = tomllib.loads(Path(__file__).with_name("explained.toml").read_text("utf-8"))
     rows, reasons, unexplained = [], [], []
     for module in track(modules, "modules", console=Console(stderr=True)):
-        every = list(mutants(path_of(module).read_text(encoding="utf-8")))
+        source = path_of(module).read_text(encoding="utf-8")
+        every = list(mutants(source))
         drivers = ROOT / "tests" / "drivers"
         files = [str(file) for name in TARGETS[module] for file in drivers.rglob(name)]
-        survivors = [mutant for mutant in every if survives(module, mutant, files)]
+        if not survives(module, ast.parse(source), files):
+            raise SystemExit(f"{module}: its tests fail without a mutant; run pytest on them")
+        survivors = [mutant for mutant in every if survives(module, mutant.tree, files)]
         known = explained.get(module, {})
         for mutant in survivors:
             reason = known.get(mutant.name)
@@ -123,8 +127,8 @@ def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]
             yield module, f"| `{package}` | `{module}` | 0 | 0 | |", True
             continue
         trial = try_mutants(f"snakewalk.{module}", drawn, nearest_tests(module), BUDGET_S)
-        for test in trial.failing:
-            print(f"{module}: fails without a mutant, and is left out: {test}", file=sys.stderr)
+        if trial.failing:
+            raise SystemExit(f"{module}: tests fail without a mutant: {', '.join(trial.failing)}")
         for index in trial.survivors:
             print(f"{module}:{drawn[index].line}: {drawn[index].name}", file=sys.stderr)
         noticed = len(drawn) - len(trial.survivors)

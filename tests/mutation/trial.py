@@ -36,7 +36,7 @@ class Trial(NamedTuple):
     cpu_s: float
     """Their CPU time on the module as it is."""
     failing: list[str]
-    """Tests that fail without a mutant; they are not run."""
+    """Tests that fail without a mutant, which makes the trial worthless."""
 
 
 def path_of(module: str) -> Path:
