@@ -51,7 +51,7 @@ def errors(swing: str, duty: tuple[float, float], noise: float) -> Floats:
     found = []
     for seed in range(DRAWS):
         spine, feet, _ = walker(swing, duty, noise, seed, FRAMES)
-        stride = measure_stride(spine, feet, (1, 3), float(FRAMES))
+        stride = measure_stride(spine, feet, (1, 3), float(FRAMES), "above")
         found.append([foot.duty - duty[k // 2] for k, foot in enumerate(stride.feet)])
     return np.array(found)
 

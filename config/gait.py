@@ -1,11 +1,12 @@
 """Schemas of gaits: a run's table, and shipped parameter sets."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.compliance import ComplianceConfig
+from snakewalk.config.key_types import BLEND, MOTION_S, GaitChangeMethod
 
 Parameters = dict[str, bool | int | float]
 
@@ -36,7 +37,7 @@ class GaitConfig(Strict):
 
     name: str = Field(description="one of `snakewalk gait list`")
     parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
-    duration_s: float = Field(20.0, gt=0.0, le=3600.0, description="then it comes to rest")
+    duration_s: float = Field(MOTION_S, gt=0.0, le=3600.0, description="then it comes to rest")
     look_heading_rad: float | None = Field(None, description="world heading that the head keeps")
     look_at_m: tuple[float, float] | None = Field(None, description="point that the head looks at")
     then: tuple[GaitChange, ...] = Field(
@@ -45,9 +46,7 @@ class GaitConfig(Strict):
     ashore: AshoreConfig | None = Field(
         None, description="along waypoints: how it goes on where it cannot swim; default: it swims"
     )
-    by: Literal["blend", "cpg"] = Field(
-        "blend", description="how gaits change: by a C1 join, or by coupled oscillators"
-    )
+    by: GaitChangeMethod = BLEND
 
     @model_validator(mode="after")
     def _times_rise(self) -> Self:

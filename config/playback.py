@@ -2,32 +2,49 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from snakewalk.config.base import Strict
+from snakewalk.config.key_types import MOTION_S
 from snakewalk.config.synthesis import Curve, Knots
+
+
+def _number_or_auto(given: object) -> object:
+    return None if given == "auto" else given
 
 
 class PlaybackConfig(Strict):
     """A recording in place of a walk; the file is the run's ``track``."""
 
-    speed: float | None = Field(
-        None, gt=0.0, le=10.0, description="times the animal's own; default: as fast as joints can"
+    speed: Annotated[float | None, BeforeValidator(_number_or_auto)] = Field(
+        None,
+        gt=0.0,
+        le=10.0,
+        description="factor on the animal's speed; default: auto, the largest that the joints "
+        "allow, at most 1",
     )
     scale: float = Field(
-        1.0, gt=0.0, le=10.0, description="times the joint angles of the recording: its amplitude"
+        1.0,
+        gt=0.0,
+        le=10.0,
+        description="factor on the joint angles; below 1 the motion is smaller",
     )
     clip: bool = Field(
-        False, description="joints are held within their limits, where the recording bends further"
+        False, description="hold joints at their limits where the recording bends further"
     )
     joints: dict[str, str] = Field(
-        {}, description="joint of the file for joints of the robot; rest keeps a joint at 0"
+        {},
+        description="joint of the file that moves a joint of the robot; `rest` keeps it at 0",
     )
     unit: Literal["rad", "deg"] | None = Field(
-        None, description="of joint angles, where the file does not state it"
+        None, description="unit of joint angles if the file states none: rad or deg"
     )
-    topic: str | None = Field(None, description="of a ROS 2 bag that has several")
-    episode: int | None = Field(None, ge=0, description="of a LeRobot dataset")
+    topic: str | None = Field(
+        None, description="topic of a bag that has several topics of joint angles"
+    )
+    episode: int | None = Field(
+        None, ge=0, description="number of the episode of a LeRobot dataset, from 0"
+    )
 
 
 class ScheduleConfig(Strict):
@@ -38,7 +55,7 @@ class ScheduleConfig(Strict):
 
     speed_m_s: Annotated[Curve, Knots] = Field(0.4, description="wanted")
     turn_rad_s: Annotated[Curve, Knots] = Field(0.0, description="wanted, positive to the left")
-    duration_s: float = Field(20.0, gt=0.0, description="then it comes to rest")
+    duration_s: float = Field(MOTION_S, gt=0.0, description="then it comes to rest")
 
 
 class RepertoireConfig(ScheduleConfig):

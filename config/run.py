@@ -10,6 +10,7 @@ from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.friction_law import LawName
 from snakewalk.config.gait import GaitConfig
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.synthesis import SynthesisConfig
@@ -297,7 +298,7 @@ class RunConfig(Strict):
     waypoint_radius_m: float = Field(
         0.3, gt=0.0, description="distance from a waypoint at which it counts as reached"
     )
-    seed: int = Field(0, ge=0, lt=2**63, description="seed of every random choice")
+    seed: Seed = SEED
     cycle_hz: float = Field(50.0, gt=0.0, le=1000.0, description="control cycles per second")
     physics_step_s: float | None = Field(
         None, ge=2e-5, le=0.01, description="default: 0.002 on a floor, 0.001 on a height field"

@@ -1,10 +1,11 @@
 """File of a walk-through: the stereo positions of a route ([KP] 3.1 and 3.6)."""
 
-from typing import Literal, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.key_types import DISPARITIES, METRE, Disparities, LengthUnit
 
 Pose = tuple[
     tuple[float, float, float, float],
@@ -63,8 +64,8 @@ class WalkthroughConfig(Strict):
         description="calibration of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a "
         "calib.txt; a path from the folder of this file"
     )
-    unit: Literal["m", "cm", "mm"] = Field("m", description="unit of the calibration's T")
-    disparities: int = Field(128, ge=16, le=2048, description="largest disparity to try, in pixels")
+    unit: LengthUnit = METRE
+    disparities: Disparities = DISPARITIES
     positions: tuple[PositionConfig, ...] = Field(
         min_length=1, max_length=200, description="positions in the order of the route"
     )

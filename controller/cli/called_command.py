@@ -2,12 +2,14 @@
 
 import inspect
 import math
+import re
 from collections.abc import Callable
-from functools import wraps
-from typing import Any
+from functools import partial, wraps
+from typing import Any, Final
 
 import typer
 from typer.core import TyperCommand
+from typer.models import ParameterInfo
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.value_faults import given, in_words
@@ -24,9 +26,16 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.plugins import take_problems
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 
+_KINDS: Final = {"bool": "", "str": "text", "int": "integer", "float": "number", "dir": "folder"}
+"""Kinds of values as the help shows them; a switch has none."""
+
 
 class CalledCommand(TyperCommand):
     """A command that refuses a value which would replace another one of the same option."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options and arguments."""
+        return with_kinds(super().get_params(ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Read the words behind a command's name."""
@@ -50,6 +59,29 @@ class CalledCommand(TyperCommand):
             for each in self.params:
                 _check_finite(ctx, each)
         return rest
+
+
+def with_kinds(parameters: list[Any]) -> list[Any]:
+    """Return parameters whose help shows kind and range of a value in words."""
+    for parameter in parameters:
+        shown = getattr(parameter, "display_type", None)  # typer before 0.29 has another form
+        is_named = parameter.param_type_name == "option" and parameter.metavar
+        if shown is not None and not is_named and "display_type_rich" not in vars(parameter):
+            between = _range(parameter.min, parameter.max)
+            parameter.min = parameter.max = None  # typer's own words; its check has them, too
+            parameter.display_type_rich = partial(_kind, shown, between)
+    return parameters
+
+
+def _range(low: float | None, high: float | None) -> str:
+    if low is None:
+        return "" if high is None else f"up to {high:g}"
+    return f"{low:g} or more" if high is None else f"{low:g} to {high:g}"
+
+
+def _kind(shown: Callable[[Any], str], between: str, ctx: Any) -> str:
+    kind = re.sub(r"list\[|[]<>]", "", shown(ctx))
+    return between or _KINDS.get(kind, kind)
 
 
 def _takes_one_value(option: Any) -> bool:
@@ -134,12 +166,14 @@ def _is_model(annotation: Any) -> bool:
     return hasattr(annotation, "model_fields")
 
 
-def _options(parameter: inspect.Parameter) -> list[inspect.Parameter]:
-    if not _is_model(parameter.annotation):
-        return [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
-    from snakewalk.controller.console.option import parameters  # noqa: PLC0415  --help has no models
+def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
+    """Return the options of a parameter: of Typer, of a key's named type, or of a model."""
+    kind = given.annotation
+    if any(isinstance(each, ParameterInfo) for each in getattr(kind, "__metadata__", ())):
+        return [given.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
+    from snakewalk.controller.console.option import key_parameter, parameters  # noqa: PLC0415  --help has no models
 
-    return [*parameters(parameter.annotation)]
+    return [*parameters(kind)] if _is_model(kind) else [key_parameter(given)]
 
 
 def _model(group: Any, options: dict[str, Any]) -> Any:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from snakewalk.controller.cli.called_command import CalledCommand, called
+from snakewalk.controller.cli.called_command import CalledCommand, called, with_kinds
 from snakewalk.controller.cli.command_tree import (
     EVERY_DAY,
     FAMILIES,
@@ -77,6 +77,10 @@ class CommandGroup(TyperGroup):
         return (
             _stub(cmd_name, entries[0]) if self._is_listing else _full_command(cmd_name, entries[0])
         )
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return the options before a command."""
+        return with_kinds(super().get_params(ctx))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that the first word names; an unknown word gets a suggestion."""

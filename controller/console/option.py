@@ -21,6 +21,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.field_facts import bounds_of, description_of
 from snakewalk.config.value_faults import in_words
 from snakewalk.controller.console.completion import Complete
+from snakewalk.controller.console.options import key_values
 
 M = TypeVar("M", bound=Strict)
 
@@ -63,13 +64,25 @@ def numbers(form: str, *counts: int) -> BeforeValidator:
 def parameters(model: type[Strict]) -> Iterator[inspect.Parameter]:
     """Yield the parameter of each field of a model, as Typer reads it."""
     for name, field in model.model_fields.items():
-        kind = _type_of_words(field)
-        yield inspect.Parameter(
-            name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=inspect.Parameter.empty if field.is_required() else _default(field, kind),
-            annotation=Annotated[kind, _typer_info(name, field, kind)],
-        )
+        yield _parameter(name, field)
+
+
+def key_parameter(given: inspect.Parameter) -> inspect.Parameter:
+    """Return a parameter whose type is the named type of a key, as Typer reads it."""
+    if given.default is given.empty:
+        return _parameter(given.name, FieldInfo.from_annotation(given.annotation))
+    field = FieldInfo.from_annotated_attribute(given.annotation, given.default)
+    return _parameter(given.name, field)
+
+
+def _parameter(name: str, field: FieldInfo) -> inspect.Parameter:
+    kind = _type_of_words(field)
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=inspect.Parameter.empty if field.is_required() else _default(field, kind),
+        annotation=Annotated[kind, _typer_info(name, field, kind)],
+    )
 
 
 def from_words(model: type[M], values: Mapping[str, Any]) -> M:
@@ -80,14 +93,23 @@ def from_words(model: type[M], values: Mapping[str, Any]) -> M:
 
     """
     given = {
-        name: values[name]
+        name: _pairs(name, field, values[name])
         for name, field in model.model_fields.items()
-        if not (values[name] is None and field.default == ())
+        if not (values[name] is None and field.default in ((), {}))
     }
     try:
         return model(**given)
     except ValidationError as error:
         raise InputError([_fault(model, dict(each)) for each in error.errors()]) from None
+
+
+def _pairs(name: str, field: FieldInfo, value: Any) -> Any:
+    """Return a table from its KEY=VALUE pairs, and any other value as it is."""
+    if get_origin(field.annotation) is not dict:
+        return value
+    of_text = get_args(field.annotation)[1] is str
+    pairs = key_values(_names(name, _flag(field))[0], value)
+    return {key: str(each) if of_text else each for key, each in pairs.items()}
 
 
 def _fault(model: type[Strict], fault: dict[str, Any]) -> str:
@@ -138,6 +160,8 @@ def _type_of_words(field: FieldInfo) -> Any:
     """Return the type that Typer reads: text for a value with a validator of its words."""
     if any(isinstance(each, BeforeValidator) for each in field.metadata):
         return str | None if type(None) in get_args(field.annotation) else str
+    if get_origin(field.annotation) is dict:
+        return list[str] | None
     arguments = get_args(field.annotation)
     if get_origin(field.annotation) is tuple and arguments[1:] == (Ellipsis,):
         return list[_word(arguments[0])] | None  # type: ignore[misc]
@@ -155,7 +179,7 @@ def _word(annotation: Any) -> Any:
 
 def _default(field: FieldInfo, kind: Any) -> Any:
     """Return a field's default as a command line shows it."""
-    if field.default == ():
+    if field.default in ((), {}):
         return None
     if kind is str and isinstance(field.default, tuple):
         return ",".join(f"{each:g}" for each in field.default)

@@ -37,7 +37,15 @@ Assume = Annotated[
     list[str] | None,
     typer.Option(help="KEY=VALUE: a value that the file does not state; may be repeated"),
 ]
-Seed = Annotated[int | None, typer.Option(help="seed of every random choice")]
+Workers = Annotated[int, typer.Option(min=1, help="number of processes")]
+Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row")]
+RunSeconds = Annotated[
+    float, typer.Option(min=4.0, max=3600.0, help="duration of each run in seconds")
+]
+TableParquet = Annotated[
+    Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
+]
+RunLog = Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")]
 Dask = Annotated[str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="first seed; the others follow it")]
 Motion = Annotated[
@@ -137,6 +145,10 @@ Rate = Annotated[
 MinScore = Annotated[
     float | None,
     typer.Option(help="ignore keypoints with a lower score; default: 0, for DeepLabCut 0.6"),
+]
+FilmRate = Annotated[
+    float | None,
+    typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
 ]
 Individual = Annotated[
     str | None, typer.Option(help="name of the animal to use from a file of several animals")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from snakewalk.config.camera import MappingConfig
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import MOTION_S
 from snakewalk.config.loader import (
     checked,
     load_robot,
@@ -264,7 +265,7 @@ def prepare_source(
     *,
     robot: str | None = None,
     world: str | None = None,
-    seconds: float = 20.0,
+    seconds: float = MOTION_S,
     seed: int = 0,
     name: str = "source",
     keys: Mapping[str, object] | None = None,
@@ -300,7 +301,7 @@ def prepare_policy(
     *,
     robot: str | None = None,
     world: str | None = None,
-    seconds: float = 20.0,
+    seconds: float = MOTION_S,
     seed: int = 0,
     keys: Mapping[str, object] | None = None,
 ) -> SourceRun:

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
+from snakewalk.config.constants import LOOK
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import show
 from snakewalk.controller.console.plugins import find, require
@@ -101,7 +102,7 @@ def write_artifacts(
     *,
     film: bool,
     fine: bool = False,
-    look: str = "servos",
+    look: str = LOOK,
     folders: bool = False,
 ) -> Artifacts:
     """Make report and film of a run; print on standard error why a file is missing.

@@ -10,6 +10,17 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).resolve().parents[2]
+_OTHERS: Final = {
+    "animals/commands/people.py:motion": "how a person moves; that of a run moves a robot",
+    "bench/commands/bus_serve.py:latency": "of a USB adapter in ms; the other is a camera's in s",
+    "exchange/commands/robot_import.py:scale": "of lengths; that of a playback is of angles",
+    "mapping/commands/elevation.py:scale": "of a map; that of a playback is of angles",
+    "mapping/commands/stereo.py:roll": "of a stereo camera by hand; the other one looks down",
+    "mapping/commands/stereo.py:scale": "of a map; that of a playback is of angles",
+    "mapping/commands/stereo.py:spacing": "of a measured map; the other is of random ground",
+    "mapping/commands/walkthrough.py:spacing": "of a measured map; the other is of random ground",
+}
+"""Options whose default equals that of another quantity of the same name, and the difference."""
 
 
 class Default(NamedTuple):
@@ -32,7 +43,8 @@ def repeated() -> list[tuple[Default, Default]]:
             if file.parent.name == "commands":
                 for one in defaults(file):
                     same = [other for other in known if _is_same(one, other)]
-                    found += [(one, same[0])] if same else []
+                    key = f"{package.name}/commands/{file.name}:{one.name}"
+                    found += [(one, same[0])] if same and key not in _OTHERS else []
     return found
 
 
@@ -62,7 +74,7 @@ def _literal(name: str, node: ast.expr | None, place: str) -> Iterator[Default]:
         value = ast.literal_eval(node)
     except ValueError:
         return
-    if not isinstance(value, bool) and value not in (None, "", ()):
+    if not isinstance(value, bool) and value not in (None, "", (), {}):
         yield Default(name, value, place)
 
 

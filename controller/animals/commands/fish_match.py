@@ -9,21 +9,16 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
 from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.accuracy import compare
-from snakewalk.controller.animals.fish.film_options import Build
+from snakewalk.controller.animals.fish.film_options import BUILD, Build
 from snakewalk.controller.animals.fish.fish_matching import MIDLINES, match_footage, read_midlines
 from snakewalk.controller.animals.fish.postures import load_postures, save_postures
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.options import FilmRate, Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
 )
-
-Rate = Annotated[
-    float | None,
-    typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
-]
 
 
 @command(
@@ -54,8 +49,8 @@ def match(
             help="picture of the empty scene from the side; default: median of the frames"
         ),
     ] = None,
-    build: Build = "carp",
-    rate: Rate = None,
+    build: Build = BUILD,
+    rate: FilmRate = None,
     length: Annotated[
         float | None,
         typer.Option(help="body length in metres; without it, lengths are in body lengths"),

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import Seed
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal, synthesise_animal
 from snakewalk.controller.animals.plots.animal_synthesis import draw_animal
 from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
@@ -21,7 +22,6 @@ from snakewalk.controller.console.options import (
     Json,
     Robot,
     RunName,
-    Seed,
     Set,
     TrackFile,
     World,
@@ -116,7 +116,7 @@ def synthesise(
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
-    seed: Seed = None,
+    seed: Seed | None = None,
     motion: Motion = None,
     animal: Animal = None,
     feet: Feet = None,

@@ -1,6 +1,6 @@
 """Options of a film of a fish, on the command line and in Python."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 from pydantic import Field
@@ -16,6 +16,7 @@ Build = Annotated[
         autocompletion=completion.words("carp", "eel"),
     ),
 ]
+BUILD: Final = "carp"
 
 
 class FishFilmOptions(Strict):
@@ -24,7 +25,7 @@ class FishFilmOptions(Strict):
     motion: Annotated[str | None, Flag(complete=completion.RECORDINGS)] = Field(
         None, description="recording to render; default: a scripted fish"
     )
-    build: Build = "carp"
+    build: Build = BUILD
     length_px: float = Field(120.0, ge=20, le=2000, description="body length in pixels")
     frames: int | None = Field(None, ge=2, description="largest number of frames to render")
     side: bool = Field(False, description="render a second film from the side")

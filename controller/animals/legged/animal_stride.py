@@ -99,7 +99,7 @@ def measure_animal(
     like: str,
     name: str,
     length_m: float | None,
-    view: str = "above",
+    view: str,
 ) -> MeasuredAnimal:
     """Measure the stride of a tracked animal.
 

@@ -107,7 +107,7 @@ class Stride:
 
 
 def measure_stride(
-    spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float, view: str = "above"
+    spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float, view: str
 ) -> Stride:
     """Measure the stride of an animal seen from above, or from its side on level ground.
 

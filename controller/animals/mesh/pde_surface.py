@@ -21,7 +21,6 @@ from math import comb, perm
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -168,21 +167,6 @@ class PdeSurface:
         rest = (1 - share) * left + share * right if around == 0 else (right - left) * count / TURN
         fading = _basis(us, self.spread * (len(self.cosine) + 1), self._order, along)
         return np.asarray(np.einsum("ub,bvx->uvx", fading, rest))
-
-
-def carry_over(mesh_m: ArrayLike, before_m: ArrayLike, after_m: ArrayLike) -> Floats:
-    """(K, 3) mesh points moved with their nearest surface points ([GC] 2.4).
-
-    Args:
-        mesh_m: (K, 3) aligned with the surface.
-        before_m: (..., 3) points of the surface at rest.
-        after_m: the same points, moved.
-
-    """
-    mesh = np.asarray(mesh_m, float)
-    rest = np.asarray(before_m, float).reshape(-1, 3)
-    nearest = cKDTree(rest).query(mesh)[1]
-    return np.asarray(mesh + np.asarray(after_m, float).reshape(-1, 3)[nearest] - rest[nearest])
 
 
 def _conditions(places: Floats, kinds: Sequence[int], rate: float | Floats) -> Floats:

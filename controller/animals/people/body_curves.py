@@ -97,7 +97,7 @@ class BodyPart:
         return np.asarray(np.einsum("kb,kbvi->kvi", self.shares, placed))
 
 
-def body_parts(skeleton: PersonSkeleton, girth: float = 1.0) -> tuple[BodyPart, ...]:
+def body_parts(skeleton: PersonSkeleton, girth: float) -> tuple[BodyPart, ...]:
     """Return trunk, two arms, two legs and two shoes.
 
     ``girth`` is a factor on all half widths and depths.

@@ -48,7 +48,7 @@ class Person:
     texture: Image
 
     @classmethod
-    def of(cls, stature_m: float = 1.75, girth: float = 1.0) -> "Person":
+    def of(cls, stature_m: float, girth: float) -> "Person":
         """Make the body of a stature; ``girth`` is a factor on all widths."""
         skeleton = PersonSkeleton.of(stature_m)
         parts = body_parts(skeleton, girth)

@@ -10,6 +10,7 @@ from rich.table import Table
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.bench import inventory, scan
+from snakewalk.controller.bench.commands.bus_options import Bauds
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
@@ -24,10 +25,7 @@ from snakewalk.controller.console.result_files import atomic_write
 )
 def bus_identify(
     port: ChainPort = None,
-    baud: Annotated[
-        list[int] | None,
-        typer.Option(help="search only this baud rate; may be repeated; default: all"),
-    ] = None,
+    baud: Bauds = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="write a first robot file here (.toml)")
     ] = None,

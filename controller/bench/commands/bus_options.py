@@ -9,6 +9,12 @@ from snakewalk.config.errors import InputError
 
 Ids = Annotated[list[int], typer.Option("--id", help="ID of a servo, 0 to 252; may be repeated")]
 Baud = Annotated[int, typer.Option(help="current baud rate of the servos")]
+Bauds = Annotated[
+    list[int] | None,
+    typer.Option(help="search only this baud rate; may be repeated; default: all"),
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="show the changes and write nothing")]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="act without asking")]
 
 
 def confirmed(action: str, question: str, *, as_json: bool) -> bool:

@@ -1,11 +1,7 @@
 """``snakewalk bus reboot``: restarts servos."""
 
-from typing import Annotated
-
-import typer
-
 from snakewalk.config.constants import DEFAULT_BAUD
-from snakewalk.controller.bench.commands.bus_options import Baud, Ids, confirmed
+from snakewalk.controller.bench.commands.bus_options import Baud, Ids, Yes, confirmed
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import restart
 from snakewalk.controller.console.command import command
@@ -17,7 +13,7 @@ def reboot(
     servo_id: Ids,
     port: ChainPort = None,
     baud: Baud = DEFAULT_BAUD,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="reboot without asking")] = False,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Restart servos and clear their alarms; torque goes off, so a held load falls."""

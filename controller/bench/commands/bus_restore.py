@@ -9,7 +9,7 @@ from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
-from snakewalk.controller.bench.commands.bus_options import Baud, confirmed
+from snakewalk.controller.bench.commands.bus_options import Baud, DryRun, Yes, confirmed
 from snakewalk.controller.bench.eeprom_backup import load_backup, plan_restore
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import apply
@@ -28,10 +28,8 @@ def restore(
     ] = None,
     port: ChainPort = None,
     baud: Baud = DEFAULT_BAUD,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="show the changes and write nothing")
-    ] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    dry_run: DryRun = False,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Write the values of a backup that differ; shows them and asks first."""

@@ -17,6 +17,7 @@ import typer
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.loader import load
 from snakewalk.controller.bench.commands.serve_options import (
     At,
@@ -99,7 +100,7 @@ def serve(
     pose_out: PoseOut = None,
     tracker: Tracker = None,
     truth: TruthFile = None,
-    seed: Annotated[int, typer.Option(help="seed of the noise of the poses")] = 0,
+    seed: Seed = SEED,
     imu: BenchImu = None,
     baud: Annotated[int | None, typer.Option(help="baud rate of the servos in bit/s")] = None,
     pace: Annotated[float, typer.Option(help="simulated seconds per second of real time")] = 1.0,

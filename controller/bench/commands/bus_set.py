@@ -7,7 +7,7 @@ import typer
 from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
-from snakewalk.controller.bench.commands.bus_options import confirmed
+from snakewalk.controller.bench.commands.bus_options import Baud, DryRun, Yes, confirmed
 from snakewalk.controller.bench.fingerprints import fingerprint_file, note_changes
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import (
@@ -33,7 +33,7 @@ from snakewalk.drivers.protocol.registers import BAUDS
 def bus_set(
     servo_id: Annotated[int, typer.Option("--id", help="ID of the servo, 0 to 252")],
     port: ChainPort = None,
-    baud: Annotated[int, typer.Option(help="current baud rate of the servo")] = DEFAULT_BAUD,
+    baud: Baud = DEFAULT_BAUD,
     new_id: Annotated[int | None, typer.Option(help="new ID, 0 to 252")] = None,
     new_baud: Annotated[int | None, typer.Option(help="new baud rate in bit/s")] = None,
     min_position: Annotated[
@@ -52,10 +52,8 @@ def bus_set(
     robot: Annotated[
         str | None, typer.Option(help="robot whose fingerprint file to update")
     ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="show the changes and write nothing")
-    ] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="write without asking")] = False,
+    dry_run: DryRun = False,
+    yes: Yes = False,
     as_json: Json = False,
 ) -> None:
     """Change settings of one servo that persist without power; shows them and asks first."""

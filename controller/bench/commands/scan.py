@@ -1,13 +1,12 @@
 """``snakewalk bus scan``: the servos on the bus."""
 
 import json
-from typing import Annotated
 
-import typer
 from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench import scan as scanning
+from snakewalk.controller.bench.commands.bus_options import Bauds
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
@@ -17,10 +16,7 @@ from snakewalk.controller.console.options import ChainPort, Json, console
 @command("bus scan", examples=("bus scan", "bus scan --port /dev/ttyUSB0 --baud 57600 --json"))
 def scan(
     port: ChainPort = None,
-    baud: Annotated[
-        list[int] | None,
-        typer.Option(help="search only this baud rate; may be repeated; default: all"),
-    ] = None,
+    baud: Bauds = None,
     as_json: Json = False,
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""

@@ -10,7 +10,15 @@ from snakewalk.controller.cameras.camera_findings import camera_findings
 from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
-from snakewalk.controller.console.options import VIEW_AT, Json, RunName, RunPort, Set, key_values
+from snakewalk.controller.console.options import (
+    VIEW_AT,
+    Json,
+    RunName,
+    RunPort,
+    Set,
+    ViewAt,
+    key_values,
+)
 from snakewalk.controller.run.factory import changed, prepare_job
 from snakewalk.controller.run.pose_provider import pose_faults
 
@@ -32,9 +40,7 @@ def check(
     view: Annotated[
         bool, typer.Option("--view", help="show the picture in a browser during the check")
     ] = False,
-    view_at: Annotated[
-        str, typer.Option(metavar="HOST:PORT", help="address of the page")
-    ] = VIEW_AT,
+    view_at: ViewAt = VIEW_AT,
     as_json: Json = False,
 ) -> None:
     """Check a camera, real or simulated: markers, frame rate, latency, light.

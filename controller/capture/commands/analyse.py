@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
+    Force,
     Individual,
     Json,
     Keypoints,
@@ -51,7 +52,7 @@ def analyse(
             help="draw tracks and maps into a file (.png, .svg, .pdf), or a folder for PNGs"
         ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite pictures")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""

@@ -11,7 +11,7 @@ from snakewalk.controller.capture.capturing import capture_recording, correct_re
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, console, show
+from snakewalk.controller.console.options import FilmRate, Force, Json, console, show
 
 Footage = Annotated[
     Path,
@@ -83,10 +83,6 @@ Output = Annotated[
 ]
 LengthM = Annotated[
     float | None, typer.Option(help="length of the animal in metres, which sets the scale")
-]
-FilmRate = Annotated[
-    float | None,
-    typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
 ]
 Head = Annotated[
     str | None, typer.Option(help="X,Y in pixels near the head in the first usable frame")

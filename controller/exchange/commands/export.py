@@ -12,7 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.options import Force, Json, RunLog, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.exchange.flat_table import (
     flat_tables,
@@ -35,7 +35,7 @@ from snakewalk.controller.runlog.reader import read_log
     ),
 )
 def export(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
+    log: RunLog,
     csv: Annotated[
         Path | None,
         typer.Option(file_okay=False, help="write CSV tables into this folder, one per channel"),

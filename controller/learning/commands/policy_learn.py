@@ -9,8 +9,9 @@ from pydantic import ValidationError
 
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, console
+from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, Workers, console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.learning.wave_search import (
@@ -41,8 +42,8 @@ def learn_policy(
     steps: Annotated[
         int, typer.Option(min=50, max=100_000, help="number of steps of 20 ms per episode")
     ] = 250,
-    seed: Annotated[int, typer.Option(min=0, help="seed of candidates and starts")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    seed: Seed = SEED,
+    workers: Workers = 2,
     resume: Annotated[
         bool, typer.Option("--resume", help="continue an interrupted search from OUT.part")
     ] = False,

@@ -4,15 +4,10 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.key_types import MOTION_S, SEED, MotionSeconds, Seed
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (
-    Robot,
-    Set,
-    Shadow,
-    World,
-    key_values,
-)
+from snakewalk.controller.console.options import Robot, Set, Shadow, World, key_values
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.controller.run.results import show_result, summarized
@@ -37,10 +32,8 @@ def run_policy(
     robot: Robot = None,
     world: World = None,
     set_: Set = None,
-    seconds: Annotated[
-        float, typer.Option(min=1.0, max=3600.0, help="duration of the motion in seconds")
-    ] = 20.0,
-    seed: Annotated[int, typer.Option(min=0, help="seed of every random choice")] = 0,
+    seconds: MotionSeconds = MOTION_S,
+    seed: Seed = SEED,
     shadow: Shadow = False,
     *,
     options: RunOptions,

@@ -12,7 +12,14 @@ from rich.table import Table
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import FirstSeed, Json, console
+from snakewalk.controller.console.options import (
+    FirstSeed,
+    Json,
+    RunSeconds,
+    Seeds,
+    Workers,
+    console,
+)
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.learning import policy_trials as study
 from snakewalk.controller.learning.policy_trials import PolicyTrial, PolicyTrialResult
@@ -41,12 +48,10 @@ def policy_trials(
             autocompletion=completion.WORLDS,
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per row")] = 10,
+    seeds: Seeds = 10,
     first_seed: FirstSeed = 0,
-    seconds: Annotated[
-        float, typer.Option(min=5.0, max=3600.0, help="duration of each run in seconds")
-    ] = 12.0,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    seconds: RunSeconds = 12.0,
+    workers: Workers = 2,
     as_json: Json = False,
 ) -> None:
     """Compare policies with gaits: each seed varies start, friction and supply equally for all."""

@@ -3,29 +3,31 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.key_types import DISPARITIES, METRE, Disparities, LengthUnit
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
 from snakewalk.controller.mapping.commands.elevation import (
     Fill,
     Picture,
+    Scale,
     WorldOut,
     check_fill,
     check_world_files,
     finish,
     not_positive,
 )
+from snakewalk.controller.mapping.length_units import unit_m
 from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
     from snakewalk.controller.mapping.stereo_ground import StereoGround
 
-_UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048}
 Left = Annotated[Path, typer.Argument(help="picture of the left camera")]
 Right = Annotated[Path, typer.Argument(help="picture of the right camera at the same moment")]
 Calibration = Annotated[
@@ -34,7 +36,6 @@ Calibration = Annotated[
         help="calibration of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a calib.txt"
     ),
 ]
-Unit = Annotated[str, typer.Option(help="unit of the calibration's T: m, cm, mm")]
 Height = Annotated[
     float | None,
     typer.Option(help="height of the left camera above the ground in metres; default: fitted"),
@@ -51,9 +52,6 @@ LevelGround = Annotated[
         "--level-ground", help="accept a fitted ground as level, however the camera is rolled"
     ),
 ]
-Disparities = Annotated[
-    int, typer.Option(min=16, max=2048, help="largest disparity to try in pixels")
-]
 SampleSpacing = Annotated[
     float, typer.Option(help="distance of samples in the robot's world in metres")
 ]
@@ -64,7 +62,6 @@ Far = Annotated[
     float | None,
     typer.Option(help="largest distance ahead in metres; default: as far as --error allows"),
 ]
-Scale = Annotated[float, typer.Option(help="metres in the robot's world per metre")]
 
 
 @command(
@@ -79,12 +76,12 @@ def stereo(
     right: Right,
     calibration: Calibration,
     out: WorldOut,
-    unit: Unit = "m",
+    unit: LengthUnit = METRE,
     height: Height = None,
     tilt: Tilt = None,
     roll: Roll = 0.0,
     level_ground: LevelGround = False,
-    disparities: Disparities = 128,
+    disparities: Disparities = DISPARITIES,
     spacing: SampleSpacing = 0.03,
     error: Error = 0.03,
     far: Far = None,
@@ -112,12 +109,10 @@ def stereo(
     faults += _stand_faults(height, tilt, roll)
     if level_ground and height is not None:
         faults.append("--level-ground fits the ground; leave out --height, --tilt and --roll")
-    if unit not in _UNITS_M:
-        faults.append(f"--unit {unit}: is unknown; use one of {', '.join(_UNITS_M)}")
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
-    calibrated = stereo_camera.read_calibration(calibration, _UNITS_M[unit])
+    calibrated = stereo_camera.read_calibration(calibration, unit_m(unit))
     pictures = (colour_picture.read_colours(side) for side in (left, right))
     pair = stereo_camera.rectify(calibrated, *pictures)
     stand = None

@@ -34,8 +34,7 @@ def labelled(costs: Costs, base: Ints, penalty: float, rounds: int = 10) -> Ints
     total = np.zeros_like(costs)
     for down, right in ((0, 1), (1, 0), (1, 1), (1, -1), (0, -1), (-1, 0), (-1, -1), (-1, 1)):
         _aggregate(costs, base, down, right, penalty, total)
-    flat = total.reshape(*costs.shape[:2], -1)
-    labels = np.where(np.isfinite(flat.min(axis=2)), flat.argmin(axis=2), -1).astype(np.int64)
+    labels = cheapest(total)
     descend(costs, base, penalty, rounds, labels)
     return labels
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, show
+from snakewalk.controller.console.options import Json, RunLog, show
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.rehearsal.judgement import judge as judged
 from snakewalk.controller.runlog.reader import read_log
@@ -16,7 +16,7 @@ from snakewalk.controller.runlog.truth import read_truth
 @command("log judge", examples=("log judge truth.jsonl runs/my-run/log.mcap",))
 def judge(
     truth: Annotated[Path, typer.Argument(help="file of `snakewalk bus serve --truth`")],
-    log: Annotated[Path, typer.Argument(help="log.mcap of the run")],
+    log: RunLog,
     as_json: Json = False,
 ) -> None:
     """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""

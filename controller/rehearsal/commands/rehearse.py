@@ -13,7 +13,14 @@ from snakewalk.config.loader import checked
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import FirstSeed, Json, console, key_values
+from snakewalk.controller.console.options import (
+    FirstSeed,
+    Json,
+    Seeds,
+    Workers,
+    console,
+    key_values,
+)
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.rehearsal.rehearsal import RUNS, RehearsalCase, case_of, rehearse
@@ -40,7 +47,7 @@ def rehearse_runs(
             autocompletion=completion.RUNS,
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, help="number of seeds of each run")] = 3,
+    seeds: Seeds = 3,
     first_seed: FirstSeed = 0,
     errors: Annotated[
         bool,
@@ -57,7 +64,7 @@ def rehearse_runs(
             help="errors of the simulated tracker; default: noise_m=0.01 noise_deg=3 delay_s=0.1",
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
+    workers: Workers = 1,
     out: Annotated[
         Path,
         typer.Option(

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import FirstSeed, Json, console
+from snakewalk.controller.console.options import FirstSeed, Json, Seeds, Workers, console
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
@@ -46,12 +46,12 @@ def tasks(
             "repeated; default: all built-in ones"
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="number of runs per cell")] = 1,
+    seeds: Seeds = 1,
     first_seed: FirstSeed = 0,
     conditions: Annotated[
         bool, typer.Option("--conditions", help="list the tasks and their conditions; run nothing")
     ] = False,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 1,
+    workers: Workers = 1,
     out: Annotated[
         Path,
         typer.Option(

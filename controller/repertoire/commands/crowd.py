@@ -8,6 +8,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
@@ -48,7 +49,7 @@ def crowd(
             "--separate/--no-separate", help="let an animal wait instead of entering another one"
         ),
     ] = True,
-    seed: Annotated[int, typer.Option(min=0, help="seed of places, sizes and choices")] = 0,
+    seed: Seed = SEED,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

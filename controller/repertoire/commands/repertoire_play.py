@@ -8,14 +8,10 @@ import numpy as np
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.playback import ScheduleConfig
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (
-    Robot,
-    Set,
-    World,
-    key_values,
-)
+from snakewalk.controller.console.options import Robot, Set, World, key_values
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
@@ -75,9 +71,7 @@ def play_actions(
     picture: Annotated[
         Path | None, typer.Option(help="draw requested and measured speed and turn rate")
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="seed of the changes that --patience causes")
-    ] = 0,
+    seed: Seed = SEED,
     *,
     options: RunOptions,
 ) -> None:

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import LOOK
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, Look, show
+from snakewalk.controller.console.options import Force, Json, Look, RunLog, show
 from snakewalk.controller.console.result_files import refuse_mixture
 from snakewalk.controller.run.results import check_look, write_artifacts
 from snakewalk.controller.runlog.reader import read_log
@@ -15,7 +16,7 @@ from snakewalk.controller.runlog.reader import read_log
 
 @command("log report", examples=("log report runs/flat-square-walk-seed0/log.mcap",))
 def report(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")],
+    log: RunLog,
     out: Annotated[
         Path | None,
         typer.Option(file_okay=False, help="folder of the report; default: the log's folder"),
@@ -24,7 +25,7 @@ def report(
     fine: Annotated[
         bool, typer.Option("--fine", help="draw the film in 1280 x 720, which is slow")
     ] = False,
-    look: Look = "servos",
+    look: Look = LOOK,
     folders: Annotated[
         bool, typer.Option("--folders", help="keep the folder names of your files in report.html")
     ] = False,

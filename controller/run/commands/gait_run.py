@@ -10,16 +10,9 @@ from typing import Annotated, Any
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console import completion
+from snakewalk.config.key_types import BLEND, MOTION_S, SEED, GaitChangeMethod, MotionSeconds, Seed
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import (
-    Compliant,
-    Robot,
-    Set,
-    Shadow,
-    World,
-    key_values,
-)
+from snakewalk.controller.console.options import Compliant, Robot, Set, Shadow, World, key_values
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
@@ -31,19 +24,9 @@ from snakewalk.controller.run.results import by_evidence, show_result, summarize
 from snakewalk.controller.run.run_for_user import observers_of, run_for_user
 from snakewalk.controller.run.run_keys import with_compliance
 
-_LEAST_S = 0.1
-"""Shortest motion (ours)."""
-
 Then = Annotated[
     list[str] | None,
     typer.Option(help="NAME@S[,PARAM=V]: change to gait NAME after S seconds; may be repeated"),
-]
-By = Annotated[
-    str,
-    typer.Option(
-        help="method for changes of the gait: blend, or cpg (coupled oscillators)",
-        autocompletion=completion.words("blend", "cpg"),
-    ),
 ]
 LookHeading = Annotated[
     float | None, typer.Option(help="world heading that the head keeps, in rad")
@@ -73,23 +56,19 @@ def run_gait(
     param: Param = None,
     set_: Set = None,
     then: Then = None,
-    by: By = "blend",
-    seconds: Annotated[float, typer.Option(help="duration of the motion in seconds")] = 20.0,
+    by: GaitChangeMethod = BLEND,
+    seconds: MotionSeconds = MOTION_S,
     look_heading_rad: LookHeading = None,
     look_at: LookAt = None,
     live: Live = False,
     gamepad: OnGamepad = None,
     compliance: Compliant = None,
     shadow: Shadow = False,
-    seed: Annotated[int, typer.Option(help="seed of every random choice")] = 0,
+    seed: Seed = SEED,
     *,
     options: RunOptions,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
-    if by not in {"blend", "cpg"}:
-        raise InputError(f"--by {by}: expected blend or cpg")
-    if seconds < _LEAST_S:
-        raise InputError(f"--seconds {seconds:g}: must be at least {_LEAST_S:g}")
     with ExitStack() as stack:
         observers = stack.enter_context(observers_of(options))
         hands = open_hands(stack, live, gamepad, observers.page)
@@ -104,7 +83,7 @@ def run_gait(
             look_at_m=_point(look_at),
             make_operator=None if hands is None else hands.operator,
             then=[_change(text) for text in then or []],
-            by="cpg" if by == "cpg" else "blend",
+            by=by,
             keys=key_values("--set", set_),
         )
         prepared = replace(gait, run=with_compliance(gait.run, compliance))

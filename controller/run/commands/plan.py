@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import Seed
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     DEFAULT_RUN,
@@ -15,7 +16,6 @@ from snakewalk.controller.console.options import (
     Motion,
     Robot,
     RunName,
-    Seed,
     Set,
     TrackFile,
     World,
@@ -45,7 +45,7 @@ def plan(
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
-    seed: Seed = None,
+    seed: Seed | None = None,
     motion: Motion = None,
     set_: Set = None,
     with_: Annotated[

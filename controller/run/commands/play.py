@@ -3,10 +3,12 @@
 from typing import Annotated
 
 import typer
+from pydantic import Field
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.playback import PlaybackConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.option import Flag
 from snakewalk.controller.console.options import (
     Robot,
     Set,
@@ -17,6 +19,16 @@ from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.run.results import show_result
 from snakewalk.controller.run.run_for_user import run_for_user
+
+
+class PlaybackOptions(PlaybackConfig):
+    """The keys of ``[playback]`` as options."""
+
+    joints: Annotated[dict[str, str], Flag(("--joint",), metavar="ROBOT=FILE")] = Field(
+        {},
+        description="joint of the file that moves a joint of the robot; ROBOT=rest keeps it at 0; "
+        "may be repeated",
+    )
 
 
 @command(
@@ -37,40 +49,9 @@ def play(
     ],
     robot: Robot = None,
     world: World = None,
-    speed: Annotated[
-        str,
-        typer.Option(
-            help="factor on the animal's speed; auto: the largest that the joints allow, at most 1"
-        ),
-    ] = "auto",
-    scale: Annotated[
-        float, typer.Option(help="factor on the joint angles; below 1 the motion is smaller")
-    ] = 1.0,
-    clip: Annotated[
-        bool,
-        typer.Option(
-            "--clip", help="hold joints at their limits where the recording bends further"
-        ),
-    ] = False,
-    joint: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="ROBOT=FILE",
-            help="joint of the file that moves a joint of the robot; ROBOT=rest keeps it at 0; may "
-            "be repeated",
-        ),
-    ] = None,
-    unit: Annotated[
-        str | None, typer.Option(help="unit of joint angles if the file states none: rad or deg")
-    ] = None,
-    topic: Annotated[
-        str | None, typer.Option(help="topic of a bag that has several topics of joint angles")
-    ] = None,
-    episode: Annotated[
-        int | None, typer.Option(help="number of the episode of a LeRobot dataset, from 0")
-    ] = None,
     set_: Set = None,
     *,
+    playback: PlaybackOptions,
     options: RunOptions,
 ) -> None:
     """Play a recording or joint angles on servos or in the simulator.
@@ -81,14 +62,8 @@ def play(
         track,
         robot=robot,
         world=world,
-        speed=_speed(speed),
-        scale=scale,
-        clip=clip,
         keys=key_values("--set", set_),
-        joints={name: str(value) for name, value in key_values("--joint", joint).items()},
-        unit=_unit(unit),
-        topic=topic,
-        episode=episode,
+        **playback.model_dump(),
     )
     name = f"play-{prepared.run.name}"
     result = run_for_user(prepared, name, options, seconds=prepared.duration_s)
@@ -97,7 +72,7 @@ def play(
         "robot": prepared.robot.name,
         "world": prepared.world.name,
         "speed": round(prepared.speed, 4),
-        "scale": scale,
+        "scale": playback.scale,
         "clipped": prepared.clipped,
         "notes": list(prepared.notes),
         "duration_s": round(result.outcome.duration_s, 2),
@@ -105,18 +80,3 @@ def play(
         "peak_current_a": result.summary.peak_current_a,
     }
     show_result(result, facts, options)
-
-
-def _unit(text: str | None) -> str | None:
-    if text not in (None, "rad", "deg"):
-        raise InputError(f"--unit {text}: expected rad or deg")
-    return text
-
-
-def _speed(text: str) -> float | None:
-    if text == "auto":
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"--speed {text}: expected auto or a factor") from None

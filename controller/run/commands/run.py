@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.constants import LOOK
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import Seed
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
@@ -17,7 +19,6 @@ from snakewalk.controller.console.options import (
     Observe,
     Robot,
     RunName,
-    Seed,
     Set,
     Shadow,
     TrackFile,
@@ -41,7 +42,7 @@ def run(
     robot: Robot = None,
     world: World = None,
     track: TrackFile = None,
-    seed: Seed = None,
+    seed: Seed | None = None,
     motion: Motion = None,
     pose: Annotated[
         str | None,
@@ -74,7 +75,7 @@ def run(
         ),
     ] = False,
     observe: Observe = None,
-    look: Look = "servos",
+    look: Look = LOOK,
     accept_dead_reckoning: Annotated[
         bool,
         typer.Option(

@@ -1,10 +1,11 @@
 """Runs of a gait, from a command's options."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitSetConfig
+from snakewalk.config.key_types import BLEND, MOTION_S, GaitChangeMethod
 from snakewalk.config.loader import load_gait, load_run, shipped
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
@@ -31,13 +32,13 @@ def prepare_gait(
     robot: str | None = None,
     world: str | None = None,
     parameters: dict[str, Any] | None = None,
-    seconds: float = 20.0,
+    seconds: float = MOTION_S,
     seed: int = 0,
     look_heading_rad: float | None = None,
     look_at_m: tuple[float, float] | None = None,
     make_operator: MakeOperator | None = None,
     then: Sequence[tuple[float, str, dict[str, Any]]] = (),
-    by: Literal["blend", "cpg"] = "blend",
+    by: GaitChangeMethod = BLEND,
     keys: Mapping[str, object] | None = None,
 ) -> GaitRun:
     """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.

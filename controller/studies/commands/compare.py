@@ -10,7 +10,7 @@ from rich.table import Column, Table
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.options import Force, Json, console, labelled
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.commands.pictures import pictures
@@ -18,9 +18,6 @@ from snakewalk.controller.studies.run_comparison import compared_run, differing,
 
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
-
-_LONGEST = 44
-"""Characters of a value in the table."""
 
 
 @command(
@@ -63,39 +60,25 @@ def compare(
 
 
 def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> None:
-    settings = Table(
-        "setting", *_columns(runs), box=None, title="What differs", title_justify="left"
-    )
+    settings = _table("setting", "What differs", runs)
     for key, values in changed.items():
-        settings.add_row(key, *map(_text, values))
+        settings.add_row(key, *(labelled(key, value)[1] for value in values))
     if changed:
         console.print(settings, "")
     else:
         console.print("Run, robot and world are the same.\n")
-    numbers = Table(
-        "number", *_columns(runs), box=None, title="What came of it", title_justify="left"
-    )
+    numbers = _table("number", "What came of it", runs)
     summaries = [flat(run.summary.to_dict()) for run in runs]
     for key in dict.fromkeys(key for each in summaries for key in each):
         values = [each.get(key) for each in summaries]
         is_known = any(value not in (None, "") for value in values)
         if is_known and key not in {"config_hash", "software"}:
-            numbers.add_row(key.replace("_", " "), *map(_text, values))
+            cells = [labelled(key, value) for value in values]
+            label = min((each for each, _ in cells), key=len)  # without the unit, if one is known
+            numbers.add_row(label, *(text for _, text in cells))
     console.print(numbers)
 
 
-def _columns(runs: "list[ComparedRun]") -> list[Column]:
-    return [Column(run.name, overflow="fold") for run in runs]
-
-
-def _text(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.5g}"
-    if isinstance(value, list | tuple):
-        text = f"[{', '.join(map(_text, value))}]"
-        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
-    return str(value)
+def _table(heading: str, title: str, runs: "list[ComparedRun]") -> Table:
+    columns = [Column(run.name, overflow="fold") for run in runs]
+    return Table(heading, *columns, box=None, title=title, title_justify="left")

@@ -12,12 +12,21 @@ from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.loader import checked, load_robot, load_world, with_keys
 from snakewalk.config.template import robot_toml, template
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, Robot, World, check_files, console
+from snakewalk.controller.console.options import (
+    Force,
+    Json,
+    Robot,
+    Workers,
+    World,
+    check_files,
+    console,
+)
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.runlog.reader import read_log
@@ -105,7 +114,7 @@ def identify(
     fit: Annotated[
         bool, typer.Option("--fit/--no-fit", help="fit, or only judge the constants of --start")
     ] = True,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
+    seed: Seed = SEED,
     backlash: Annotated[
         bool, typer.Option("--backlash", help="estimate the backlash of the gears, too")
     ] = False,
@@ -126,7 +135,7 @@ def identify(
             "robot of a run's log with its mass"
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes, for logs of runs")] = 2,
+    workers: Workers = 2,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.options import Force, Json, RunLog, console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 from snakewalk.controller.runlog.reader import read_log
@@ -20,7 +20,7 @@ from snakewalk.controller.studies import replay as replaying
 
 @command("log replay", examples=("log replay runs/flat-square-walk-seed0/log.mcap --json",))
 def replay(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, simulated or on servos")],
+    log: RunLog,
     tolerance_rad: Annotated[
         float,
         typer.Option(

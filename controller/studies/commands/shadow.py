@@ -1,16 +1,12 @@
 """``snakewalk log shadow``: differences between a robot, by its log, and the simulator."""
 
 import json
-from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_world
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Json, World, check_files, console
+from snakewalk.controller.console.options import Json, RunLog, Workers, World, check_files, console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
@@ -24,9 +20,9 @@ from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
     ),
 )
 def shadow(
-    log: Annotated[Path, typer.Argument(help="log.mcap of a run, on servos or simulated")],
+    log: RunLog,
     world: World = None,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    workers: Workers = 2,
     as_json: Json = False,
 ) -> None:
     """Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences."""

@@ -9,10 +9,21 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Dask, Force, Json, Set, console, key_values
+from snakewalk.controller.console.options import (
+    Dask,
+    Force,
+    Json,
+    RunSeconds,
+    Set,
+    TableParquet,
+    Workers,
+    console,
+    key_values,
+)
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
@@ -64,11 +75,9 @@ def sweep(
     points: Annotated[
         int, typer.Option(min=1, max=100_000, help="number of points per gait and robot")
     ] = 30,
-    seconds: Annotated[
-        float, typer.Option(min=4.0, max=3600.0, help="duration of each run in seconds")
-    ] = 12.0,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the choice of points")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    seconds: RunSeconds = 12.0,
+    seed: Seed = SEED,
+    workers: Workers = 2,
     dask: Dask = None,
     backend: Annotated[
         str, typer.Option(help="simulator: processes, warp, warp:DEVICE, or a plug-in")
@@ -80,9 +89,7 @@ def sweep(
     picture: Annotated[
         Path | None, typer.Option(help="draw the table here (.png, .svg, .pdf)")
     ] = None,
-    parquet: Annotated[
-        Path | None, typer.Option(help="write the table as Parquet here, in addition")
-    ] = None,
+    parquet: TableParquet = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

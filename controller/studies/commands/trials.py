@@ -22,7 +22,10 @@ from snakewalk.controller.console.options import (
     FirstSeed,
     Force,
     Json,
+    Seeds,
+    TableParquet,
     TrackFile,
+    Workers,
     console,
 )
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
@@ -88,9 +91,6 @@ TrialsPicture = Annotated[
     Path | None,
     typer.Option(help="draw complete and failed runs with reasons (.png, .svg, .pdf)"),
 ]
-TrialsParquet = Annotated[
-    Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
-]
 TrialsOut = Annotated[
     Path | None,
     typer.Option(
@@ -121,7 +121,7 @@ def trials(
             autocompletion=completion.RUNS_OR_GAITS,
         ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row")] = 20,
+    seeds: Seeds = 20,
     first_seed: FirstSeed = 0,
     start_spread: StartSpread = 0.04,
     motion: Annotated[
@@ -155,11 +155,11 @@ def trials(
         ),
     ] = None,
     track: TrackFile = None,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    workers: Workers = 2,
     out: TrialsOut = None,
     dask: Dask = None,
     picture: TrialsPicture = None,
-    parquet: TrialsParquet = None,
+    parquet: TableParquet = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

@@ -8,9 +8,19 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, Robot, Set, key_values, show
+from snakewalk.controller.console.options import (
+    Force,
+    Json,
+    Robot,
+    RunSeconds,
+    Set,
+    Workers,
+    key_values,
+    show,
+)
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.gaits.gait import fitting_robot
@@ -38,14 +48,14 @@ def tune(
     set_: Set = None,
     budget: Annotated[int, typer.Option(min=16, help="number of runs of the search")] = 120,
     seeds: Annotated[int, typer.Option(min=1, help="number of other grounds to compare on")] = 5,
-    seconds: Annotated[float, typer.Option(min=4.0, help="duration of each run in seconds")] = 10.0,
-    seed: Annotated[int, typer.Option(min=0, help="seed of the search")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="number of processes")] = 2,
+    seconds: RunSeconds = 10.0,
+    seed: Seed = SEED,
+    workers: Workers = 2,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", help="write the set of parameters for gait run here (.toml)"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="overwrite an existing file")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
+from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import show_progress
@@ -45,7 +46,7 @@ def walk(
     repeats: Annotated[
         int, typer.Option(min=1, max=100_000, help="number of graphs of each kind")
     ] = 30,
-    seed: Annotated[int, typer.Option(min=0, help="seed of every random choice")] = 0,
+    seed: Seed = SEED,
     picture: Annotated[
         Path | None, typer.Option(help="draw states seen over steps here (.png, .svg, .pdf)")
     ] = None,

@@ -130,7 +130,6 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
         (("--unit", "mm", "--height", 1), "--height and --tilt belong together"),
         (("--level-ground", "--height", 1, "--tilt", 3), "--level-ground fits the ground"),
         (("--unit", "mm", "--roll", 3), "--roll belongs to --height and --tilt"),
-        (("--unit", "px"), "is unknown; use one of m, cm, mm"),
         (("--unit", "mm", "--error", 0), "--error 0: must be above 0"),
         (("--unit", "mm", "--error", 1e-6), "nothing in the pictures is matched, or all is too"),
     ):

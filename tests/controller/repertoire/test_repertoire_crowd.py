@@ -11,8 +11,9 @@ from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record_action
-from snakewalk.controller.repertoire.replay import replay, replay_all
+from snakewalk.controller.repertoire.replay import replay
 from snakewalk.controller.repertoire.secondary import SecondaryController
+from tests.helpers.replayed import replay_all
 
 
 def test_a_crowd_replays_as_one_body_does(repertoire: Repertoire) -> None:

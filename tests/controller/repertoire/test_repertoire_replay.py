@@ -15,10 +15,10 @@ from snakewalk.controller.repertoire.replay import (
     bridge,
     bridge_frames,
     replay,
-    replay_all,
     tip_travel_m,
 )
 from snakewalk.controller.repertoire.segment import Segment, cut
+from tests.helpers.replayed import replay_all
 
 Floats = NDArray[np.float64]
 

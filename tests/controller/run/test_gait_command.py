@@ -79,7 +79,7 @@ def test_help_gives_an_example(command: str) -> None:
         (["show", "rolling", "--picture", "body.txt"], "a picture ends in .png"),
         (["run", "rolling", "--live"], "keys from a terminal"),
         (["run", "rolling", "--gamepad", "/dev/nosuch"], "no gamepad"),
-        (["run", "rolling", "--seconds", "-1"], "--seconds -1: must be at least 0.1"),
+        (["run", "rolling", "--seconds", "-1"], "--seconds: must be at least 0.1 (got '-1')"),
         (["run", "rolling", "--port", "/dev/nosuch"], "/dev/nosuch"),
     ],
 )

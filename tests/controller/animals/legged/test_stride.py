@@ -37,7 +37,9 @@ TRACKER_FILES = Path(__file__).parents[3] / "oracles" / "tracked_lizard.zip"
 @pytest.mark.parametrize("name", ANIMALS)
 def test_planted_figures_come_back(name: str, frames: int, seed: int) -> None:
     animal = read_animal(name)
-    found = measure_stride(*tracked(animal, 7.0, frames, seed), (1, 3), frames / animal.cycle_s)
+    found = measure_stride(
+        *tracked(animal, 7.0, frames, seed), (1, 3), frames / animal.cycle_s, "above"
+    )
     assert found.cycle_s == pytest.approx(animal.cycle_s, rel=0.005)
     assert found.stride == pytest.approx(animal.stride, rel=0.015)
     assert found.length == pytest.approx(animal.length_m, rel=0.01)
@@ -93,7 +95,7 @@ def test_contact_is_known_to_a_fiftieth_of_a_cycle(seed: int) -> None:
     swing = list(SWINGS)[seed % 4]
     duty = ((0.45, 0.5), (0.5, 0.53), (0.63, 0.66), (0.72, 0.75), (0.6, 0.5))[seed % 5]
     spine, feet, _ = walker(swing, duty, 0.002, seed)
-    found = measure_stride(spine, feet, (1, 3), 30.0)
+    found = measure_stride(spine, feet, (1, 3), 30.0, "above")
     assert found.cycle_s == pytest.approx(1.0, rel=0.002)
     assert found.stride == pytest.approx(_STRIDE, rel=0.005)
     for k, foot in enumerate(found.feet):
@@ -129,11 +131,13 @@ def test_what_is_no_walk_is_told() -> None:
     lizard = read_animal("lizard")
     spine, feet = tracked(lizard, 1.5, 24, 0)
     with pytest.raises(InputError, match=r"1\.[345] cycles of the legs are seen; expected two"):
-        measure_stride(spine, feet, (1, 3), 24 / lizard.cycle_s)
+        measure_stride(spine, feet, (1, 3), 24 / lizard.cycle_s, "above")
     spine, feet = tracked(lizard, 6.0, 24, 0)
     held = spine - spine.mean(axis=1, keepdims=True)
     with pytest.raises(InputError, match="does not walk"):
-        measure_stride(held, feet - spine.mean(axis=1, keepdims=True), (1, 3), 24 / lizard.cycle_s)
+        measure_stride(
+            held, feet - spine.mean(axis=1, keepdims=True), (1, 3), 24 / lizard.cycle_s, "above"
+        )
 
 
 @pytest.mark.slow
@@ -194,7 +198,7 @@ def test_files_as_trackers_write_them_give_the_stride(
     rate_hz = None if name.endswith(("slp", "is.h5", "rd.h5")) else 16 / lizard.cycle_s
     keypoints = load_keypoints(tmp_path / name, rate_hz, choice=choice_of(individual, None, None))
     names = Names.of("nose,neck,mid,hip,tail,tip", "neck,hip", "FL,FR,HL,HR")
-    mine = measure_animal(keypoints, names, "lizard", "mine", None)
+    mine = measure_animal(keypoints, names, "lizard", "mine", None, "above")
     assert not mine.rate_assumed
     assert mine.stride.cycle_s == pytest.approx(lizard.cycle_s, rel=0.01)
     assert mine.stride.stride == pytest.approx(lizard.stride, rel=0.02)

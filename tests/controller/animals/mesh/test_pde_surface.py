@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.mesh.pde_surface import TURN, PdeSurface, carry_over
+from snakewalk.controller.animals.mesh.pde_surface import TURN, PdeSurface
+from tests.oracles.carried_mesh import carry_over
 
 Floats = NDArray[np.float64]
 COUNT = 48

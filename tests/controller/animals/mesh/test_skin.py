@@ -10,13 +10,14 @@ from scipy.spatial.transform import Rotation
 from snakewalk.controller.animals.mesh.body_model import spindle
 from snakewalk.controller.animals.mesh.cross_sections import AROUND, CrossSections, ellipses
 from snakewalk.controller.animals.mesh.patches import Tube
-from snakewalk.controller.animals.mesh.pde_surface import TURN, PdeSurface, carry_over
+from snakewalk.controller.animals.mesh.pde_surface import TURN, PdeSurface
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin, carried, pde_skin, weights
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.gaits.spine import SpineGait
 from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import BoneMotion, from_points, swimming
+from tests.oracles.carried_mesh import carry_over
 
 Floats = NDArray[np.float64]
 LENGTH_M = 1.2

@@ -39,7 +39,7 @@ PLAIN = FootParameters(height_m=H, length_m=L, duty=0.6)
 
 @pytest.fixture(scope="module")
 def person() -> Person:
-    return Person.of(1.75)
+    return Person.of(1.75, 1.0)
 
 
 @pytest.fixture(scope="module")
