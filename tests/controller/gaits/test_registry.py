@@ -1,9 +1,12 @@
 """Gaits of other packages, by entry points."""
 
-from importlib.metadata import EntryPoint
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest_mock import MockerFixture
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
@@ -18,19 +21,32 @@ class Sway(Rolling):
     name = "sway"
 
 
-def entry(name: str, value: str) -> EntryPoint:
-    return EntryPoint(name, f"{__name__}:{value}" if ":" not in value else value, "snakewalk.gaits")
+Install = Callable[[dict[str, str]], None]
 
 
 @pytest.fixture
-def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, type[registry.Gait]]:
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mocker: MockerFixture) -> Install:
+    """Install a package that declares entry points."""
+    mocker.patch.dict(registry.GAITS)
+    mocker.patch.dict(registry.BROKEN, clear=True)
+
+    def write(entries: dict[str, str]) -> None:
+        folder = tmp_path / "foreign-1.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: foreign\nVersion: 1\n")
+        lines = [f"{name} = {value}" for name, value in entries.items()]
+        (folder / "entry_points.txt").write_text("\n".join(["[snakewalk.gaits]", *lines, ""]))
+        monkeypatch.syspath_prepend(tmp_path)
+
+    return write
+
+
+@pytest.fixture
+def installed(install: Install) -> dict[str, type[registry.Gait]]:
     """The gaits, with those of a package that declares three entry points."""
-    entries = [entry("sway", "Sway"), entry("gone", "nosuch:Gait"), entry("text", "__name__")]
-    monkeypatch.setattr(registry, "entry_points", lambda group: entries)
-    monkeypatch.setattr(registry, "BROKEN", {})
-    gaits = registry.gaits_by_name()
-    monkeypatch.setattr(registry, "GAITS", gaits)
-    return gaits
+    install({"sway": f"{__name__}:Sway", "gone": "nosuch:Gait", "text": f"{__name__}:__name__"})
+    registry.GAITS.update(registry.gaits_by_name())
+    return registry.GAITS
 
 
 def test_a_gait_of_another_package_moves_the_robot(
@@ -47,14 +63,21 @@ def test_a_gait_of_another_package_moves_the_robot(
     ("name", "fault"),
     [("gone", "cannot be imported .*No module named 'nosuch'"), ("text", "cannot be imported")],
 )
-def test_a_broken_one_is_one_line(name: str, fault: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("snakewalk.controller.run.kinds.gait_factory.BROKEN", registry.BROKEN)
-    with pytest.raises(InputError, match=f"gait {name} of .*: {fault}.*; repair or uninstall it"):
+def test_a_broken_one_is_one_line(name: str, fault: str) -> None:
+    with pytest.raises(
+        InputError, match=f"gait {name} of foreign: {fault}.*; repair or uninstall it"
+    ):
         gait_by_name(name, None)
 
 
-def test_a_gait_of_snakewalk_has_priority(monkeypatch: pytest.MonkeyPatch) -> None:
-    foreign = type("Foreign", (Rolling,), {"name": "rolling", "__module__": __name__})
-    monkeypatch.setitem(globals(), "Foreign", foreign)
-    monkeypatch.setattr(registry, "entry_points", lambda group: [entry("rolling", "Foreign")])
+class Foreign(Rolling):
+    """A gait of another package with the name of one of snakewalk."""
+
+    name = "rolling"
+
+
+def test_a_gait_of_snakewalk_has_priority(install: Install) -> None:
+    install({"rolling": f"{__name__}:Foreign"})
+    (entry,) = entry_points(group=registry.ENTRY_POINTS, name="rolling")
+    assert entry.load() is Foreign
     assert registry.gaits_by_name()["rolling"] is Rolling
