@@ -67,6 +67,20 @@ def read_corrections(path: Path) -> Corrections:
     return checked(Corrections, data, str(path))
 
 
+def _check_frames(corrections: Corrections, count: int, name: str) -> None:
+    redrawn = [one.frame for one in corrections.redrawn]
+    lists = {"flipped": corrections.flipped, "left_out": corrections.left_out, "redrawn": redrawn}
+    for key, frames in lists.items():
+        beyond = [k for k in frames if not 0 <= k < count]
+        if beyond:
+            raise InputError(
+                f"{name}: frame {min(beyond)} is not there: the track has {count}, from 0"
+            )
+        twice = [k for k, times in Counter(frames).items() if times > 1]
+        if twice:
+            raise InputError(f"{name}: {key}: frame {twice[0]} stands there twice")
+
+
 def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
     """Return the recording with corrections; frames left out override all others.
 
@@ -87,17 +101,8 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
             f"{name}: these corrections belong to another track than {held.name}, or were applied "
             "to it already; give the track of which the page was made"
         )
+    _check_frames(corrections, count, name)
     drawn = {one.frame: one for one in corrections.redrawn}
-    named = [*corrections.flipped, *corrections.left_out, *(r.frame for r in corrections.redrawn)]
-    beyond = sorted({k for k in named if not 0 <= k < count})
-    if beyond:
-        raise InputError(f"{name}: frame {beyond[0]} is not there: the track has {count}, from 0")
-    for key in ("flipped", "left_out"):
-        twice = [k for k, times in Counter(getattr(corrections, key)).items() if times > 1]
-        if twice:
-            raise InputError(f"{name}: {key}: frame {twice[0]} stands there twice")
-    if len(drawn) < len(corrections.redrawn):
-        raise InputError(f"{name}: redrawn: a frame stands there twice")
     usual_px = float(np.nanmedian(captured.length_px))
     usual_radius = np.nanmedian(captured.radius_px, axis=0)
     flipped = set(corrections.flipped)

@@ -68,26 +68,9 @@ def check_options(options: CaptureOptions) -> None:
             f"--threshold {options.threshold:g}: expected the grey levels, above 0, by which the "
             "body stands out from its background at its boundary"
         )
-    if options.output.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{options.output}: a track is written as one of {', '.join(SUFFIXES)}")
-    if options.wide and options.output.suffix.lower() != ".csv":
-        raise InputError(f"--wide: is a form of a .csv, not of {options.output}; leave it out")
-    if options.cropped and options.output.suffix.lower() == ".csv":
-        raise InputError(
-            f"{options.output}: a .csv cannot state that places were not recorded (--cropped); "
-            "write an .npz or a .wcon"
-        )
-    if options.review is not None and options.output.suffix.lower() != ".npz":
-        raise InputError(f"--review: corrects an .npz, not {options.output}; name an .npz")
+    _check_files(options)
     if options.animals is not None:
         _check_animals(options, options.animals)
-    if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
-        raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
-    for picture in (options.sheet, options.steps, options.trail):
-        if picture is not None and picture.suffix.lower() not in _SHEETS:
-            raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
-    if options.review is not None and options.review.suffix.lower() not in _PAGES:
-        raise InputError(f"{options.review}: a review page is an .html")
     refuse_to_overwrite(
         [
             options.output,
@@ -99,6 +82,28 @@ def check_options(options: CaptureOptions) -> None:
         ],
         options.force,
     )
+
+
+def _check_files(options: CaptureOptions) -> None:
+    """Reject a name of a result whose end is not a format of that result."""
+    if options.output.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{options.output}: a track is written as one of {', '.join(SUFFIXES)}")
+    if options.wide and options.output.suffix.lower() != ".csv":
+        raise InputError(f"--wide: is a form of a .csv, not of {options.output}; leave it out")
+    if options.cropped and options.output.suffix.lower() == ".csv":
+        raise InputError(
+            f"{options.output}: a .csv cannot state that places were not recorded (--cropped); "
+            "write an .npz or a .wcon"
+        )
+    if options.review is not None and options.output.suffix.lower() != ".npz":
+        raise InputError(f"--review: corrects an .npz, not {options.output}; name an .npz")
+    if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
+        raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
+    for picture in (options.sheet, options.steps, options.trail):
+        if picture is not None and picture.suffix.lower() not in _SHEETS:
+            raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
+    if options.review is not None and options.review.suffix.lower() not in _PAGES:
+        raise InputError(f"{options.review}: a review page is an .html")
 
 
 def _check_animals(options: CaptureOptions, animals: str) -> None:

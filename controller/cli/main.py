@@ -47,20 +47,8 @@ def main() -> None:
     """Run the command line; bad input ends with exit code 2 and one line per fault."""
     make_streams_safe()
     make_path_safe()
-    # numba reads .numba_config.yaml of the working folder; this keeps it from loading code there
-    os.environ.setdefault("NUMBA_CACHE_DIR", "")
-    # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
-    # choice that is not installed.
-    os.environ["MUJOCO_GL"] = "disable"
-    leave_out_avx512()
-    # a script makes its background programs ignore ^C and SIGQUIT, and a run has to stop all the
-    # same; nohup ignores SIGHUP on purpose
-    for number in _ENDING:
-        ignored = signal.getsignal(number) is signal.SIG_IGN
-        if signal.getsignal(number) is signal.SIG_DFL or (ignored and number.name != "SIGHUP"):
-            signal.signal(number, _unwind)
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    _prepare_imports()
+    _prepare_signals()
     try:
         _check_words(sys.argv[1:])
         _stop_at_once(sys.argv[1:])
@@ -70,34 +58,59 @@ def main() -> None:
         _tell_of_pipes()
         observe_compilation(CompilationNotice(_print_line))
         app(prog_name="snakewalk")
-    except PortError as error:
-        began = bool(notes_of(error))  # of a run, whose port has vanished
-        _end(1 if began else 2, "; ".join(error.faults), *notes_of(error))
-    except InputError as error:
-        _end(2, *error.faults)
-    except DriverError as error:
-        _end(1, _with_notes(str(error), error))
-    except ModuleNotFoundError as error:
-        needed = missing_extra(error)
-        if needed is None:
-            raise
-        _end(2, needed)
-    except OSError as error:
-        place = f"{Path(str(error.filename))}: " if error.filename else ""
-        notes = notes_of(error)  # of a run: state of torque and log
-        _end(1 if notes else 2, _with_notes(f"{place}{error.strerror or error}", error))
-    except (MemoryError, ImportError) as error:
-        if not _is_out_of_memory(error):
-            raise
-        notes = notes_of(error)  # of a run: state of torque and log
-        _end(1 if notes else 2, _with_notes(_NO_MEMORY, error))
-    except KeyboardInterrupt as stop:
-        _end(_INTERRUPTED, _with_notes("interrupted", stop))
     except SystemExit as stop:
         if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
             name = signal.Signals(stop.code - _BY_SIGNAL).name
             _print_line(_with_notes(f"ended by {name}", stop))
         raise
+    except KeyboardInterrupt as stop:
+        _end(_INTERRUPTED, _with_notes("interrupted", stop))
+    except Exception as error:
+        _end_by(error)
+
+
+def _prepare_imports() -> None:
+    """Set what numba, MuJoCo and numpy read when they are imported."""
+    # numba reads .numba_config.yaml of the working folder; this keeps it from loading code there
+    os.environ.setdefault("NUMBA_CACHE_DIR", "")
+    # Pictures are drawn without a screen, by a context of our own; MuJoCo's import fails on a
+    # choice that is not installed.
+    os.environ["MUJOCO_GL"] = "disable"
+    leave_out_avx512()
+
+
+def _prepare_signals() -> None:
+    """Let each signal that ends the program end every context properly."""
+    # a script makes its background programs ignore ^C and SIGQUIT, and a run has to stop all the
+    # same; nohup ignores SIGHUP on purpose
+    for number in _ENDING:
+        ignored = signal.getsignal(number) is signal.SIG_IGN
+        if signal.getsignal(number) is signal.SIG_DFL or (ignored and number.name != "SIGHUP"):
+            signal.signal(number, _unwind)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _end_by(error: Exception) -> None:
+    """End with what an error means to the user; one that no user can cause is raised again."""
+    notes = notes_of(error)  # of a run: state of torque and log
+    begun = 1 if notes else 2
+    match error:
+        case PortError(faults=faults):
+            _end(begun, "; ".join(faults), *notes)
+        case InputError(faults=faults):
+            _end(2, *faults)
+        case DriverError():
+            _end(1, _with_notes(str(error), error))
+        case ModuleNotFoundError() if (needed := missing_extra(error)) is not None:
+            _end(2, needed)
+        case OSError():
+            place = f"{Path(str(error.filename))}: " if error.filename else ""
+            _end(begun, _with_notes(f"{place}{error.strerror or error}", error))
+        case MemoryError() | ImportError() if _is_out_of_memory(error):
+            _end(begun, _with_notes(_NO_MEMORY, error))
+        case _:
+            raise error
 
 
 def _stop_at_once(words: list[str]) -> None:

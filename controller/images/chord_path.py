@@ -112,7 +112,7 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
 
 
 @compiled(f"boolean({_CURVE}, float64[::1], int64[::1], int64)")
-def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int) -> bool:
+def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int) -> bool:  # noqa: C901  a compiled loop
     """Move ``at`` (N + 1,) along the path until the last place is the end of the curve."""
     count = len(piece)
     length = arc[-1]

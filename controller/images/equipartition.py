@@ -190,7 +190,7 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
     return None
 
 
-def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:
+def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:  # noqa: C901  a compiled loop
     found = [] if known is None else [known]
     for method, crossing in _crossings(given.segments, search=known is None):
         for chord in _roots(given, crossing):
@@ -343,7 +343,7 @@ def _roots(given: _Curve, crossing: Ints) -> Iterator[float]:
     f"int64({readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}, float64,"
     f" {readonly_array('int64', layout='C')}, float64[:, ::1], float64[::1])"
 )
-def march(
+def march(  # noqa: C901  a compiled loop
     line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats
 ) -> int:
     """Write the points at distance ``chord`` from one another along ``line``.

@@ -128,15 +128,32 @@ def skeleton_of_level(
     line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, noise_level)))
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
-    uniform = float(depth.max()) < _UNIFORM * WORKING_WIDTH
-    if width < THIN_PX and grey and (uniform or width < _UNSURE_PX):
-        found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
-        if found is None and width < _UNSURE_PX:
-            return no_skeleton(FrameStatus.BLOB)
-        if found is not None:
-            line = (found[0] + 0.5) * step - 0.5 + _MARGIN
+    if grey and width < THIN_PX:
+        line = _fitted_line(line, level, width, depth, step)
+    if line is None:
+        return no_skeleton(FrameStatus.BLOB)
     if grey and width >= _POINTED_PX:
         line = to_pointed_tips(line, fine, WORKING_WIDTH, step)
+    return _in_segments(line, depth, step, origin_px)
+
+
+def _fitted_line(
+    line: Floats, level: Level, width: float, depth: Level, step: float
+) -> Floats | None:
+    """Fit the line of a thin body to the grey levels; None if a very thin one has no fit."""
+    uniform = float(depth.max()) < _UNIFORM * WORKING_WIDTH
+    if not uniform and width >= _UNSURE_PX:
+        return line
+    found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
+    if found is None:
+        return None if width < _UNSURE_PX else line
+    return (found[0] + 0.5) * step - 0.5 + _MARGIN
+
+
+def _in_segments(
+    line: Floats, depth: Level, step: float, origin_px: tuple[float, float]
+) -> Skeleton:
+    """Skeleton along a line (n, 2) in the working picture."""
     try:
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):

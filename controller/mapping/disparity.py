@@ -164,7 +164,7 @@ def _without_specks(disparity: Floats, least: int) -> Floats:
 @compiled(
     f"void({readonly_array(dimensions=2, layout='C')}, float64[:, ::1], int64, float64, float64)"
 )
-def _on_planes(
+def _on_planes(  # noqa: C901  a compiled loop
     disparity: Floats, smooth: Floats, radius: int, touch: float, least_share: float
 ) -> None:
     """Write the value of the plane fitted to the pixels around each that are close to it.

@@ -220,20 +220,7 @@ def _of_points(
     if len(points_m) == 0:
         raise InputError(f"{file}: holds no point")
     _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
-    corner = points_m[:, :2].min(axis=0)
-    placed = points_m - [*corner, 0.0]
-    low, high = np.zeros(2), placed[:, :2].max(axis=0)
-    if options.crop is not None:
-        whole = high
-        low, high = np.maximum(options.crop[:2], low), np.minimum(options.crop[2:], high)
-        if faces is None:
-            placed = placed[((placed[:, :2] >= low) & (placed[:, :2] <= high)).all(axis=1)]
-        if len(placed) == 0 or (low > high).any():
-            raise InputError(
-                f"{file}: nothing is within the crop: it is {whole[0]:.6g} m by {whole[1]:.6g} m"
-            )
-    if faces is None:
-        low, high = placed[:, :2].min(axis=0), placed[:, :2].max(axis=0)
+    placed, low, high = _cropped(file, points_m, options.crop, is_mesh=faces is not None)
     size = high - low
     kind = "points" if faces is None else "triangles"
     spacing_m = options.spacing_m
@@ -255,6 +242,35 @@ def _of_points(
     relief_m = _relief(elevation.z_m) / rise
     whole_m = float(size[0]), float(size[1])
     return FileMap(elevation.centred(), whole_m, relief_m, kind, tuple(notes))
+
+
+def _cropped(
+    file: Path,
+    points_m: Floats,
+    crop: tuple[float, float, float, float] | None,
+    *,
+    is_mesh: bool,
+) -> tuple[Floats, Floats, Floats]:
+    """Move points to their corner; return those within the crop, and its two corners (2,).
+
+    The triangles of a mesh are cut later, so that all its points stay.
+    """
+    corner = points_m[:, :2].min(axis=0)
+    placed = points_m - [*corner, 0.0]
+    low = np.zeros(2)
+    high = placed[:, :2].max(axis=0)
+    if crop is not None:
+        whole = high
+        low, high = np.maximum(crop[:2], low), np.minimum(crop[2:], high)
+        if not is_mesh:
+            placed = placed[((placed[:, :2] >= low) & (placed[:, :2] <= high)).all(axis=1)]
+        if len(placed) == 0 or (low > high).any():
+            raise InputError(
+                f"{file}: nothing is within the crop: it is {whole[0]:.6g} m by {whole[1]:.6g} m"
+            )
+    if not is_mesh:
+        low, high = placed[:, :2].min(axis=0), placed[:, :2].max(axis=0)
+    return placed, low, high
 
 
 def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> None:

@@ -95,20 +95,27 @@ def _pcd(file: Path, data: bytes) -> Floats:
         return np.stack([points[axis][:, 0].astype(float) for axis in "xyz"], axis=-1)
     if encoding != "binary_compressed":
         raise ValueError(f"DATA {encoding} is not one of ascii, binary, binary_compressed")
+    return _compressed(body, row, total)
+
+
+def _compressed(body: bytes, row: np.dtype[Any], total: int) -> Floats:
+    """Points (N, 3) of compressed data, which hold one field after another."""
     packed, unpacked = struct.unpack("<II", body[:8])
     if unpacked != total * row.itemsize or packed > len(body) - 8:
         raise ValueError("the sizes of its compressed data do not fit its points")
     plain = np.zeros(unpacked, np.uint8)
     if _expand(np.frombuffer(body[8 : 8 + packed], np.uint8), plain) != unpacked:
         raise ValueError("its compressed data are damaged")
-    columns = []
+    columns = {}
     at = 0
-    for name, kind, count in zip(names, kinds, counts, strict=True):
-        width = np.dtype(kind).itemsize * count * total
+    for name in row.names or ():
+        field = row[name]
+        width = field.itemsize * total
         if name in "xyz":
-            columns.append((name, plain[at : at + width].view(kind)[::count].astype(float)))
+            count = field.shape[0]
+            columns[name] = plain[at : at + width].view(field.base)[::count].astype(float)
         at += width
-    return np.stack([values for _, values in sorted(columns)], axis=-1)
+    return np.stack([columns[axis] for axis in "xyz"], axis=-1)
 
 
 def _header(data: bytes) -> tuple[dict[str, list[str]], int]:

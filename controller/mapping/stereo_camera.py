@@ -154,7 +154,8 @@ def _middlebury(file: Path) -> dict[str, Any]:
     }
 
 
-def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalibration:
+def _numbers(file: Path, found: Mapping[str, Any], unit_m: float) -> dict[str, Floats]:
+    """Return the values as arrays of the right size, in metres."""
     values: dict[str, Floats] = {}
     for key, value in found.items():
         try:
@@ -177,6 +178,11 @@ def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalib
     ]
     if faults:
         raise InputError(faults)
+    return values
+
+
+def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalibration:
+    values = _numbers(file, found, unit_m)
     rotation = values["rotation"]
     translation = values["translation"]
     for key in ("k_left", "k_right"):

@@ -210,7 +210,7 @@ def _least_power(
 
 
 @compiled(_ITERATION, makes_arrays=False)
-def _least_missing(
+def _least_missing(  # noqa: C901  a compiled loop
     table: Floats,
     rows: int,
     links: int,

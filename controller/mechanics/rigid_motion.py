@@ -348,7 +348,7 @@ def _solve(hessian: Floats, gradient: Floats, step: Floats) -> None:
     " float64[::1], float64[:, ::1])",
     makes_arrays=False,
 )
-def balance(
+def balance(  # noqa: C901  a compiled loop
     table: Floats,
     rows: int,
     links: int,

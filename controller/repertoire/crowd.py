@@ -211,7 +211,7 @@ def _balance(r, most):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _step(  # type: ignore[no-untyped-def]
+def _step(  # type: ignore[no-untyped-def]  # noqa: C901  a compiled loop
     turn,
     move,
     shape,

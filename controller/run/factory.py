@@ -132,22 +132,7 @@ def prepare_job(
         options.setdefault("robot", str(beside / run.robot))
     run = checked(RunConfig, run.model_dump() | options, "command line")
     run = with_keys_of("run", run, keys)
-    if run.motion == "kp" and not on_paper:
-        raise InputError(
-            f"run {run.name}: kp is a motion on paper: snakewalk animal synthesise RUN --motion kp "
-            "-o NAME, then snakewalk play NAME.npz"
-        )
-    if run.motion == "gait" and not run.waypoints_m:
-        raise InputError(f"run {run.name}: a gait is run by: snakewalk gait run NAME")
-    if run.motion == "playback":
-        raise InputError(f"run {run.name}: a recording is played by: snakewalk play TRACK")
-    if run.motion == "repertoire":
-        raise InputError(
-            f"run {run.name}: planned by: snakewalk plan --with repertoire; without waypoints "
-            "played by: snakewalk gait repertoire play"
-        )
-    if run.motion == "source":
-        raise InputError(f"run {run.name}: a source of your own is run by prepare_source")
+    _refuse_other_commands(run, on_paper)
     if run.pose is not None:
         pose_plugin(run.pose)
     robot = run.walk.pitch.set_up(load_robot(run.robot, beside))
@@ -167,6 +152,30 @@ def prepare_job(
     _reject_legs(robot)
     _refuse_one_joint(robot)
     return WalkRun(run, robot, world)
+
+
+def _refuse_other_commands(run: RunConfig, on_paper: bool) -> None:
+    """Reject a motion that another command runs.
+
+    Raises:
+        InputError: with that command.
+
+    """
+    commands = {
+        "playback": "a recording is played by: snakewalk play TRACK",
+        "repertoire": "planned by: snakewalk plan --with repertoire; without waypoints played by: "
+        "snakewalk gait repertoire play",
+        "source": "a source of your own is run by prepare_source",
+    }
+    if not on_paper:
+        commands["kp"] = (
+            "kp is a motion on paper: snakewalk animal synthesise RUN --motion kp -o NAME, then "
+            "snakewalk play NAME.npz"
+        )
+    if not run.waypoints_m:
+        commands["gait"] = "a gait is run by: snakewalk gait run NAME"
+    if run.motion in commands:
+        raise InputError(f"run {run.name}: {commands[run.motion]}")
 
 
 def _refuse_one_joint(robot: RobotConfig) -> None:

@@ -116,7 +116,7 @@ def _lists(shapes: tuple[tuple[int, ...], ...]) -> Ints:
 
 
 @compiled(f"int64({readonly_array()}, {readonly_array('int64', 2)}, uint8[::1])")
-def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
+def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:  # noqa: C901  a compiled loop
     """Print finite ``values`` as ``_template`` does; how many bytes, or -1 where it must be used.
 
     The template is needed for large numbers, and for those so near the middle between two of six

@@ -271,12 +271,7 @@ class Drive:
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
-                    sent = self._link.last_verdict
-                    before_rad = state.position_rad if sent is None else sent.goal_rad
-                    rate = self._derating.update(state, before_rad, period_s)
-                    goal = self._steer_or_hold(period_s, rate, view)
-                    if self._compliance is not None:
-                        goal = self._compliance.step(goal, state, period_s)
+                    goal = self._next_goal(state, period_s, view)
                 self._send(tick, state, pose, view, goal)
                 if self._link.tripped or motion.done or self._pose_failure:
                     break
@@ -387,6 +382,14 @@ class Drive:
     @property
     def _pose_failure(self) -> str | None:
         return None if self._pose_hold is None else self._pose_hold.failure
+
+    def _next_goal(self, state: JointState, period_s: float, view: BodyView) -> Floats:
+        """Return the goals of this cycle, derated and compliant."""
+        sent = self._link.last_verdict
+        before_rad = state.position_rad if sent is None else sent.goal_rad
+        rate = self._derating.update(state, before_rad, period_s)
+        goal = self._steer_or_hold(period_s, rate, view)
+        return goal if self._compliance is None else self._compliance.step(goal, state, period_s)
 
     def _steer_or_hold(self, period_s: float, rate: float, view: BodyView) -> Floats:
         """Return the goals of this cycle; without a pose the motion pauses."""

@@ -164,15 +164,7 @@ class _LivePage:
             self._stop.arm()
             return
         if topic == ConfigTable.topic.name:
-            self._header = record_of({topic: [row]}, complete=False, note="").header
-            with self._server.atomic():
-                self._scene = BodyScene(self._server, self._header)
-                self._scene.first_camera()
-                self._dashboard = Dashboard(self._server, self._header)
-            self._show_gait()
-            self._take_waypoints()
-            tabs = self._dashboard.tabs
-            self._gamepad_panel = GamepadPanel(self._server, tabs, self._gamepad)
+            self._open(record_of({topic: [row]}, complete=False, note="").header)
             return
         if topic == PICTURE:
             if self._dashboard is not None:
@@ -191,14 +183,29 @@ class _LivePage:
             return
         self._rows[topic].append(row)
         if topic == EventTable.topic.name:
-            if row["kind"] in ("trip", "interrupt") or (row["kind"] == "stop" and not self._over):
-                self._over = True
-                self._stop.ended(row["text"])
-            if self._dashboard is not None:
-                events = {topic: list(self._rows[topic])}
-                self._dashboard.show_events(self._record(events).events)
-            if self._waypoint_panel is not None:
-                self._waypoint_panel.show(row["kind"], row["text"])
+            self._take_event(row["kind"], row["text"])
+
+    def _open(self, header: Header) -> None:
+        """Draw the body of a run that begins, and its panels."""
+        self._header = header
+        with self._server.atomic():
+            self._scene = BodyScene(self._server, header)
+            self._scene.first_camera()
+            self._dashboard = Dashboard(self._server, header)
+        self._show_gait()
+        self._take_waypoints()
+        self._gamepad_panel = GamepadPanel(self._server, self._dashboard.tabs, self._gamepad)
+
+    def _take_event(self, kind: str, text: str) -> None:
+        if kind in ("trip", "interrupt") or (kind == "stop" and not self._over):
+            self._over = True
+            self._stop.ended(text)
+        if self._dashboard is not None:
+            topic = EventTable.topic.name
+            events = {topic: list(self._rows[topic])}
+            self._dashboard.show_events(self._record(events).events)
+        if self._waypoint_panel is not None:
+            self._waypoint_panel.show(kind, text)
 
     def _show_gait(self) -> None:
         if self._gait is None or self._header is None or self._dashboard is None:

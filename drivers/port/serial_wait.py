@@ -80,7 +80,7 @@ def send(fd: int, request: Bytes) -> int:
 
 
 @compiled(int64(int32, uint8[::1], int64, int64, int64, int64, int64[::1]), nogil=True)
-def receive(
+def receive(  # noqa: C901  a compiled loop
     fd: int,
     reply: Bytes,
     begun_ns: int,

@@ -143,7 +143,7 @@ class FollowingError:
     " float64[:, ::1], float64[:, ::1])",
     makes_arrays=False,
 )
-def _judge(
+def _judge(  # noqa: C901  a compiled loop
     goal_rad: Floats,
     position_rad: Floats,
     velocity_rad_s: Floats,

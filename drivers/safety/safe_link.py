@@ -224,12 +224,7 @@ class SafeLink:
         doubt = None
         if self._state is not None:
             state, doubt = self._steps.update(state, self._state)
-            if doubt is not None and self._doubt is None:
-                self._doubts += 1
-                if self._doubts in (1, _DOUBTS):
-                    last = "" if self._doubts == 1 else _LAST_DOUBT
-                    self._on_event(f"not believed: {doubt}{last}")
-            self._doubt = doubt
+            self._note_doubt(doubt)
         if doubt is not None or (self._recovery is not None and self.tripped is None):
             stale = stale_fault(state, self._limits, self._clock.now_s())
             if stale is not None and doubt is None:
@@ -245,6 +240,15 @@ class SafeLink:
             return self._recover(f"{name}: alarm: overload", None, joint)
         self._check(state, self._memory)
         return state
+
+    def _note_doubt(self, doubt: str | None) -> None:
+        """Report the first doubt and the last that is reported."""
+        if doubt is not None and self._doubt is None:
+            self._doubts += 1
+            if self._doubts in (1, _DOUBTS):
+                last = "" if self._doubts == 1 else _LAST_DOUBT
+                self._on_event(f"not believed: {doubt}{last}")
+        self._doubt = doubt
 
     def write(self, command: JointCommand) -> None:
         """Vet a command against the newest state and send the result.

@@ -275,8 +275,6 @@ class FaultPlayer:
                 return self._power_cut(np.arange(self._rows[behind] + 1, len(line.ids())))
             case plan.ClashFault():
                 return partial(self._rename, fault, True), partial(self._rename, fault, False)
-            case plan.WriteFault(register_name=name, value=value, every_s=None):
-                return partial(line.write_register, rows, name, value), None
             case plan.WriteFault():
                 return partial(self._write_again, fault, rows), None
             case plan.ReadingFault(register_name=name, value=value):

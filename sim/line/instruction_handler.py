@@ -82,12 +82,20 @@ class InstructionHandler:
         if code in _GROUP_INSTRUCTIONS and servo_id == BROADCAST_ID:
             return self._group(code, params)
         if servo_id == BROADCAST_ID:
-            whole = code == Instruction.FACTORY_RESET and params == b"\xff"
-            for row in [] if whole else self.directory.present():  # refused since firmware 42
-                self._one(row, code, params)
+            self._broadcast(code, params)
             return []
         if code == Instruction.READ:
             return self._read(servo_id, params)
+        return self._respond(self._addressed(servo_id, code, params))
+
+    def _broadcast(self, code: int, params: bytes) -> None:
+        if code == Instruction.FACTORY_RESET and params == b"\xff":  # refused since firmware 42
+            return
+        for row in self.directory.present():
+            self._one(row, code, params)
+
+    def _addressed(self, servo_id: int, code: int, params: bytes) -> list[Reply]:
+        """Execute an instruction for one ID; return the reply of each device that has it."""
         replies = []
         for row in self.directory.primary(servo_id):
             level = int(self.bank["Status Return Level"][row])
@@ -100,7 +108,7 @@ class InstructionHandler:
         if self._imu_at(servo_id) is not None:  # no register of it is known to be writable
             refused = StatusPacket(servo_id, ResultError.ACCESS, b"")
             replies.append(Reply(0.0, encode_status(refused)))
-        return self._respond(replies)
+        return replies
 
     def _imu_at(self, servo_id: int) -> Imu | None:
         """The IMU, if it has this ID and the line's baud rate."""

@@ -122,23 +122,33 @@ def dressed_model(
     for k, sheet in enumerate(prints):
         _print(spec, f"print{k}", sheet)
     for k, (x, y) in enumerate(waypoints_m):
-        z = 0.0 if ground is None else float(ground.elevation_m(x, y))
-        _add(
-            spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD
-        ).name = f"waypoint{k}"
-        if hollow:
-            spec.geom(f"waypoint{k}").rgba = HIDDEN
-        ring = _ring(ground, x, y, waypoint_radius_m)
-        for part, (one, other) in enumerate(itertools.pairwise(ring)):
-            _add(
-                spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)
-            ).name = f"waypoint{k}ring{part}"
-            if hollow and part % 2:
-                spec.geom(f"waypoint{k}ring{part}").rgba = HIDDEN
+        _mark(spec, f"waypoint{k}", ground, x, y, waypoint_radius_m, hollow)
     model = finish(spec.compile(), ground)
     if ground is not None:
         _paint(model, ground)
     return model
+
+
+def _mark(
+    spec: mujoco.MjSpec,
+    name: str,
+    ground: HeightField | None,
+    x: float,
+    y: float,
+    radius_m: float,
+    hollow: bool,
+) -> None:
+    """Add a waypoint: a pole and a ring."""
+    z = 0.0 if ground is None else float(ground.elevation_m(x, y))
+    _add(spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD).name = name
+    if hollow:
+        spec.geom(name).rgba = HIDDEN
+    ring = _ring(ground, x, y, radius_m)
+    for part, (one, other) in enumerate(itertools.pairwise(ring)):
+        of_ring = f"{name}ring{part}"
+        _add(spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)).name = of_ring
+        if hollow and part % 2:
+            spec.geom(of_ring).rgba = HIDDEN
 
 
 def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:

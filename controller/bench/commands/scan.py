@@ -44,24 +44,28 @@ def scan(
         servos = [servo.to_dict() | {"port": name} for name, servo in found]
         print(json.dumps({"port": lines.port, "servos": servos, "noise_bytes": noise}))
     elif found:
-        heads = ("ID", "model", "firmware", "baud")
-        table = Table(*heads, *(["port"] if lines.several else []), box=None)
-        for name, servo in found:
-            shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
-            table.add_row(*map(str, shown), *([name] if lines.several else []))
-        console.print(table)
-        for _, servo in found:
-            if servo.secondary_id is not None:
-                console.print(
-                    f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
-                    "Secondary ID(12); a run sets it to 255"
-                )
+        _print_servos(found, lines.several)
     elif noise:
         console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
     else:
         console.print(f"{lines.port}: {_silence(baud)}")
     if not found:
         raise SystemExit(1)
+
+
+def _print_servos(found: list[tuple[str, scanning.ScanResult]], several: bool) -> None:
+    """Print a table, with the port if there are ``several``."""
+    table = Table("ID", "model", "firmware", "baud", *(["port"] if several else []), box=None)
+    for name, servo in found:
+        shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
+        table.add_row(*map(str, shown), *([name] if several else []))
+    console.print(table)
+    for _, servo in found:
+        if servo.secondary_id is not None:
+            console.print(
+                f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
+                "Secondary ID(12); a run sets it to 255"
+            )
 
 
 def _silence(bauds: list[int] | None) -> str:

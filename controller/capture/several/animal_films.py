@@ -180,15 +180,14 @@ def capture_animals(
             film.add(shown, detection)
         if on_progress is not None:
             on_progress()
-    out = []
-    for identity, film in zip(found.identities, films, strict=True):
-        try:
-            captured = film.done()
-        except InputError as error:
-            out.append(CapturedAnimal(None, identity, str(error)))
-        else:
-            out.append(CapturedAnimal(captured, identity))
-    return out
+    return [_captured(*each) for each in zip(found.identities, films, strict=True)]
+
+
+def _captured(identity: Identity, film: FilmParts) -> CapturedAnimal:
+    try:
+        return CapturedAnimal(film.done(), identity)
+    except InputError as error:
+        return CapturedAnimal(None, identity, str(error))
 
 
 def _plan(identity: Identity, count: int) -> SignedInts:

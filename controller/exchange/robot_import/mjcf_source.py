@@ -163,6 +163,13 @@ def _resolve_meshes(
     source: ModelSource, path: Path, defaults: _Defaults, assumed: Assumptions
 ) -> None:
     root = source.root
+    missing = _find_meshes(root, path)
+    if missing:
+        source.notes.append(_without(root, missing, defaults, assumed))
+
+
+def _find_meshes(root: LineElement, path: Path) -> dict[str, str]:
+    """Write the whole path of each mesh into the model; return name and file of those not found."""
     missing = {}
     compiler = root.find("compiler")
     settings = {} if compiler is None else compiler.attrib
@@ -184,8 +191,13 @@ def _resolve_meshes(
     for element in root.iter("compiler"):
         for name in ("meshdir", "assetdir", "texturedir", "strippath"):
             element.attrib.pop(name, None)
-    if not missing:
-        return
+    return missing
+
+
+def _without(
+    root: LineElement, missing: dict[str, str], defaults: _Defaults, assumed: Assumptions
+) -> str:
+    """Replace the shapes of missing meshes; return what was done."""
     for default in root.iter("default"):
         for geom in children(default, "geom"):
             if geom.get("mesh") in missing:
@@ -200,7 +212,7 @@ def _resolve_meshes(
         replaced += 1
         _replace(parent, geom, defaults.value(geom, "mass", childclass), absent or "", assumed)
     files = ", ".join(sorted(set(missing.values()))[:3])
-    source.notes.append(
+    return (
         f"{replaced} shapes are left out, their mass is kept: missing mesh files: {files}"
         f"{', ...' if len(missing) > 3 else ''}"
     )

@@ -88,7 +88,7 @@ def _aggregate(
 
 
 @compiled(f"void({_COST}, {_INTS}, float64, int64, {_LABELS})")
-def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints) -> None:
+def descend(costs: Costs, base: Ints, penalty: float, rounds: int, labels: Ints) -> None:  # noqa: C901  a compiled loop
     """Change labels to their conditional modes until none changes; the energy never rises."""
     rows, columns, scales, high, wide = costs.shape
     window = high * wide

@@ -179,7 +179,7 @@ def _epipolar_lines(camera: Floats, pose: RelativePose, points_m: Floats) -> Flo
     f" {readonly_array('int64', 3, 'C')}, {readonly_array('float64', 3, 'C')},"
     " int64, float64, float32[:, :, :, :])"
 )
-def _data_terms(
+def _data_terms(  # noqa: C901  a compiled loop
     one: Picture,
     two: Picture,
     scale: float,

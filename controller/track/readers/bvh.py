@@ -75,13 +75,10 @@ def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
         while at < len(words):
             word = words[at].upper()
             if word in {"ROOT", "JOINT", "END"}:
-                parent = above[-1] if above else -1
-                if word == "ROOT" and joints:
-                    raise InputError(f"{file}: has two skeletons; export one")
-                name = words[at + 1] if word != "END" else f"{joints[parent].name}_end"
-                joints.append(_Joint(name, parent))
-                if len(joints) > _MOST_JOINTS:
-                    raise InputError(f"{file}: has more than {_MOST_JOINTS} joints")
+                if word == "END":
+                    joints.append(_Joint(f"{joints[above[-1]].name}_end", above[-1]))
+                else:
+                    joints.append(_Joint(words[at + 1], above[-1] if above else -1))
                 at += 2
             elif word == "{":
                 above.append(len(joints) - 1)
@@ -100,11 +97,21 @@ def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
                 raise InputError(f"{file}: unknown word {words[at][:20]!r} in its HIERARCHY")
     except (IndexError, ValueError):
         raise InputError(f"{file}: its HIERARCHY is damaged near word {at + 1}") from None
+    if not joints or above:
+        raise InputError(f"{file}: its HIERARCHY is cut")
+    _check_joints(file, joints)
+    return joints
+
+
+def _check_joints(file: Path, joints: list[_Joint]) -> None:
+    if [joint.parent for joint in joints].count(-1) > 1:
+        raise InputError(f"{file}: has two skeletons; export one")
+    if len(joints) > _MOST_JOINTS:
+        raise InputError(f"{file}: has more than {_MOST_JOINTS} joints")
     known = {f"{axis}{kind}" for axis in _AXES for kind in ("POSITION", "ROTATION")}
     odd = [each for joint in joints for each in joint.channels if each not in known]
-    if odd or not joints or above:
-        raise InputError(f"{file}: its HIERARCHY {f'has a channel {odd[0]}' if odd else 'is cut'}")
-    return joints
+    if odd:
+        raise InputError(f"{file}: its HIERARCHY has a channel {odd[0]}")
 
 
 def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Floats]:

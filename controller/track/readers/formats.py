@@ -1,6 +1,6 @@
 """File formats of recordings, recognised by their first bytes."""
 
-from typing import Literal
+from typing import Final, Literal
 
 from snakewalk.controller.track.readers.bvh import is_bvh
 from snakewalk.controller.track.readers.marker_tables import is_trc
@@ -20,20 +20,22 @@ Format = Literal[
 ]
 """``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` cannot be recordings."""
 
+_MARKS: Final[tuple[tuple[bytes, Format], ...]] = (
+    (b"PK\x03\x04", "zip"),
+    (b"\x93NUMPY", "npy"),
+    (b"\x89HDF\r\n\x1a\n", "hdf5"),
+    (b"MATLAB 7.3 MAT-file", "hdf5"),
+    (b"MATLAB 5.0 MAT-file", "mat"),
+)
 HEAD_BYTES = 128
 """First bytes of a file that ``format_of`` needs."""
 
 
 def format_of(head: bytes) -> Format:
     """Recognise a file by its first ``HEAD_BYTES``."""
-    if head.startswith(b"PK\x03\x04"):
-        return "zip"
-    if head.startswith(b"\x93NUMPY"):
-        return "npy"
-    if head.startswith((b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file")):
-        return "hdf5"
-    if head.startswith(b"MATLAB 5.0 MAT-file"):
-        return "mat"
+    for mark, kind in _MARKS:
+        if head.startswith(mark):
+            return kind
     if not head:
         return "empty"
     if head[1:2] == b"\x50" and b"\x00" in head:

@@ -1,8 +1,9 @@
 """The entry for recordings: a shipped name, a file of figures, or a file of bodies."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -10,7 +11,7 @@ from snakewalk.config.loader import load
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
 from snakewalk.controller.track.readers.bvh import load_bvh
-from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, format_of
+from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, Format, format_of
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
 from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
 from snakewalk.controller.track.readers.marker_tables import load_trc
@@ -122,15 +123,10 @@ def load_keypoints(
 def _loaded(
     file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
 ) -> Track | Keypoints:
-    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
-        raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
-    if least_score is not None and not 0.0 <= least_score <= 1.0:
-        raise InputError(f"{file}: the least score must be from 0 to 1, not {least_score}")
-    try:
-        with file.open("rb") as stream:
-            kind = format_of(stream.read(HEAD_BYTES))
-    except OSError as error:
-        raise InputError(f"{file}: {error.strerror or error}") from None
+    _check_options(file, rate_hz, least_score)
+    kind = _format(file)
+    if kind in _MARKERS:
+        return _MARKERS[kind](file, rate_hz, choice)
     match kind:
         case "zip":
             text = zipped_text(file)
@@ -150,23 +146,42 @@ def _loaded(
             choice.only(file, "a MATLAB file")
             return load_mat(file, rate_hz, least_score)
         case "json":
-            try:
-                return load_wcon(file, file.read_text(encoding="utf-8-sig"), rate_hz, choice)
-            except UnicodeDecodeError:
-                raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
+            return load_wcon(file, _json(file), rate_hz, choice)
         case "csv":
             return load_csv(file, rate_hz, least_score, choice)
-        case "qtm":
-            return load_qtm(file, rate_hz, choice)
-        case "bvh":
-            return load_bvh(file, rate_hz, choice)
-        case "trc":
-            return load_trc(file, rate_hz, choice)
-        case "c3d":
-            return load_c3d(file, rate_hz, choice)
-        case _:
-            reason = "is empty" if kind == "empty" else "is no recording"
-            raise InputError(f"{file}: {reason}; known: {KNOWN}")
+    reason = "is empty" if kind == "empty" else "is no recording"
+    raise InputError(f"{file}: {reason}; known: {KNOWN}")
+
+
+_MARKERS: Final[dict[str, Callable[[Path, float | None, Choice], Track | Keypoints]]] = {
+    "qtm": load_qtm,
+    "bvh": load_bvh,
+    "trc": load_trc,
+    "c3d": load_c3d,
+}
+"""Readers of motion capture."""
+
+
+def _check_options(file: Path, rate_hz: float | None, least_score: float | None) -> None:
+    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
+        raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
+    if least_score is not None and not 0.0 <= least_score <= 1.0:
+        raise InputError(f"{file}: the least score must be from 0 to 1, not {least_score}")
+
+
+def _format(file: Path) -> Format:
+    try:
+        with file.open("rb") as stream:
+            return format_of(stream.read(HEAD_BYTES))
+    except OSError as error:
+        raise InputError(f"{file}: {error.strerror or error}") from None
+
+
+def _json(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
 
 
 def track_beside(name_or_path: str, folder: Path | None) -> str:

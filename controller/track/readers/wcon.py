@@ -26,6 +26,21 @@ _OWN = "@snakewalk"
 """Key of a record with facts for which WCON has no name."""
 
 
+def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
+    """Unit of each coordinate in metres; None for all that are not lengths."""
+    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
+    metres |= {
+        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
+        for name in ("ox", "oy", "cx", "cy")
+    }
+    if len({value is None for value in metres.values()}) > 1:
+        raise InputError(
+            f"{file}: units: some are lengths and some are not: "
+            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
+        )
+    return metres
+
+
 def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
@@ -39,38 +54,13 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
     if second is None:
         raise InputError(f"{file}: units: t: expected a time, such as s, not {units['t']!r}")
     choice.only(file, "WCON", "individual")
-    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
-    metres |= {
-        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
-        for name in ("ox", "oy", "cx", "cy")
-    }
-    if len({value is None for value in metres.values()}) > 1:
-        raise InputError(
-            f"{file}: units: some are lengths and some are not: "
-            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
-        )
+    metres = _metres(file, units)
     records = held["data"] if isinstance(held["data"], list) else [held["data"]]
     animals = sorted({str(r.get("id")) for r in records if isinstance(r, dict)})
     if len(animals) > 1 or choice.individual is not None:
         mine = choice.animal(file, animals, animals)
         records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
-    bodies: list[tuple[float, Floats]] = []
-    words: list[tuple[float, str]] = []
-    for number, record in enumerate(records):
-        try:
-            bodies += _bodies(record, metres)
-            words += _words(record)
-        except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
-            raise InputError(
-                f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
-                f"{error}"
-            ) from None
-    if len(bodies) < 2:
-        raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
-    lost = sum(not math.isfinite(at) for at, _ in bodies)
-    if lost:
-        raise InputError(f"{file}: {lost} of {len(bodies)} times t are not finite numbers")
-    bodies.sort(key=lambda body: body[0])
+    bodies, words = _all_bodies(file, records, metres)
     time = second * np.array([at for at, _ in bodies])
     step = float(np.median(np.diff(time)))
     if not (np.diff(time) > 0.0).all():
@@ -90,6 +80,30 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         else (),
     )
     return _about(track, held.get("metadata"), records)
+
+
+def _all_bodies(
+    file: Path, records: list[Any], metres: dict[str, float | None]
+) -> tuple[list[tuple[float, Floats]], list[tuple[float, str]]]:
+    """Return the bodies of all records in the order of their times, and the words about them."""
+    bodies: list[tuple[float, Floats]] = []
+    words: list[tuple[float, str]] = []
+    for number, record in enumerate(records):
+        try:
+            bodies += _bodies(record, metres)
+            words += _words(record)
+        except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
+            raise InputError(
+                f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
+                f"{error}"
+            ) from None
+    if len(bodies) < 2:
+        raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
+    lost = sum(not math.isfinite(at) for at, _ in bodies)
+    if lost:
+        raise InputError(f"{file}: {lost} of {len(bodies)} times t are not finite numbers")
+    bodies.sort(key=lambda body: body[0])
+    return bodies, words
 
 
 def _about(track: Track, about: Any, records: list[Any]) -> Track:
