@@ -276,6 +276,7 @@ def test_a_simulated_run_is_stopped_from_another_program_and_its_log_says_so(
     def on_progress(progress: Progress) -> None:
         if not other:
             other.append(command("stop", "--json"))
+        assert other[0].poll() in {None, 0}, "the stop failed, and nothing ends the run"
 
     job = prepare_gait("lateral-undulation", seconds=3600.0)
     finished = run_robot(RunRequest(job, tmp_path / "run", on_progress=on_progress))
