@@ -24,8 +24,14 @@ import pytest
 from rich.console import Console
 from rich.progress import track
 
-from tests.mutation.mutants import mutants
-from tests.mutation.packages import drawn_modules, nearest_tests, sample
+from tests.mutation.mutants import Mutant, mutants
+from tests.mutation.packages import (
+    FILES,
+    FURTHER_FILES,
+    drawn_modules,
+    nearest_tests,
+    sample,
+)
 from tests.mutation.trial import ROOT, STUCK_S, WORDS, path_of, try_mutants
 
 DOC = ROOT / "docs" / "mutation.md"
@@ -116,6 +122,16 @@ def try_every(modules: list[str]) -> tuple[list[str], list[str]]:
     return [*head, *rows, "", *reasons], unexplained
 
 
+def survivors_of(module: str, tried: list[Mutant], files: list[str]) -> list[Mutant]:
+    """Return the mutants of a module that no test of the files notices."""
+    if not tried or not files:
+        return tried
+    trial = try_mutants(f"snakewalk.{module}", tried, files, BUDGET_S)
+    if trial.failing:
+        raise SystemExit(f"{module}: tests fail without a mutant: {', '.join(trial.failing)}")
+    return [tried[index] for index in trial.survivors]
+
+
 def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]]:
     """Try a sample of each drawn module; yield it, its row of the page, and if it passes."""
     for package, module in drawn_modules():
@@ -126,12 +142,12 @@ def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]
         if not drawn:
             yield module, f"| `{package}` | `{module}` | 0 | 0 | |", True
             continue
-        trial = try_mutants(f"snakewalk.{module}", drawn, nearest_tests(module), BUDGET_S)
-        if trial.failing:
-            raise SystemExit(f"{module}: tests fail without a mutant: {', '.join(trial.failing)}")
-        for index in trial.survivors:
-            print(f"{module}:{drawn[index].line}: {drawn[index].name}", file=sys.stderr)
-        noticed = len(drawn) - len(trial.survivors)
+        near = nearest_tests(module)
+        left = survivors_of(module, drawn, near[:FILES])
+        left = survivors_of(module, left, near[FILES : FILES + FURTHER_FILES])
+        for mutant in left:
+            print(f"{module}:{mutant.line}: {mutant.name}", file=sys.stderr)
+        noticed = len(drawn) - len(left)
         share = noticed / len(drawn)
         row = f"| `{package}` | `{module}` | {len(drawn)} | {noticed} | {100 * share:.0f} % |"
         yield module, row, share >= SHARE

@@ -18,6 +18,8 @@ LINES: Final = 100
 """A drawn module has more lines."""
 FILES: Final = 6
 """Test files that are run on a mutant: those nearest to its module."""
+FURTHER_FILES: Final = 12
+"""Test files after these that are run on the mutants that are left."""
 ALWAYS: Final = ("controller.images.silhouette", "controller.track.analysis")
 """Modules whose evidence once was in expensive tests only."""
 
@@ -51,7 +53,7 @@ def sample(mutants: Sequence[Mutant], count: int) -> list[Mutant]:
 
 
 def nearest_tests(module: str) -> list[str]:
-    """Return the paths of the test files near a module: of its name, then of its package."""
+    """Return the test files that a module reaches: of its name, then of its package."""
     path = module.replace(".", "/") + ".py"
     stem = PurePosixPath(path).stem
     by_import = distances([path], _imports(), texts_of_tests())
@@ -66,4 +68,4 @@ def nearest_tests(module: str) -> list[str]:
         is_apart = str(file.parent) != mirror
         return is_indirect, -len(shared), is_apart, by_import[test], cpu_s.get(test, 0.0), test
 
-    return sorted(by_import, key=rank)[:FILES]
+    return sorted(by_import, key=rank)
