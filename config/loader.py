@@ -22,7 +22,17 @@ if TYPE_CHECKING:
     from snakewalk.config.world import WorldConfig
 
 M = TypeVar("M", bound=BaseModel)
-Kind = Literal["robots", "worlds", "runs", "recordings", "gaits", "skins", "animals", "policies"]
+Kind = Literal[
+    "robots",
+    "worlds",
+    "runs",
+    "recordings",
+    "gaits",
+    "skins",
+    "animals",
+    "policies",
+    "measurements",
+]
 
 _ONE_OF: Final = {"policies": "policy"}
 """Kinds whose singular is not the word without its s."""

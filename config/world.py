@@ -199,6 +199,12 @@ class Water(Strict):
     density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0, description="density of the water")
     drag_across: float = Field(2.0, ge=0.0, le=5.0, description="coefficient of the cross-flow")
     drag_along: float = Field(0.03, ge=0.0, le=1.0, description="coefficient of the skin")
+    linear_across_m_s: float = Field(
+        0.0, ge=0.0, le=10.0, description="speed across below which the linear drag is larger"
+    )
+    linear_along_m_s: float = Field(
+        0.0, ge=0.0, le=10.0, description="speed along below which the linear drag is larger"
+    )
     buoyancy: float = Field(
         1.0, ge=0.0, le=5.0, description="of a link under water over its weight; 1: trimmed neutral"
     )

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from functools import partial, wraps
+from types import ModuleType
 from typing import Any, Final
 
 import typer
@@ -171,13 +172,19 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
     kind = given.annotation
     if any(isinstance(each, ParameterInfo) for each in getattr(kind, "__metadata__", ())):
         return [given.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
-    from snakewalk.controller.console.option import key_parameter, parameters  # noqa: PLC0415  --help has no models
-
-    return [*parameters(kind)] if _is_model(kind) else [key_parameter(given)]
+    option = _option_module()
+    return [*option.parameters(kind)] if _is_model(kind) else [option.key_parameter(given)]
 
 
 def _model(group: Any, options: dict[str, Any]) -> Any:
     """Return a model from its options, and remove these from the others."""
-    from snakewalk.controller.console.option import from_words  # noqa: PLC0415  --help has no models
+    return _option_module().from_words(
+        group, {name: options.pop(name) for name in group.model_fields}
+    )
 
-    return from_words(group, {name: options.pop(name) for name in group.model_fields})
+
+def _option_module() -> ModuleType:
+    """Return the module of options that are keys or fields of a model."""
+    from snakewalk.controller.console import option  # noqa: PLC0415  --help has no models
+
+    return option

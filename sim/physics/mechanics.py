@@ -57,7 +57,7 @@ class Mechanics:
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
-    """(L, 7) ``sim.physics.water.water_constants``."""
+    """(L, 9) ``sim.physics.water.water_constants``."""
     rotor: Floats
     """(5, J) state of the backlash, as ``sim.servo.backlash`` has it."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))

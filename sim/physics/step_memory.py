@@ -154,7 +154,7 @@ def _links(m: Any) -> Links:
         reals_at(m.before_at, (links, 3)),
         reals_at(m.load_at, (links,)),
         reals_at(m.mass_kg_at, (links,)),
-        reals_at(m.water_at, (links, 7)),
+        reals_at(m.water_at, (links, 9)),
     )
 
 

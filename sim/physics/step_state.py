@@ -51,7 +51,7 @@ class Links(NamedTuple):
     """(L,) force that the ground bore in the last step."""
     mass_kg: Floats
     water: Floats
-    """(L, 7) ``sim.physics.water.water_constants``."""
+    """(L, 9) ``sim.physics.water.water_constants``."""
 
 
 class Geoms(NamedTuple):

@@ -1,14 +1,15 @@
 """Water: every link is dragged across and along itself, and carried.
 
-Resistive drag, quadratic in the speed, each component by itself (E. Kelasidi, K. Y. Pettersen,
-J. T. Gravdahl, P. Liljeback, Modeling of underwater snake robots, ICRA 2014; the cross-flow
-principle of G. I. Taylor, Proc. R. Soc. A 214, 1952). Per metre of a body of radius r:
+Resistive drag, linear and quadratic in the speed, each component by itself (E. Kelasidi,
+K. Y. Pettersen, J. T. Gravdahl, P. Liljeback, Modeling of underwater snake robots, ICRA 2014; the
+cross-flow principle of G. I. Taylor, Proc. R. Soc. A 214, 1952). Per metre of a body of radius r:
 
-    across: 1/2 rho C_D 2 r |v_n| v_n        along: 1/2 rho C_F pi r |v_t| v_t
+    across: 1/2 rho C_D 2 r (|v_n| + u_n) v_n        along: 1/2 rho C_F pi r (|v_t| + u_t) v_t
 
-``v_n`` is a vector across the link. Drag acts at the two Gauss points of a link's length, so it
-also brakes turning links. Added mass is not modelled: MuJoCo's bodies weigh the same in all
-directions.
+``v_n`` is a vector across the link. ``u_n`` and ``u_t`` are the speeds below which the linear part
+is the larger one; by default 0: purely quadratic. Drag acts at the two Gauss points of a link's
+length, so it also brakes turning links. Added mass is not modelled: MuJoCo's bodies weigh the same
+in all directions.
 """
 
 import math
@@ -25,15 +26,16 @@ GAUSS = 0.5 / math.sqrt(3.0)
 
 
 def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
-    """(J + 1, 7) of each link, all zero in a dry world.
+    """(J + 1, 9) of each link, all zero in a dry world.
 
     Columns: drag across and along of half the link, kg/m; a Gauss point's arm, radius and surface,
-    m; lift of the link under water, N; axis of the link's frame along it. The axis is 0, or 1 for a
-    leg's segment, a rod as thick as its foot.
+    m; lift of the link under water, N; axis of the link's frame along it. The last two are the
+    speeds of the linear parts across and along, m/s. The axis is 0, or 1 for a leg's segment, a rod
+    as thick as its foot.
     """
     water = world.ground
     links = robot.joint_count + 1
-    rows = np.zeros((links, 7))
+    rows = np.zeros((links, 9))
     if not isinstance(water, Water):
         return rows
     rods = [*zip(robot.link_lengths_m, robot.link_radii_m, robot.link_masses_kg, strict=True)]
@@ -50,6 +52,8 @@ def water_constants(world: WorldConfig, robot: RobotConfig) -> Floats:
             water.depth_m,
             water.buoyancy * mass_kg * GRAVITY_M_S2,
             float(k >= robot.link_count),
+            water.linear_across_m_s,
+            water.linear_along_m_s,
         )
     return rows
 
@@ -96,7 +100,7 @@ def add_water(
         rotation: (L, 9) rows of their rotations.
         v: (L, 3) velocity of the centres, world.
         w: (L, 3) spins, world.
-        water: (L, 7) ``water_constants``.
+        water: (L, 9) ``water_constants``.
         step_s: length of the step.
 
     """
@@ -121,8 +125,8 @@ def add_water(
             s2 = v[i, 2] + w[i, 0] * r1 - w[i, 1] * r0
             slide = s0 * e0 + s1 * e1 + s2 * e2
             n0, n1, n2 = s0 - slide * e0, s1 - slide * e1, s2 - slide * e2
-            d_n = -wet * across * math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-            d_t = -wet * along * abs(slide) * slide
+            d_n = -wet * across * (math.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + water[i, 7])
+            d_t = -wet * along * (abs(slide) + water[i, 8]) * slide
             f0, f1, f2 = d_n * n0 + d_t * e0, d_n * n1 + d_t * e1, d_n * n2 + d_t * e2
             lost -= (f0 * s0 + f1 * s1 + f2 * s2) * step_s
             p0, p1, p2 = centre[i, 0] + r0, centre[i, 1] + r1, centre[i, 2] + r2

@@ -14,7 +14,7 @@ CORE: Final = (
 """Packages of the controller that know no feature package; only ``run`` knows bus and simulator."""
 FEATURES: Final = (
     *("capture", "animals", "cameras", "mapping", "repertoire", "bench", "report", "studies"),
-    *("rehearsal", "view", "exchange", "ros", "learning", "cli"),
+    *("rehearsal", "validation", "view", "exchange", "ros", "learning", "cli"),
 )
 """Packages of the controller that may import every core package, but not each other."""
 BETWEEN_FEATURES: Final[dict[tuple[str, str], str]] = {

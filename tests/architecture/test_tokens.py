@@ -53,6 +53,7 @@ LIMITS: Final = {
     "controller.report": 6050,
     "controller.studies": 20900,
     "controller.rehearsal": 4350,
+    "controller.validation": 3000,
     "controller.view": 8850,
     "controller.exchange": 17400,
     "controller.ros": 4650,

@@ -1,0 +1,1 @@
+"""Published measurements, played in the simulator and compared."""

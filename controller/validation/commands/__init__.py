@@ -1,0 +1,1 @@
+"""Command that compares the simulator with published measurements."""

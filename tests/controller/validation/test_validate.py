@@ -1,0 +1,189 @@
+"""Published measurements against the simulator: files, benches, command and page."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from typer.testing import CliRunner
+
+from snakewalk.config.errors import ConfigError, InputError
+from snakewalk.config.loader import shipped
+from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.validation.benches import SineWave, simulate
+from snakewalk.controller.validation.comparison import compare, median_ratio
+from snakewalk.controller.validation.measurement import (
+    MeasuredRow,
+    WaveMotion,
+    load_measurement,
+)
+from snakewalk.controller.validation.page import page_text
+
+PAGE = Path(__file__).resolve().parents[3] / "docs/validation.md"
+FILES = shipped("measurements")
+BENCH = ("dynamixel-voltages", "mx-no-load", "sts3215-pendulum")
+"""Files without a run: they need a tenth of a second."""
+
+
+def run(*words: str) -> tuple[int, str]:
+    result = CliRunner().invoke(app, ["trials", "validate", *words])
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_each_row_has_valid_conditions_and_a_measured_value_in_its_range(name: str) -> None:
+    _, measurement = load_measurement(name)
+    for row in measurement.rows:
+        conditions = measurement.conditions(row, name)
+        if isinstance(conditions.motion, WaveMotion):
+            assert len(conditions.motion.amplitudes_deg) == conditions.robot.joint_count
+
+
+@pytest.mark.parametrize("name", BENCH)
+def test_servos_alone_stay_in_their_ranges(name: str) -> None:
+    rows = compare([load_measurement(name)])
+    assert [row.row for row in rows if row.state not in {"ok", "reported"}] == []
+    assert not any(row.counts for row in rows)
+
+
+def test_there_are_twenty_rows_and_ten_that_count() -> None:
+    files = [load_measurement(name)[1] for name in FILES]
+    rows = [(file, row) for file in files for row in file.rows]
+    travelling = [
+        row
+        for file, row in rows
+        if file.motion.kind in {"wave", "gait"} and row.kind == "measured" and row.over is None
+    ]
+    assert len(rows) >= 20
+    assert len(travelling) >= 10
+
+
+@pytest.mark.costs("a simulated run of 16 s")
+def test_the_published_law_of_the_milk_snake_within_three_per_cent() -> None:
+    [row] = compare([load_measurement("milk-snake-model")])
+    assert row.ratio == pytest.approx(1.0, abs=0.03)
+    assert row.kind == "published model"
+    assert not row.counts
+
+
+def test_a_motor_at_half_its_voltage_has_half_of_everything() -> None:
+    name, measurement = load_measurement("mx-no-load")
+    row = measurement.rows[0]
+    low, high = (
+        simulate(
+            measurement.conditions(
+                row.model_copy(update={"set": row.set | {"motion.supply_v": volts}}), name
+            )
+        )
+        for volts in (6.0, 12.0)
+    )
+    for quantity, value in high.items():
+        assert low[quantity] == pytest.approx(0.5 * value, rel=1e-3)
+
+
+def test_a_wave_begins_at_rest_and_reaches_its_amplitude() -> None:
+    motion = WaveMotion(frequency_hz=2.0, amplitudes_deg=(30.0,), phases_deg=(90.0,), seconds=3.0)
+    wave = SineWave(motion)
+    assert wave.goal_rad()[0] == 0.0
+    assert abs(wave.velocity_rad_s()[0]) < 1e-3
+    angles = [wave.step(0.01, None)[0] for _ in range(200)]  # type: ignore[arg-type]
+    assert max(angles[100:]) == pytest.approx(math.radians(30.0), rel=1e-3)
+    assert np.abs(angles[:30]).max() < math.radians(10.0)
+
+
+def test_a_range_beyond_a_quarter_needs_a_cause() -> None:
+    fields = {"name": "a", "quantity": "lag_s", "value": 1.0, "kind": "measured"}
+    MeasuredRow(**fields, range=(0.8, 1.25))
+    with pytest.raises(ValidationError, match="cause: is required"):
+        MeasuredRow(**fields, range=(0.5, 1.25))
+    with pytest.raises(ValidationError, match="write lowest first"):
+        MeasuredRow(**fields, range=(1.25, 0.8), cause="none")
+
+
+def changed(tmp_path: Path, old: str, new: str) -> str:
+    text = (PAGE.parents[1] / "config/measurements/mx-no-load.toml").read_text(encoding="utf-8")
+    assert old in text
+    file = tmp_path / "mine.toml"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return str(file)
+
+
+def test_a_row_that_leaves_its_range_gives_exit_code_1(tmp_path: Path) -> None:
+    code, output = run(changed(tmp_path, "value = 33.1", "value = 66.2"))
+    assert code == 1
+    assert "outside" in output
+    code, output = run("mx-no-load")
+    assert code == 0
+    assert max(map(len, output.splitlines())) <= 80
+
+
+def test_a_simulation_that_fails_is_a_row_with_its_reason(tmp_path: Path) -> None:
+    file = changed(tmp_path, 'quantity = "no_load_rpm"', 'quantity = "lag_s"')
+    code, output = run(file, "--json")
+    assert code == 1
+    data = json.loads(output[output.index("{") :])
+    assert data["rows"][0]["state"] == "failed"
+    assert "choose one of them" in data["rows"][0]["cause"]
+    assert data["median_rows"] == 0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("value = 33.1", "value = -1.0", "value"),
+        ('name = "MX-64-10V"', 'name = "MX-64-6V"', "same name"),
+        ('kind = "measured"', 'kind = "guessed"', "kind"),
+        ('quantity = "no_load_rpm"', 'quantity = "no_load_rpm"\nover = "none"', "is not a row"),
+    ],
+)
+def test_a_fault_of_a_file_is_bad_input(tmp_path: Path, old: str, new: str, fault: str) -> None:
+    with pytest.raises(ConfigError, match=fault):
+        load_measurement(changed(tmp_path, old, new))
+
+
+def test_a_replaced_key_begins_with_the_name_of_a_table(tmp_path: Path) -> None:
+    file = changed(tmp_path, '"robot.servo.model"', '"servo.model"')
+    name, measurement = load_measurement(file)
+    with pytest.raises(InputError, match="a key begins with robot"):
+        measurement.conditions(measurement.rows[0], name)
+
+
+def test_a_quotient_of_rows_divides_value_and_result(tmp_path: Path) -> None:
+    file = changed(tmp_path, 'name = "MX-64-10V"', 'name = "MX-64-10V"\nover = "MX-64-6V"')
+    rows = {row.row: row for row in compare([load_measurement(file)])}
+    quotient = rows["MX-64-10V"]
+    assert quotient.measured == pytest.approx(55.5 / 33.1)
+    assert quotient.simulated == pytest.approx(10.0 / 6.0, rel=1e-3)
+
+
+def test_the_picture_has_all_rows(tmp_path: Path) -> None:
+    picture = tmp_path / "ratios.svg"
+    code, _ = run("mx-no-load", "--picture", str(picture))
+    assert code == 0
+    assert picture.read_text(encoding="utf-8").count("MX-106") >= 3
+
+
+def test_the_page_has_the_files_and_bench_rows_of_today() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    for name in FILES:
+        assert f"`config/measurements/{name}.toml`" in text
+    for name in BENCH:
+        loaded = [load_measurement(name)]
+        written = page_text(loaded, compare(loaded))
+        section = written[written.index("\n## ") : written.index("\n## Limits")]
+        assert section in text
+
+
+@pytest.mark.slow
+@pytest.mark.costs("plays every published measurement")
+def test_the_page_is_written_by_the_command_and_no_row_left_its_range() -> None:
+    loaded = [load_measurement(name) for name in FILES]
+    rows = compare(loaded)
+    assert [row.row for row in rows if row.state not in {"ok", "reported"}] == []
+    assert page_text(loaded, rows) == PAGE.read_text(encoding="utf-8")
+    ratio, count = median_ratio(rows)
+    readme = (PAGE.parents[1] / "README.md").read_text(encoding="utf-8")
+    assert f"{count} measured" in readme
+    assert f"{ratio:.2f}" in readme
