@@ -92,7 +92,7 @@ def _prepare_signals() -> None:
 
 
 def _end_by(error: Exception) -> None:
-    """End with what an error means to the user; one that no user can cause is raised again."""
+    """Report an error in words of the user; an error that no user can cause is raised again."""
     notes = notes_of(error)  # of a run: state of torque and log
     begun = 1 if notes else 2
     match error:
