@@ -17,10 +17,10 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.field_facts import bounds_in, bounds_text, description_of
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.loader import Kind, locate, shipped
-from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.world import WorldConfig

@@ -1,12 +1,10 @@
-"""Playback of recordings (table ``playback`` of a run) and of recorded actions (``repertoire``)."""
+"""Playback of recordings (table ``playback`` of a run)."""
 
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
 from snakewalk.config.base import Strict
-from snakewalk.config.key_types import MOTION_S
-from snakewalk.config.synthesis import Curve, Knots
 
 
 def _number_or_auto(given: object) -> object:
@@ -44,27 +42,4 @@ class PlaybackConfig(Strict):
     )
     episode: int | None = Field(
         None, ge=0, description="number of the episode of a LeRobot dataset, from 0"
-    )
-
-
-class ScheduleConfig(Strict):
-    """Wanted speed and turn; a curve is a number, or [[s, value]...]: linear between, level beyond.
-
-    Below the half of the slowest action's speed the body rests, below nought it goes back.
-    """
-
-    speed_m_s: Annotated[Curve, Knots] = Field(0.4, description="wanted")
-    turn_rad_s: Annotated[Curve, Knots] = Field(0.0, description="wanted, positive to the left")
-    duration_s: float = Field(MOTION_S, gt=0.0, description="then it comes to rest")
-
-
-class RepertoireConfig(ScheduleConfig):
-    """Recorded actions in place of a walk ([YT])."""
-
-    file: str = Field(description="file that `snakewalk gait repertoire record` wrote")
-    patience: int | None = Field(
-        None,
-        ge=1,
-        description="cycles of an action after which another one of its kind follows; "
-        "default: it stays",
     )

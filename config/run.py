@@ -11,8 +11,9 @@ from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.friction_law import LawName
 from snakewalk.config.gait import GaitConfig
 from snakewalk.config.key_types import SEED, Seed
-from snakewalk.config.playback import PlaybackConfig, RepertoireConfig
+from snakewalk.config.playback import PlaybackConfig
 from snakewalk.config.robot import RobotConfig, ServoConfig
+from snakewalk.config.schedule import RepertoireConfig
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.value_faults import STOP_OUTPUT_PATTERN
 

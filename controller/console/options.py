@@ -12,6 +12,7 @@ from rich.table import Table
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
+from snakewalk.config.units import label_and_unit
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.plain_console import PlainConsole
@@ -265,28 +266,6 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
     return values
 
 
-UNITS: Final = {
-    "_rad_cycle": "rad per cycle",
-    "_body_lengths_cycle": "body lengths per cycle",
-    "_rad_s": "rad/s",
-    "_m_s": "m/s",
-    "_n_m": "N m",
-    "_m2": "m²",
-    "_rad": "rad",
-    "_deg": "°",
-    "_hz": "Hz",
-    "_kg": "kg",
-    "_ms": "ms",
-    "_mm": "mm",
-    "_a": "A",
-    "_c": "°C",
-    "_j": "J",
-    "_m": "m",
-    "_s": "s",
-    "_v": "V",
-    "_w": "W",
-}
-"""Units by the end of a key; the longest end comes first."""
 _DIGITS: Final = 4
 """Significant digits of a number in a table (ours); JSON has all of them."""
 
@@ -308,10 +287,8 @@ def show(result: Mapping[str, object], as_json: bool) -> None:
 
 def labelled(key: str, value: object) -> tuple[str, str]:
     """Return the label of a key, and its value with a unit."""
-    ends = (end for end in UNITS if key.endswith(end)) if _is_number(value) else ()
-    end = next(iter(ends), "")
-    text = _text(value)
-    return key.removesuffix(end).replace("_", " "), f"{text} {UNITS[end]}" if end else text
+    label, unit = label_and_unit(key) if _is_number(value) else (key.replace("_", " "), "")
+    return label, f"{_text(value)} {unit}".rstrip()
 
 
 def _is_number(value: object) -> bool:

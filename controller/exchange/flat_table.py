@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 from snakewalk.config.joint_names import numbered_joint_names
 from snakewalk.config.robot import JointConfig
-from snakewalk.controller.runlog.column import ANY, JOINT, LINK, Column, Table, unit_of
+from snakewalk.config.units import end_of
+from snakewalk.controller.runlog.column import ANY, JOINT, LINK, Column, Table
 from snakewalk.controller.runlog.encode import encode
 from snakewalk.controller.runlog.evidence import PoseEvidence
 from snakewalk.controller.runlog.record import Header, RunRecord
@@ -135,9 +136,8 @@ def _evidence(evidence: PoseEvidence, rows: int) -> dict[str, Cells]:
 
 def cell_names(name: str, column: Column, width: int, joints: Sequence[str]) -> list[str]:
     """Names of the ``width`` numbers in a row of an array; the unit is the end of each name."""
-    unit = unit_of(name)
-    stem = name.removesuffix(f"_{unit}")
-    end = f"_{unit}" if unit else ""
+    end = end_of(name)
+    stem = name.removesuffix(end)
     match column.shape:
         case (shape,) if shape == JOINT:
             parts = [f"_{joint}" for joint in joints]

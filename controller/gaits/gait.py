@@ -11,6 +11,7 @@ from pydantic import Field
 from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
+from snakewalk.config.field_facts import bounds_of, description_of
 from snakewalk.config.loader import checked
 
 if TYPE_CHECKING:
@@ -185,17 +186,12 @@ def ranges(model: type[GaitParameters]) -> dict[str, Range]:
     found: dict[str, Range] = {}
     kinds: dict[object, type] = {int: int, bool: bool}
     for name, field in model.model_fields.items():
-        bounds = {
-            key: float(value)
-            for rule in field.metadata
-            for key in ("ge", "gt", "le", "lt")
-            if (value := getattr(rule, key, None)) is not None
-        }
+        bounds = {"gt": 0.0, "lt": 1.0} | bounds_of(field)
         found[name] = Range(
             kind=kinds.get(field.annotation, float),
             default=float(field.default),
-            low=bounds.get("ge", bounds.get("gt", 0.0)),
-            high=bounds.get("le", bounds.get("lt", 1.0)),
-            description=field.description or "",
+            low=float(bounds.get("ge", bounds["gt"])),
+            high=float(bounds.get("le", bounds["lt"])),
+            description=description_of(field),
         )
     return found

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
+from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.messages import LOGGER

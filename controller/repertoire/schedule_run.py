@@ -14,7 +14,7 @@ from snakewalk.config.archive import MOST_JSON_BYTES, read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked, load
-from snakewalk.config.playback import RepertoireConfig, ScheduleConfig
+from snakewalk.config.schedule import RepertoireConfig, ScheduleConfig
 from snakewalk.config.synthesis import curve_at
 from snakewalk.controller.kinematics.frame import body_frame
 from snakewalk.controller.kinematics.links import BodyView

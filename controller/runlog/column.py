@@ -26,8 +26,6 @@ Kind = Literal["exact", "rounded", "integer", "flag", "text", "joints", "points"
 """``exact`` floats keep every digit, ``rounded`` ones six decimals; ``joints`` are indices of some
 joints, ``points`` lists of coordinates, ``object`` is any JSON."""
 Watched = Literal["all", "newest", ""]
-UNITS: Final = ("rad_s", "m_s", "rad", "ah", "a", "s", "m", "c", "v", "j")
-"""Suffixes of names that are units; the longest comes first."""
 JOINT = "joint"
 LINK = "link"
 ANY = "any"
@@ -203,11 +201,6 @@ def topic(
 def registered_tables() -> tuple[type[Table], ...]:
     """Return the table of each topic that is declared so far."""
     return tuple(_registered)
-
-
-def unit_of(name: str) -> str:
-    """Unit in the name of a field; empty without one."""
-    return next((unit for unit in UNITS if name.endswith(f"_{unit}")), "")
 
 
 def _column(hint: Any) -> Column:

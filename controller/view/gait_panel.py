@@ -9,6 +9,7 @@ import viser
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.units import label_and_unit
 from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.refusals import NAME_MAX
@@ -85,11 +86,12 @@ class GaitPanel:
     def _input(self, name: str, span: Range) -> Any:
         value = _shown(self._values[name])
         hint = span.description or None
+        label = ", ".join(filter(None, label_and_unit(name)))
         if span.kind is bool:
-            return self._gui.add_checkbox(name, bool(value), hint=hint)
+            return self._gui.add_checkbox(label, bool(value), hint=hint)
         wide = span.high - span.low
         step = 1 if span.kind is int else 10.0 ** math.floor(math.log10(wide / 100.0))
-        return self._gui.add_slider(name, span.low, span.high, step, value, hint=hint)
+        return self._gui.add_slider(label, span.low, span.high, step, value, hint=hint)
 
     def _command_of(self, name: str) -> Callable[[Any], None]:
         """Callback for a change of an input, by a browser and not by ``show``."""

@@ -11,8 +11,8 @@ from typing import Any
 import snakewalk
 from snakewalk.config.camera import MappingConfig
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.config.playback import ScheduleConfig
 from snakewalk.config.pose import TrackerConfig
+from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.controller.rehearsal.rehearsal import LATE_S, errors_of, generator, moved
 from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule

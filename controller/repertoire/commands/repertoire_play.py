@@ -9,7 +9,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import SEED, Seed
-from snakewalk.config.playback import ScheduleConfig
+from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Robot, Set, World, key_values
 from snakewalk.controller.console.result_files import check_picture

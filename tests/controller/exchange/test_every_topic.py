@@ -6,12 +6,13 @@ from collections import defaultdict
 import pytest
 from mcap.reader import make_reader
 
+from snakewalk.config.units import end_of
 from snakewalk.controller.exchange import foxglove_scene, ros_messages
 from snakewalk.controller.exchange.flat_table import flat_tables
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.exchange.remaining_fields import TIME
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
-from snakewalk.controller.runlog.column import Table, unit_of
+from snakewalk.controller.runlog.column import Table
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import TABLES, ConfigTable
 
@@ -34,7 +35,7 @@ def test_every_topic_is_a_table(table: type[Table], record: RunRecord) -> None:
         elif table.topic.columns[name].kind == "points":
             assert "point_x_m" in columns
         else:
-            stem = name.removesuffix(f"_{unit_of(name)}").removesuffix("s")
+            stem = name.removesuffix(end_of(name)).removesuffix("s")
             assert any(column.startswith(stem) for column in columns), name
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import ConfigError, InputError
-from snakewalk.config.playback import ScheduleConfig
+from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire import Repertoire

@@ -10,7 +10,8 @@ import pytest
 from mcap.reader import make_reader
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.runlog.column import Panel, Table, topic, unit_of
+from snakewalk.config.units import end_of
+from snakewalk.controller.runlog.column import Panel, Table, topic
 from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.row_printer import RowPrinter
@@ -143,8 +144,8 @@ def test_a_log_of_before_loads(tmp_path: Path) -> None:
 
 
 def test_the_unit_is_the_end_of_the_name() -> None:
-    assert [unit_of(name) for name in ("rate_rad_s", "asked_rad", "path_s_m", "eta_q")] == [
-        *("rad_s", "rad", "m", "")
+    assert [end_of(name) for name in ("rate_rad_s", "asked_rad", "path_s_m", "eta_q")] == [
+        *("_rad_s", "_rad", "_m", "")
     ]
 
 
