@@ -191,7 +191,8 @@ def captured_from(
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
     expected[[not one.status.has_points for one in skeletons]] = np.nan
-    if goes_on_faintly(skeletons, found.store) or found.is_unclear(skeletons):
+    goes_on = not found.shows_tips(skeletons) and goes_on_faintly(skeletons, found.store)
+    if goes_on or found.is_unclear(skeletons):
         skeletons, expected = _without_tail(skeletons, expected)
     return Capture(
         points_px=np.stack([one.points_px for one in skeletons]),

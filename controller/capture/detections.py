@@ -44,9 +44,12 @@ class Detections:
     axis_error_px: list[float] = field(default_factory=list)
     """Error of the medial axis of any body; NaN for a frame without one."""
     outlines: dict[int, Outline] = field(default_factory=dict)
-    """By frame: silhouettes of bodies that are whole, also those that touch themselves."""
+    """By frame: silhouettes of bodies that are whole, also those that touch themselves; none of a
+    body with a faint tail, which no coil's outline shows."""
     faint_error_px: dict[int, float] = field(default_factory=dict)
     """By frame: least expected error of bodies with faint parts, apart from hidden bands."""
+    tails: int = 0
+    """Number of bodies whose faint tail was followed to its tip."""
     bands_px: list[float] = field(default_factory=list)
     """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
@@ -79,6 +82,7 @@ class Detections:
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
+        is_tailed = detection.tip_error_px > 0.0
         if body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
@@ -86,17 +90,21 @@ class Detections:
             line = body.points_px - first
             ends_px = profile_ends(line, body.radius_px, silhouette.level, blur_px)
             ends_px[:, :2] += first
-            if detection.faint_parts:
+            if is_tailed:
+                # the edge's blur moves the head only; points between share the errors of both ends
+                axis_px = 0.5 * float(np.hypot(axis_px, detection.tip_error_px))
+                self.tails += 1
+            elif detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
                 self.bands_px.append(_longest_band_px(body, detection))
                 self.faint_error_px[number] = axis_px
         may_coil = body.status in COILS and silhouette.status is FrameStatus.GOOD
-        if body.status is FrameStatus.GOOD or may_coil:
+        if may_coil or (body.status is FrameStatus.GOOD and not is_tailed):
             width_px = 2.0 * float(np.max(body.radius_px))
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         self._keep(number, frame, detection)
-        if body.length_px <= LONGEST_PX and not detection.faint_parts:
+        if body.length_px <= LONGEST_PX and not (detection.faint_parts or is_tailed):
             self._last = number
             self._points = body.points_px
             self.crops.put(number, frame, detection.background, self._points)
@@ -123,6 +131,10 @@ class Detections:
         ]
         return used < _CLEAR_FRAMES * len(noise) and float(np.median(noise)) > _NOISY
 
+    def shows_tips(self, skeletons: Sequence[Skeleton]) -> bool:
+        """Whether most tips are those of followed tails: nothing is seen beyond them."""
+        return self.tails > 0.5 * sum(one.status.has_points for one in skeletons)
+
     @property
     def least_error_px(self) -> dict[int, float]:
         """By frame: least expected error of bodies with faint parts."""
@@ -145,6 +157,8 @@ class Detections:
         body = detection.silhouette
         corner = np.array([body.origin_px, np.add(body.origin_px, body.level.shape[::-1])])
         places = np.vstack([corner, self._points]) if body.area_px > 0.0 else self._points
+        if detection.skeleton.status is FrameStatus.GOOD:
+            places = np.vstack([places, detection.skeleton.points_px])
         if len(places):
             length = float(np.nan_to_num(detection.skeleton.length_px))
             self.store.put(number, frame, places, length)

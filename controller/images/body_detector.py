@@ -16,11 +16,17 @@ from snakewalk.controller.images.background import (
     surrounding_ground,
 )
 from snakewalk.controller.images.faint_parts import may_have_faint_parts, with_faint_parts
+from snakewalk.controller.images.faint_tail import with_tails
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton, skeleton_of_level
 from snakewalk.controller.images.residual import check_residual, is_ghost
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
+_HIDING = 0.5  # of the threshold: noise of single pixels hides a faint tail
+_TAILED = 1.15  # times the length without a faint tail that is followed; less may be dirt at a tip
+_THAN_TAILED = 1.12  # the same, for parts that a followed tail does not contain
+_NEAR_TIP = slice(2, 6)  # stations
+_POINTED = 0.45  # of the median radius, near a tip: half of the contrast may end it too early
 _LONGER = 1.15  # times the length without the faint parts: they belong to the body
 _LENGTH_TOLERANCE = 0.15  # of the length: frames agree on it
 _BETTER = 0.04  # of the frames: this many more must agree for another ground than the median
@@ -48,6 +54,8 @@ class Detection:
     """Whether parts of the body are much fainter than the rest; its line is then less accurate."""
     may_have_faint_parts: bool = False
     """Whether something fainter than the silhouette goes on beyond it."""
+    tip_error_px: float = 0.0
+    """Expected error of the tip of a faint tail, along the body; 0 without one."""
     core_threshold: float | None = None
     """Half of the contrast of the strongest part, for a body with faint parts; None for others."""
 
@@ -94,16 +102,25 @@ class BodyDetector:
             )
         body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
         found = self._judged(image, background, body)
-        if self.threshold is not None or not may_have_faint_parts(body):
+        if self.threshold is not None:
             return found
-        if self.search_faint_parts:
+        faint = may_have_faint_parts(body)
+        if not self.search_faint_parts:
+            return replace(found, may_have_faint_parts=faint)
+        hidden = body.noise_level > _HIDING * body.threshold
+        part = found.skeleton.status is FrameStatus.PART
+        may_go_on = faint or hidden or part or _is_pointed(found.skeleton)
+        tailed = self._with_tails(image, background, body) if may_go_on else None
+        best = found if tailed is None else tailed
+        if faint:
             fuller = with_faint_parts(image, background, self.polarity, body)
             if fuller is not None:
                 other = self._judged(image, background, fuller)
-                length = np.nan_to_num(found.skeleton.length_px)
-                if other.skeleton.length_px > _LONGER * length:
+                length = np.nan_to_num(best.skeleton.length_px)
+                least = _LONGER if tailed is None else _THAN_TAILED
+                if other.skeleton.length_px > least * length:
                     return replace(other, faint_parts=True, core_threshold=body.threshold)
-        return replace(found, may_have_faint_parts=True)
+        return best if tailed is not None else replace(found, may_have_faint_parts=faint)
 
     def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
         if self.inside is not None and body.status is FrameStatus.GOOD:
@@ -117,12 +134,35 @@ class BodyDetector:
         if body.status is not FrameStatus.GOOD:
             return Detection(body, no_skeleton(body.status), background)
         skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
+        return self._checked(image, background, body, skeleton)
+
+    def _checked(
+        self, image: DeepImage, background: DeepImage, body: Silhouette, skeleton: Skeleton
+    ) -> Detection:
+        """The body if it explains the picture around it."""
         if skeleton.status is FrameStatus.GOOD:
             ghosts = self.background is not None
             status = check_residual(image, background, self.polarity, body, skeleton, ghosts=ghosts)
             if status is not FrameStatus.GOOD:
                 skeleton = no_skeleton(status)
         return Detection(body, skeleton, background)
+
+    def _with_tails(
+        self, image: DeepImage, background: DeepImage, body: Silhouette
+    ) -> Detection | None:
+        """The body with a faint tail that is thin beyond its silhouette; None without one."""
+        if body.status is not FrameStatus.GOOD:
+            return None
+        core = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
+        if core.status is not FrameStatus.GOOD:
+            return None
+        tailed = with_tails(image, background, self.polarity, body, core)
+        if tailed is None or tailed.skeleton.length_px < _TAILED * core.length_px:
+            return None
+        found = self._checked(image, background, tailed.silhouette, tailed.skeleton)
+        if found.skeleton.status is not FrameStatus.GOOD:
+            return None
+        return replace(found, tip_error_px=tailed.tip_error_px)
 
     def ground_of(self, image: DeepImage) -> DeepImage:
         """Return the background (H, W[, 3]) for a frame."""
@@ -131,6 +171,13 @@ class BodyDetector:
         if self.surroundings_px:
             return surrounding_ground(image, self.polarity, self.surroundings_px)
         return smooth_background(image)
+
+
+def _is_pointed(body: Skeleton) -> bool:
+    """Whether an end is much thinner than the body."""
+    radius = body.radius_px
+    ends = radius[_NEAR_TIP].mean(), radius[::-1][_NEAR_TIP].mean()
+    return bool(min(ends) < _POINTED * float(np.median(radius)))
 
 
 def make_detector(

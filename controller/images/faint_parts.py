@@ -1,5 +1,7 @@
 """Parts of a body that are much fainter than the rest: a pale tail, light bands."""
 
+from typing import Final
+
 import cv2
 import numpy as np
 
@@ -16,7 +18,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
 _MUCH = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
-_FAINTEST = 0.07  # of the body's contrast: a fainter area is a stain or a trail
+FAINTEST: Final = 0.07
+"""Of the body's contrast: a fainter area is a stain or a trail."""
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
 _BLUR_PX = 4  # around the silhouette: a larger area is not its blur
 _TYPICAL = 40.0  # percentile of the contrast along the middle of the faint parts
@@ -78,7 +81,7 @@ def with_faint_parts(
         return None
     faint = float(np.percentile(apart[window][ridge], _TYPICAL)) - middle
     threshold = max(middle + 0.5 * faint, body.noise_level)
-    if faint < _FAINTEST * 2.0 * (body.threshold - middle) or threshold > 0.9 * body.threshold:
+    if faint < FAINTEST * 2.0 * (body.threshold - middle) or threshold > 0.9 * body.threshold:
         return None
     flat = np.minimum(apart, 2.0 * threshold).astype(np.float32)
     return cut_out(flat, threshold, body.noise_level, middle, _MARGIN_PX)

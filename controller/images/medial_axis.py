@@ -36,6 +36,27 @@ WORKING_WIDTH = 14.0
 _SMOOTH = 3.0  # of the chain of pixels, working px
 _CENTRINGS = 2
 _TURN_GAIN = 1.0  # of the turn towards the ridge on the way to a tip
+_MOST_TURN = float(np.tan(np.radians(37.0)))  # of that way from the line's own end: beyond lies an
+# eye, or another part next to the body (tried on a film of a larva)
+_WIDE_END = 1.35  # of the median depth: an end with a deeper place is a head with eyes on its sides
+_NEAR_END = 0.3  # of the axis: that place lies nearer to the end
+_SHORT_END = 3.6  # depths, from that place to the end of the axis
+_AS_DEEP = 0.85  # of the largest depth: the eyes are about as wide as the place between them
+_HOOKED = float(np.cos(np.radians(25.0)))  # the axis turns there into one half of the wide end
+_REACH = 3.0  # depths from that place: pixels of the wide end
+_FRONT = 95.0  # percentile of the pixels ahead of the place: the front of a wide end
+
+
+@dataclass(frozen=True, slots=True)
+class _WideEnd:
+    """An end with two halves, such as eyes; working px."""
+
+    place: Floats
+    """(2,) where the axis enters one half."""
+    deep: float
+    """Distance of that place from the boundary."""
+    length: float
+    """From that place to the front."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +146,10 @@ def skeleton_of_level(
         return no_skeleton(FrameStatus.BRANCH)
     inside = float(np.percentile(fine[solid > 0], 75))
     tip = inside * float(np.clip(_THIN_TIP + 0.075 * (width - 2.0), _THIN_TIP, 0.5))
-    line = _to_the_tips(curve, fine, threshold, depth, min(threshold, max(tip, noise_level)))
+    heads: list[_WideEnd] = []
+    line = _to_the_tips(
+        curve, fine, threshold, solid, depth, heads, min(threshold, max(tip, noise_level))
+    )
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
     if grey and width < THIN_PX:
@@ -159,6 +183,9 @@ def _in_segments(
     except (NoEquipartitionError, ValueError):
         return no_skeleton(FrameStatus.BLOB)
     radius = _sample(depth, even.points) / step
+    for one in heads:
+        within = np.hypot(*(even.points - one.place).T) < one.length
+        radius[within] = np.maximum(radius[within], one.deep / step)
     points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
     return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
 
@@ -192,9 +219,18 @@ def _rescaled(level: Level, scale: float) -> Level:
 
 
 def _to_the_tips(
-    chain: Floats, fine: Level, threshold: float, depth: Level, tip: float
+    chain: Floats,
+    fine: Level,
+    threshold: float,
+    solid: Image,
+    depth: Level,
+    heads: list[_WideEnd],
+    tip: float,
 ) -> Floats | None:
-    """Smooth the chain of pixels, remove forks at its ends, extend it to the boundary."""
+    """Smooth the chain of pixels, remove forks at its ends, extend it to the boundary.
+
+    Wide ends are added to ``heads``.
+    """
     line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     deep = _sample(depth, line)
@@ -202,13 +238,56 @@ def _to_the_tips(
     inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))
     if len(inner) < 4:
         return None
-    core = line[inner[0] : inner[-1] + 1]
+    forks = _wide_end(line, deep), _wide_end(line[::-1], deep[::-1])
+    first = inner[0] if forks[0] is None else forks[0]
+    last = inner[-1] if forks[1] is None else len(line) - 1 - forks[1]
+    if last - first < 4:
+        return None
+    core = line[first : last + 1]
     for _ in range(_CENTRINGS):
         core = _centred(core, fine, threshold)
     reach = min(round(WORKING_WIDTH), len(core))
-    head = _tip(core[:reach][::-1], fine, tip)
-    tail = _tip(core[-reach:], fine, tip)
-    return np.vstack([head[::-1], core, tail])
+    ends = []
+    for end, fork in ((core[::-1], forks[0]), (core, forks[1])):
+        if fork is None:
+            ends.append(_tip(end[-reach:], fine, tip))
+        else:
+            front = _to_the_front(end, float(deep.max()), solid)
+            heads.append(_WideEnd(end[-1], float(_sample(depth, end[-1:])[0]), float(len(front))))
+            ends.append(front)
+    return np.vstack([ends[0][::-1], core, ends[1]])
+
+
+def _wide_end(line: Floats, deep: Floats) -> int | None:
+    """Where an axis (K, 2) enters one half of a wide first end; None if it does not."""
+    near = deep[: round(_NEAR_END * len(line))]
+    most = float(near.max(initial=0.0))
+    if most < _WIDE_END * float(np.median(deep)):
+        return None
+    place = int(np.flatnonzero(near >= _AS_DEEP * most)[-1])
+    if float(np.hypot(*np.diff(line[: place + 1], axis=0).T).sum()) > _SHORT_END * most:
+        return None
+    behind = min(place + max(2, round(1.5 * most)), len(line) - 1)
+    ahead = line[place] - line[behind]
+    every = max(1, min(place, round(0.5 * most)))
+    ways = line[: place + 1 - every] - line[every : place + 1]
+    straight = ways @ ahead / np.maximum(np.hypot(*ways.T) * np.hypot(*ahead), 1e-9)
+    return place if float(straight.min()) < _HOOKED else None
+
+
+def _to_the_front(end: Floats, deep: float, solid: Image) -> Floats:
+    """Points from the end of a line, between both halves of a wide end, to its front."""
+    ahead = end[-1] - end[max(0, len(end) - 1 - round(1.5 * deep))]
+    ahead = ahead / np.hypot(*ahead)
+    y, x = np.nonzero(solid)
+    away = np.column_stack([x, y]) - end[-1]
+    along = away @ ahead
+    near = (along > 0.0) & (np.hypot(*away.T) < _REACH * deep)
+    if not near.any():
+        return np.empty((0, 2))
+    ahead = _bounded(away[near].mean(axis=0), ahead)  # the middle between both halves
+    front = float(np.percentile(away[near] @ ahead, _FRONT))
+    return np.asarray(end[-1] + np.arange(1.0, front)[:, None] * ahead)
 
 
 def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
@@ -240,7 +319,7 @@ def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
 def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
     """Extend ``end`` (K, 2) along the ridge to the end of the body; return the new points."""
     ahead = end[-1] - end[0]
-    ahead = ahead / np.hypot(*ahead)
+    first = ahead = ahead / np.hypot(*ahead)
     across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
     here = end[-1]
     found = []
@@ -257,10 +336,18 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
         weight = np.maximum(level[1:] - threshold, 0.0)
         off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
         turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
-        ahead = turned / np.hypot(*turned)
+        ahead = _bounded(turned, first)
         here = there + 0.5 * _TURN_GAIN * off * side
         found.append(here)
     return np.asarray(found)
+
+
+def _bounded(turned: Floats, first: Floats) -> Floats:
+    """Unit vector of a direction (2,), at most 37 degrees from the unit vector ``first``."""
+    side = np.array([-first[1], first[0]])
+    slope = float(turned @ side) / max(float(turned @ first), 1e-9)
+    slope = float(np.clip(slope, -_MOST_TURN, _MOST_TURN))
+    return np.asarray((first + slope * side) / np.hypot(1.0, slope))
 
 
 def _sample(image: NDArray[np.generic], points: Floats) -> Floats:

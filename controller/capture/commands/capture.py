@@ -171,17 +171,24 @@ def capture(
         force=force,
     )
     if animals is not None and corrections is None:
-        _show_several(capture_several(options), as_json)
+        show_several(capture_several(options), as_json=as_json)
         return
     facts = (capture_recording if corrections is None else correct_recording)(options)
     show(asdict(facts), as_json)
 
 
-def _show_several(facts: AnimalsFacts, as_json: bool) -> None:
-    """One row for each animal, or all facts as JSON."""
+def show_several(facts: AnimalsFacts, *, as_json: bool) -> None:
+    """Show the animals, as rows or as JSON; exit with code 1 if one of them has no track."""
     if as_json:
         show(asdict(facts), as_json)
-        return
+    else:
+        _print_animals(facts)
+    if any(one.capture is None for one in facts.animals):
+        raise SystemExit(1)
+
+
+def _print_animals(facts: AnimalsFacts) -> None:
+    """One row for each animal."""
     table = Table(title=f"{facts.recording}: {facts.frames} frames", title_justify="left", box=None)
     heads = ("animal", "track", "frames used", "in contact", "length, px", "identity uncertain")
     for head in heads:

@@ -14,6 +14,7 @@ from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture import film_parts
 from snakewalk.controller.capture.capture import capture, load_capture, save_capture
+from snakewalk.controller.capture.commands.capture import show_several
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
@@ -141,6 +142,18 @@ def test_each_animal_has_a_track_without_the_frames_in_contact(
         assert captured.head_by == "travel"
     assert names == {0, 1}
     assert (folder / "film.avi").exists()
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_the_command_exits_with_a_code_if_an_animal_has_no_track(
+    dish: tuple[Path, AnimalsFacts], *, as_json: bool
+) -> None:
+    _, facts = dish
+    show_several(facts, as_json=as_json)
+    lost = replace(facts.animals[0], capture=None, fault="the body is never seen whole")
+    with pytest.raises(SystemExit) as stopped:
+        show_several(replace(facts, animals=(lost, *facts.animals[1:])), as_json=as_json)
+    assert stopped.value.code == 1
 
 
 def test_the_page_shows_all_animals(dish: tuple[Path, AnimalsFacts]) -> None:

@@ -1,0 +1,205 @@
+"""A faint tail beyond the end of a silhouette, followed along its ridge of contrast.
+
+A tail that is fainter than half of the body's contrast, or fainter than a pixel's noise, still
+stands out in the mean over a few pixels along it. Each step turns towards the direction in which
+the ridge is clearest; the turn of a step is bounded, so the path cannot curl round an eye.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from snakewalk.config.arrays import Bools, DeepImage, Floats
+from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
+from snakewalk.controller.images.faint_parts import FAINTEST
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.silhouette import Polarity, Silhouette, contrast
+from snakewalk.controller.track.frame_status import FrameStatus
+
+_AHEAD_PX = 9.0  # length of the rays that are compared
+_RADIUS_PX = 9.0  # smallest radius of a bend
+_FAN = np.linspace(-1.0, 1.0, 21)  # directions of the rays that are compared
+_FAN_RAD = 0.7  # largest turn of a ray
+_BESIDE_PX = 2.5  # beyond the half width: the ground on both sides of the ridge
+_CLEAR = 3.0  # standard deviations of a ray on bare ground
+_MOST = 2.0  # times the length of the silhouette's line: a longer tail is a trail
+_AVERAGED = 6  # steps whose clearness is the usual one at the tip
+_SAMPLES = 400  # rays on bare ground
+_LEAST_PX = 4.0  # a shorter extension is ignored
+_THINNEST_PX, _WIDEST_PX = 1.0, 3.0  # half width of a tail
+_AROUND, _MARGIN_PX = 1.0, 20  # of the length of the silhouette, and px: where tails are searched
+_FREE_PX = 12.0  # from the silhouette: bare ground, but for the tail
+_END_STATIONS = 10  # of the skeleton: the width at its end
+_SMOOTH = 2.0  # stations
+_DRAWN = 1.2  # of the threshold: contrast that the silhouette receives along the tail
+_TIP = 1.5  # of the ray over its clearness: error of the tip (measured on one film of a larva)
+
+
+@dataclass(frozen=True, slots=True)
+class TailedBody:
+    """A body with the faint tail beyond the end of its silhouette."""
+
+    silhouette: Silhouette
+    skeleton: Skeleton
+    tip_error_px: float
+    """Expected error of the tip of the tail, along the body."""
+
+
+@dataclass(frozen=True, slots=True)
+class FollowedTail:
+    """The continuation of a line."""
+
+    points: Floats
+    """(K, 2) from the end of the line to the tip, one pixel apart."""
+    clearness: float
+    """Median contrast of the ridge over its noise."""
+
+
+def follow_tail(
+    level: NDArray[np.float32], line: Floats, half_px: float, away_px: Floats, faintest: float
+) -> FollowedTail | None:
+    """Follow a ridge beyond the last point of a line; None if nothing goes on there.
+
+    A ridge that leads back into the silhouette is no tail.
+
+    Args:
+        level: (h, w) contrast around the body, with its ground.
+        line: (P, 2) x, y; its last point is the end of the silhouette.
+        half_px: half width of the body at that end.
+        away_px: (h, w) distance from the silhouette; the noise is learnt far from it.
+        faintest: contrast of a ray below which it is a stain or a trail.
+
+    """
+    half = float(np.clip(half_px, _THINNEST_PX, _WIDEST_PX))
+    noise = _noise(level, half, away_px > _FREE_PX)
+    if noise is None:
+        return None
+    noise = max(noise, faintest / _CLEAR)
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    back = max(1, round(_AHEAD_PX * (len(line) - 1) / max(length, 1e-6)))
+    ahead = line[-1] - line[max(0, len(line) - 1 - back)]
+    angle = float(np.arctan2(ahead[1], ahead[0]))
+    here = line[-1]
+    points: list[Floats] = []
+    clear = [0.0]
+    rows, columns = level.shape
+    for _ in range(round(_MOST * length)):
+        ways = angle + _FAN_RAD * _FAN
+        seen = _ridge(level, np.broadcast_to(here, (len(ways), 2)), ways, half) / noise
+        best = int(np.argmax(seen - np.abs(_FAN)))
+        ahead_px = 1.0
+        if seen[best] < _CLEAR:
+            # a ray that only begins on the tail is as clear as its part on the tail is long
+            usual = float(np.mean(clear[-_AVERAGED:]))
+            ahead_px = _AHEAD_PX * min(1.0, float(seen[best]) / max(usual, _CLEAR))
+        angle += float(np.clip(_FAN_RAD * _FAN[best], -1.0 / _RADIUS_PX, 1.0 / _RADIUS_PX))
+        unit = np.array([np.cos(angle), np.sin(angle)])
+        if seen[best] < _CLEAR:
+            points.extend(here + k * unit for k in np.arange(1.0, ahead_px + 0.5))
+            break
+        here = here + unit
+        if not (0.0 <= here[0] < columns and 0.0 <= here[1] < rows):
+            break
+        points.append(here)
+        clear.append(float(seen[best]))
+    if len(clear) - 1 < _LEAST_PX or _returns(np.array(points), away_px):
+        return None
+    return FollowedTail(np.array(points), float(np.median(clear[1:])))
+
+
+def _ridge(level: NDArray[np.float32], start: Floats, ways: Floats, half: float) -> Floats:
+    """(W,) mean contrast along a ray from each point (W, 2), less that of its clearer side."""
+    along = np.arange(1.0, _AHEAD_PX + 1.0)
+    unit = np.column_stack([np.cos(ways), np.sin(ways)])
+    side = np.column_stack([-unit[:, 1], unit[:, 0]])
+    middle = start[:, None] + along[None, :, None] * unit[:, None]
+    beside = half + _BESIDE_PX
+    across = np.array([-0.5 * half, 0.0, 0.5 * half, -beside, beside])
+    places = middle[:, :, None] + across[:, None] * side[:, None, None]
+    x, y = np.moveaxis(places.reshape(len(ways), -1, 2), -1, 0).astype(np.float32)
+    shown = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    seen = np.asarray(shown, dtype=float).reshape(places.shape[:-1]).mean(axis=1)
+    return np.asarray(seen[:, :3].mean(axis=1) - seen[:, 3:].max(axis=1))
+
+
+def _returns(points: Floats, away_px: Floats) -> bool:
+    """Whether a path (K, 2) leaves the silhouette and enters it again."""
+    rows, columns = away_px.shape
+    x, y = np.clip(np.rint(points).astype(int), 0, [columns - 1, rows - 1]).T
+    outside = away_px[y, x] > 0.0
+    return bool((~outside[int(np.argmax(outside)) :]).any() and outside.any())
+
+
+def _noise(level: NDArray[np.float32], half: float, free: Bools) -> float | None:
+    """Standard deviation of ``_ridge`` on bare ground; None if there is too little of it."""
+    y, x = np.nonzero(free)
+    if len(x) < _SAMPLES:
+        return None
+    some = np.linspace(0, len(x) - 1, _SAMPLES).round().astype(int)
+    ways = np.linspace(0.0, 12.0 * np.pi, _SAMPLES)
+    seen = _ridge(level, np.column_stack([x[some], y[some]]).astype(float), ways, half)
+    return float(1.4826 * np.median(np.abs(seen - np.median(seen))))
+
+
+def with_tails(
+    image: DeepImage, background: DeepImage, polarity: Polarity, body: Silhouette, found: Skeleton
+) -> TailedBody | None:
+    """Return the body with the faint tail beyond either end; None if nothing goes on there.
+
+    Args:
+        image: (H, W[, 3]) the frame.
+        background: the same without the animal.
+        polarity: whether the animal is darker or lighter than its ground.
+        body: the part above half of the contrast.
+        found: its skeleton.
+
+    """
+    around = round(_AROUND * found.length_px) + _MARGIN_PX
+    rows, columns = body.level.shape
+    left, top = (int(v) for v in body.origin_px)
+    x, y = max(0, left - around), max(0, top - around)
+    window = (slice(y, top + rows + around), slice(x, left + columns + around))
+    level = np.asarray(contrast(image[window], background[window], polarity), dtype=np.float32)
+    mask = np.zeros(level.shape, dtype=np.uint8)
+    inner = (slice(top - y, top - y + rows), slice(left - x, left - x + columns))
+    mask[inner] = body.mask
+    away_px = np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5), dtype=float)
+    faintest = 2.0 * FAINTEST * body.threshold
+    line, radius = found.points_px - [x, y], found.radius_px
+    clearness, added = [], []
+    for _ in range(2):
+        end = float(np.median(radius[-_END_STATIONS:]))
+        tail = follow_tail(level, line, end, away_px, faintest)
+        if tail is not None:
+            clearness.append(tail.clearness)
+            added.append(tail.points)
+            line = np.vstack([line, tail.points])
+            radius = np.concatenate([radius, np.linspace(end, _THINNEST_PX, len(tail.points))])
+        line, radius = line[::-1], radius[::-1]
+    if not added:
+        return None
+    smooth = gaussian_filter1d(line, _SMOOTH, axis=0, mode="nearest")
+    try:
+        even = equipartition(np.vstack([line[:1], smooth, line[-1:]]), SEGMENTS)
+    except (NoEquipartitionError, ValueError):
+        return None
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    shares = np.linspace(0.0, arc[-1], SEGMENTS + 1)
+    length = even.chord * SEGMENTS
+    skeleton = Skeleton(
+        even.points + np.array([x, y]), np.interp(shares, arc, radius), length, FrameStatus.GOOD
+    )
+    own = np.zeros(level.shape, dtype=np.float32)
+    own[inner] = body.level
+    for points in added:
+        cv2.polylines(
+            mask, [np.rint(points).astype(np.int32)], isClosed=False, color=2, thickness=3
+        )
+    own[mask == 2] = np.maximum(own[mask == 2], _DRAWN * body.threshold)
+    area = float(np.count_nonzero(own > body.threshold))
+    silhouette = replace(body, level=own, origin_px=(float(x), float(y)), area_px=area)
+    error = _TIP * _AHEAD_PX / min(clearness)
+    return TailedBody(silhouette, skeleton, error)
