@@ -21,11 +21,11 @@ from snakewalk.controller.capture.capture import (
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
-from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
+from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
-from snakewalk.controller.capture.plots.capture import contact_sheet, step_picture, trail_picture
+from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
@@ -339,8 +339,6 @@ def _write_pictures(
     captured = held.captured
     footage = film.footage
     region = film.region
-    if options.sheet is not None:
-        contact_sheet(options.sheet, footage.read(), captured)
     if options.trail is not None:
         trail_picture(options.trail, footage.read(), captured, detector.polarity)
     if options.steps is not None:
@@ -349,7 +347,7 @@ def _write_pictures(
         image = film.cut(shot)
         line = captured.points_px[number] - np.array(region.origin_px)
         step_picture(options.steps, image, detector, line)
-    write_overlay_and_review(options, film, [held], [options.output], bar, scale)
+    write_looks(options, film, [held], [options.output], bar, scale)
 
 
 def facts_of(

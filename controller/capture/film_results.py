@@ -8,7 +8,7 @@ from snakewalk.controller.capture.capture import Capture, CaptureFile
 from snakewalk.controller.capture.image_file import scaled
 from snakewalk.controller.capture.opened_film import OpenedFilm
 from snakewalk.controller.capture.options import CaptureOptions
-from snakewalk.controller.capture.plots.capture import overlay_film
+from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film
 from snakewalk.controller.capture.review import review_page
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
@@ -24,7 +24,7 @@ def in_whole_film(options: CaptureOptions, film: OpenedFilm, captured: Capture) 
     return replace(captured, points_px=points_px, time_s=time_s, rate_hz=rate_hz)
 
 
-def write_overlay_and_review(
+def write_looks(
     options: CaptureOptions,
     film: OpenedFilm,
     animals: Sequence[CaptureFile],
@@ -32,7 +32,7 @@ def write_overlay_and_review(
     bar: ProgressBar,
     scale: float,
 ) -> None:
-    """Write the overlay film and the review page if the options name them.
+    """Write the contact sheet, the overlay film and the review page if the options name them.
 
     Args:
         options: of the command.
@@ -45,6 +45,8 @@ def write_overlay_and_review(
     """
     footage = film.footage
     region = film.region
+    if options.sheet is not None:
+        contact_sheet(options.sheet, footage.read(), [one.captured for one in animals])
     if options.overlay is not None:
         bar.update(0, footage.count, description="overlay film")
         captures = [one.captured for one in animals]

@@ -114,7 +114,6 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
     given = {
         "--head": options.head,
         "--steps": options.steps,
-        "--sheet": options.sheet,
         "--trail": options.trail,
     }
     one = [name for name, value in given.items() if value is not None]

@@ -68,23 +68,35 @@ def _words(canvas: Image, text: str, good: bool, line: int = 0) -> None:
 
 
 def contact_sheet(
-    path: Path, frames: Iterable[DeepImage], captured: Capture, columns: int = 6, rows: int = 4
+    path: Path,
+    frames: Iterable[DeepImage],
+    animals: Sequence[Capture],
+    columns: int = 6,
+    rows: int = 4,
 ) -> None:
-    """Frames spread over the recording, every third place kept for frames that were not used."""
-    chosen = set(_chosen(captured, columns * rows))
-    tiles = []
+    """Frames spread over the recording, every third place kept for frames that were not used.
+
+    Each of several animals has half as many rows, with its number on every tile.
+    """
+    if len(animals) > 1:
+        rows = max(1, rows // 2)
+    chosen = [set(_chosen(captured, columns * rows)) for captured in animals]
+    tiles: list[list[Image]] = [[] for _ in animals]
     for number, image in enumerate(frames):
-        if number in chosen:
+        for k, captured in enumerate(animals):
+            if number not in chosen[k]:
+                continue
             status = captured.status[number]
             tile = _tile(image, captured.points_px[number], status)
             reason = "" if status is FrameStatus.GOOD else f": {status}"
-            for line, text in enumerate(wrap(f"{number}{reason}", _LETTERS)[::-1]):
+            name = f"animal {k + 1}, " if len(animals) > 1 else ""
+            for line, text in enumerate(wrap(f"{name}{number}{reason}", _LETTERS)[::-1]):
                 _words(tile, text, status is FrameStatus.GOOD, line)
-            tiles.append(tile)
+            tiles[k].append(tile)
     empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
-    wide = min(columns, len(tiles))
-    tiles += [empty] * (-len(tiles) % wide)
-    sheet = np.vstack([np.hstack(tiles[k : k + wide]) for k in range(0, len(tiles), wide)])
+    wide = min(columns, max(len(one) for one in tiles))
+    placed = [tile for one in tiles for tile in [*one, *[empty] * (-len(one) % wide)]]
+    sheet = np.vstack([np.hstack(placed[k : k + wide]) for k in range(0, len(placed), wide)])
     with atomic_write(path) as part:
         if not _written(part, sheet):
             raise InputError(f"{path}: a contact sheet is a .png or .jpg")

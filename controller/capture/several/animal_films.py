@@ -24,7 +24,7 @@ from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DIRT = 0.05  # of the usual area: smaller objects are not mentioned
-_AROUND = 0.4  # of the body's length, around its blob
+_AROUND = 1.2  # of the length of a blob, around it: a faint tail goes on beyond the blob
 _LEAST_AROUND_PX = 24
 _UNSEEN = -1
 _MERGED = -2

@@ -14,7 +14,7 @@ from snakewalk.controller.capture.capturing import (
     marker_scale,
     part_folder,
 )
-from snakewalk.controller.capture.film_results import in_whole_film, write_overlay_and_review
+from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import AUTO, CaptureOptions, check_options, track_files
 from snakewalk.controller.capture.results import write_captures
@@ -171,7 +171,7 @@ def _write(
         files = [file for file, one in zip(files, held, strict=True) if one is not None]
         for file, one in zip(files, good, strict=True):
             write_captures(file, [one])
-    write_overlay_and_review(options, film, good, files, bar, scale)
+    write_looks(options, film, good, files, bar, scale)
 
 
 def _facts(

@@ -166,8 +166,9 @@ class TrackletBuilder:
 
     def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
         """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""
-        before = [self._nodes[old] for old in olds]
-        if len(olds) == len(news) == 1:
+        before = [one for old in olds if not self._is_part(one := self._nodes[old])]
+        before = before or [self._nodes[old] for old in olds]
+        if len(before) == len(news) == 1:
             node = before[0]
             new = int(news[0])
             area = float(blobs.area_px[new])
@@ -189,6 +190,12 @@ class TrackletBuilder:
                 nodes[int(new)] = self._new(crossing)
             else:
                 nodes[int(new)] = _Crossing(crossing, share)
+
+    def _is_part(self, node: _Node) -> bool:
+        """Whether a blob is only a part of an animal, such as a tail that joins it again."""
+        if not isinstance(node, Tracklet) or node.begins_in is not None:
+            return False
+        return len(node.frames) < _FEWEST and node.area_px < _PART * self.usual_px
 
     def _shares(self, areas: Floats, count: int) -> list[int]:
         """How many animals each of some blobs shows, ``count`` in all; at least one each."""

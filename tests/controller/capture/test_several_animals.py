@@ -19,11 +19,12 @@ from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.several.animal_films import find_animals
-from snakewalk.controller.capture.several.blobs import detector_of_several
+from snakewalk.controller.capture.several.blobs import blobs_of, detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
-from snakewalk.controller.capture.several.tracklets import Tracklet
-from snakewalk.controller.images.body_detector import Detection, make_detector
+from snakewalk.controller.capture.several.tracklets import Tracklet, TrackletBuilder
+from snakewalk.controller.images.body_detector import BodyDetector, Detection, make_detector
+from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_file
@@ -118,7 +119,7 @@ def dish(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, AnimalsFacts]:
     writer.release()
     options = CaptureOptions(
         film, folder / "track.npz", animals="auto", review=folder / "page.html",
-        overlay=folder / "film.avi",
+        overlay=folder / "film.avi", sheet=folder / "sheet.png",
     )  # fmt: skip
     return folder, capture_several(options)
 
@@ -142,6 +143,10 @@ def test_each_animal_has_a_track_without_the_frames_in_contact(
         assert captured.head_by == "travel"
     assert names == {0, 1}
     assert (folder / "film.avi").exists()
+    sheet = cv2.imread(str(folder / "sheet.png"))
+    assert sheet is not None
+    high, wide = sheet.shape[:2]
+    assert high * 3 == wide * 2  # two rows of six frames for each animal
 
 
 @pytest.mark.parametrize("as_json", [False, True])
@@ -218,6 +223,22 @@ def test_what_does_not_fit_several_animals_is_rejected(
     with pytest.raises(InputError, match="--review"):
         capture_several(replace(plain, output=tmp_path / "t.csv", review=tmp_path / "r.html"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_part_of_an_animal_that_joins_it_again_is_no_contact() -> None:
+    """A tail that appears apart from its body in one frame, and is one with it in the next."""
+    body, tail, between = np.s_[10:18, 5:45], np.s_[21:30, 33:45], np.s_[18:21, 33:45]
+    builder = TrackletBuilder(320.0)
+    ground = np.full((40, 60), 200, dtype=np.uint8)
+    detector = BodyDetector(ground, Polarity.DARK, "given", threshold=60.0)
+    for parts in [[body]] * 6 + [[body, tail]] + [[body, tail, between]] * 6:
+        image = ground.copy()
+        for part in parts:
+            image[part] = 50
+        builder.add(blobs_of(image, ground, detector))
+    (one,) = builder.done()
+    assert len(one.frames) == 13
+    assert one.ends_in is None
 
 
 @pytest.mark.slow
