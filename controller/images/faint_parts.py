@@ -19,7 +19,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
 _MUCH = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
 FAINTEST: Final = 0.07
-"""Of the body's contrast: a fainter area is a stain or a trail."""
+"""Least contrast of a part, relative to that of the body: fainter areas are stains or trails."""
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
 _BLUR_PX = 4  # around the silhouette: a larger area is not its blur
 _TYPICAL = 40.0  # percentile of the contrast along the middle of the faint parts

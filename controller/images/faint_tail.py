@@ -63,7 +63,7 @@ def follow_tail(
 ) -> FollowedTail | None:
     """Follow a ridge beyond the last point of a line; None if nothing goes on there.
 
-    A ridge that leads back into the silhouette is no tail.
+    A ridge that leads back into the silhouette is not a tail.
 
     Args:
         level: (h, w) contrast around the body, with its ground.
