@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 
 import typer
 
@@ -59,12 +59,15 @@ def run_for_user(
     else:
         bar = TimeBar(prepared.run.name, seconds or prepared.run.time_limit_s, motion_at)
     opened = nullcontext(observers) if observers else observers_of(options, observe, live=live)
-    with opened as watching, run_folder(name, options.out) as folder, bar:
+    with ExitStack() as opened_parts:
+        watching = opened_parts.enter_context(opened)
+        folder = opened_parts.enter_context(run_folder(name, options.out))
+        opened_parts.enter_context(bar)
         if live and watching.page is not None:
             watching.page.on_course()
         is_paced = (watching or stop_requested is not None) and not options.port
         can_ask = stop_requested is None and sys.stdin.isatty()
-        return run_robot(
+        result = run_robot(
             RunRequest(
                 prepared,
                 folder,
@@ -79,6 +82,9 @@ def run_for_user(
                 on_event=bar.on_event,
             )
         )
+        with result.ending.noted():  # the observers need up to seconds to close
+            opened_parts.close()
+        return result
 
 
 def _confirm(found: str) -> bool:

@@ -99,6 +99,8 @@ def run_gait(
             shadow=shadow,
             stop_requested=None if hands is None else hands.torque_off,
         )
+        with result.ending.noted():  # the observers need up to seconds to close
+            stack.close()
     show_result(result, _facts(prepared, result), options)
 
 

@@ -144,6 +144,11 @@ PHASES = {
         OFF,
         "the run is whole",
     ),
+    "bar and observers close": (
+        "snakewalk.controller.console.progress.TimeBar.__exit__",
+        OFF,
+        "the run is whole",
+    ),
     "log is read": ("snakewalk.controller.run.run_robot.read_log", OFF, "the run is whole"),
     "report": ("snakewalk.controller.report.artifacts._draw", OFF, "the run is whole"),
     "film": ("snakewalk.controller.report.artifacts._film", OFF, "the run is whole"),
@@ -152,7 +157,7 @@ PHASES = {
 """What a signal interrupts: the function called then, the state of torque, the name of the log."""
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("phase", PHASES)
 def test_each_signal_in_each_phase_says_what_became_of_torque_and_log(
     phase: str,
