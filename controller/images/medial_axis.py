@@ -158,7 +158,7 @@ def skeleton_of_level(
         return no_skeleton(FrameStatus.BLOB)
     if grey and width >= _POINTED_PX:
         line = to_pointed_tips(line, fine, WORKING_WIDTH, step)
-    return _in_segments(line, depth, step, origin_px)
+    return _in_segments(line, depth, step, origin_px, heads)
 
 
 def _fitted_line(
@@ -175,9 +175,13 @@ def _fitted_line(
 
 
 def _in_segments(
-    line: Floats, depth: Level, step: float, origin_px: tuple[float, float]
+    line: Floats,
+    depth: Level,
+    step: float,
+    origin_px: tuple[float, float],
+    heads: Sequence[_WideEnd],
 ) -> Skeleton:
-    """Skeleton along a line (n, 2) in the working picture."""
+    """Skeleton along a line (n, 2) in the working picture, as wide as its wide ends there."""
     try:
         even = equipartition(line, SEGMENTS)
     except (NoEquipartitionError, ValueError):
