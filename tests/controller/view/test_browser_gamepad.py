@@ -67,6 +67,21 @@ def test_a_stop_button_stops_at_once_whoever_steers() -> None:
     assert pads.stops == 3
 
 
+def test_a_press_that_waited_in_the_line_steers_nothing_but_a_stop_still_stops() -> None:
+    pads = Pads()
+    pads.take(state(4))
+    pads.gamepad.commands()
+    since_s = pads.now_s
+    pads.now_s += 1.5
+    assert pads.gamepad.take("a", state(4, 1), since_s)
+    assert pads.gamepad.commands() == []
+    assert pads.gamepad.take("a", state(4, 11), since_s)
+    assert pads.stops == 1
+    assert pads.gamepad.take("a", state(4), pads.now_s)
+    assert pads.gamepad.take("a", state(4, 1), pads.now_s - 0.5)
+    assert pads.gamepad.commands() == ["m", hold_command(True, pads.now_s)]
+
+
 def test_one_steers_until_it_goes_or_says_nothing_any_more() -> None:
     pads = Pads()
     pads.take(state(4))

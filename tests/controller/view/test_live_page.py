@@ -1,5 +1,6 @@
 """The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
 
+import asyncio
 import dataclasses
 import json
 import os
@@ -8,6 +9,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
@@ -48,6 +50,8 @@ from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.view.stop_element import StopElement
 from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.controller.view.test_fresh_line import Proxy
+from tests.controller.view.test_stop_element import ended, run_in
 from tests.helpers.bus import PATIENT
 
 ROOT = Path(__file__).parents[3]
@@ -74,8 +78,13 @@ def run(folder: Path, *words: str) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextmanager
-def browsed(child: subprocess.Popen[str], width: int = 700, script: str = "") -> Iterator[Any]:
-    """The page of a run in a browser."""
+def browsed(
+    child: subprocess.Popen[str],
+    width: int = 700,
+    script: str = "",
+    through: Callable[[int], int] = lambda port: port,
+) -> Iterator[Any]:
+    """The page of a run in a browser; ``through`` returns the port of a proxy."""
     playwright = pytest.importorskip("playwright.sync_api")
     assert child.stderr is not None
     line = child.stderr.readline()
@@ -89,7 +98,8 @@ def browsed(child: subprocess.Popen[str], width: int = 700, script: str = "") ->
         page = browser.new_page(viewport={"width": width, "height": 500})
         page.set_default_timeout(60_000.0)
         page.add_init_script(script)
-        page.goto(url[0])
+        port = int(re.findall(r":(\d+)/", url[0])[0])
+        page.goto(url[0].replace(f":{port}/", f":{through(port)}/"))
         page.get_by_text("torque off at once, latched").wait_for()
         yield page
         browser.close()
@@ -464,6 +474,59 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         assert child.wait(60.0) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
+
+
+STALL_S = 2.5
+"""How long the connection stalls in real time: commands of 1 s are late."""
+
+
+@pytest.mark.nightly("a browser at a running gait: 40 s of CPU")
+@IN_A_BROWSER
+def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_run(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus("1-4")
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
+    words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
+    proxies: list[Proxy] = []
+
+    def through(port: int) -> int:
+        proxies.append(Proxy(port))
+        started = asyncio.start_server(proxies[0].pass_on, "127.0.0.1", 0)
+        return int(run_in(loop, started).result().sockets[0].getsockname()[1])
+
+    def stall() -> None:
+        proxies[0].flows.clear()
+        loop.call_later(STALL_S, proxies[0].flows.set)
+
+    loop = asyncio.new_event_loop()
+    thread = threading.Thread(target=loop.run_forever, daemon=True)
+    thread.start()
+    with run(tmp_path, *words) as child, browsed(child, through=through) as page:
+        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
+        page.get_by_role("tab", name="gait").click()
+        slider = page.get_by_role("slider").first
+        slider.focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text(re.compile(r"operator: frequency_hz = 0\.\d")).wait_for()
+        page.get_by_role("tab", name="gait").click()
+        slider.focus()
+        loop.call_soon_threadsafe(stall)
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("tab", name="events").click()
+        page.get_by_text("late and is dropped").first.wait_for()
+        page.keyboard.press("Escape")
+        page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        assert child.wait(60.0) == 1
+    run_in(loop, ended(asyncio.all_tasks(loop))).result()
+    loop.call_soon_threadsafe(loop.stop)
+    thread.join()
+    record = read_log(tmp_path / "run" / "log.mcap")
+    said = [event.text for event in record.events if event.kind == "operator"]
+    assert len([text for text in said if text.startswith("frequency_hz = ")]) == 1
 
 
 FAKE_PAD = """
