@@ -1,6 +1,6 @@
 """Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,15 +12,64 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.friction_law import LAWS
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.run import RunConfig
+from snakewalk.controller.pose.sample import ArrivedPose
+from snakewalk.controller.pose.udp_feed import decoded
 from snakewalk.controller.rehearsal.judgement import judge
 from snakewalk.controller.rehearsal.metric_errors import metric_errors
-from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.truth import read_truth
+from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.chain.servo_chain import ServoChain
+
+SENDER: Final = "127.0.0.1:40000"
+"""Address that the simulated tracker has in messages."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedDatagrams:
+    """The datagrams of a served robot's tracker; a ``PoseFeed``."""
+
+    served: ServedRobot
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived since the last call."""
+        self.served.line.settle()
+        due = self.served.tracker.due(now_s)
+        return [decoded(sent.data, SENDER, sent.due_s) for sent in due]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedPort:
+    """A served robot as a port of a request; a ``RehearsedPort``."""
+
+    served: ServedRobot
+    name: str = "rehearsal"
+
+    def open(self, run: RunConfig, robot: RobotConfig) -> Backend:
+        """Open the port: the client knows its bytes and its datagrams, and nothing else."""
+        line = self.served.line
+        chain = ServoChain(
+            servo_bus(line, robot.models_by_id),
+            robot.model_copy(update={"ports": ()}),
+            watchdog_s=run.safety.watchdog_s,
+            rate_hz=run.cycle_hz,
+        )
+        return Backend(
+            self.name,
+            chain,
+            line.clock,
+            None,
+            None,
+            lambda: line.busy_s,
+            poses=SimulatedDatagrams(self.served),
+        )
+
 
 RUNS: Final = (
     "jacksboro-traverse",

@@ -1,6 +1,6 @@
 """Feetech servos: the registers drive the motors and show their shafts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -8,13 +8,66 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.servo_model import ServoModel
-from snakewalk.drivers.protocol.feetech import CALIBRATE_MIDDLE, MAX_ID, TORQUE_DAMPING
-from snakewalk.sim.feetech.alarms import FeetechAlarms
+from snakewalk.drivers.protocol.feetech import (
+    CALIBRATE_MIDDLE,
+    MAX_ID,
+    TORQUE_DAMPING,
+    FeetechAlarm,
+)
+from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.feetech.registers import FeetechRegisters
-from snakewalk.sim.plant import Mounting, Plant
+from snakewalk.sim.plant import Mounting, Plant, ServoDrive
+from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.motor import MotorColumns, MotorModel, make_drive
 from snakewalk.sim.servo.profile import Trajectory
 from snakewalk.sim.servo.simulated_servos import SimulatedServos, check_ids
+
+ALARMS: Mapping[str, int] = {
+    "overload": FeetechAlarm.OVERLOAD,
+    "overheating": FeetechAlarm.OVERHEATING,
+    "voltage": FeetechAlarm.VOLTAGE,
+    "encoder": FeetechAlarm.ENCODER,
+}
+"""By the words of a fault file."""
+_TIME_UNIT_S = 0.01
+
+
+class FeetechAlarms(Ax12Alarms):
+    """Alarms of S servos of one model, whose registers are ``register(name)`` (S,)."""
+
+    def __init__(
+        self,
+        register: Callable[[str], NDArray[np.int64]],
+        kinds: Sequence[str],
+        drive: ServoDrive,
+        motor: MotorModel,
+        blocked_shaft: BlockedShaft,
+        supply_v: float,
+    ) -> None:
+        """Set up servos without an alarm; they detect those of ``kinds``."""
+        super().__init__(register, drive, motor, blocked_shaft, supply_v)  # type: ignore[arg-type]
+        self.known = {kind: bit for kind, bit in ALARMS.items() if kind in kinds}
+
+    @property
+    def is_weak(self) -> Bools:
+        """(S,) whether an overload has lowered the output."""
+        return np.asarray((self._latched & FeetechAlarm.OVERLOAD) != 0)
+
+    def _full_output(self) -> Floats:
+        if "overload" not in self.known:
+            return np.full(len(self.shown), np.inf)
+        return np.asarray(self._register("Overload Torque") / 100.0)
+
+    def _overload_s(self) -> Floats | float:
+        if "overload" not in self.known:
+            return np.inf
+        return np.asarray(self._register("Protection Time") * _TIME_UNIT_S)
+
+    def _shut_down(self) -> None:
+        self.shown |= self._latched
+        off = self._latched & self._register("Shutdown") & ~FeetechAlarm.OVERLOAD
+        self._register("Torque Enable")[off != 0] = 0
+
 
 POSITION, VELOCITY, PUSH, STEP = range(4)
 """Operating Mode(33); PUSH is open-loop PWM on STS servos, and current on HLS servos. STEP is

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bools
 from snakewalk.config.servo_model import TABLE_BYTES
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
@@ -18,6 +19,7 @@ from snakewalk.drivers.protocol.registers import (
     REVERSE,
     TORQUE_ON_BY_GOAL,
     WATCHDOG_TRIPPED,
+    WATCHDOG_UNIT_S,
 )
 from snakewalk.sim.plant import Mounting, Plant
 from snakewalk.sim.servo.bank import ServoBank
@@ -35,7 +37,39 @@ from snakewalk.sim.servo.present_values import PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
 from snakewalk.sim.servo.register_rules import PROFILE
 from snakewalk.sim.servo.servo_loops import accept_goals
-from snakewalk.sim.servo.watchdog import Watchdog
+
+ROUNDING_S = 1e-9
+"""Times closer than this are the same."""
+
+
+class Watchdog:
+    """The watchdogs of all servos of a bank, fed until ``time_s``."""
+
+    def __init__(self, bank: ServoBank, time_s: float) -> None:
+        self._bank = bank
+        self.fed_s = time_s
+        """When they were last fed."""
+        self.timeout_s = np.inf
+        """How long the most impatient of them waits."""
+        self._watched = np.zeros(len(bank), bool)
+        self.due_s = np.inf
+        """When the first of them runs out."""
+
+    def arm(self, on: Bools) -> None:
+        """Read the register; ``on`` (S,) marks servos with torque."""
+        dog = self._bank["Bus Watchdog"]
+        self._watched = (dog > 0) & (dog < WATCHDOG_TRIPPED) & on
+        watched = self._watched
+        self.timeout_s = WATCHDOG_UNIT_S * float(dog[watched].min()) if watched.any() else np.inf
+        self.due_s = self.fed_s + self.timeout_s
+
+    def trip(self, time_s: float) -> Bools:
+        """Put those expired by ``time_s`` into the error state; return them (S,)."""
+        dog = self._bank["Bus Watchdog"]
+        late = self._watched & (self.fed_s + WATCHDOG_UNIT_S * dog <= time_s + ROUNDING_S)
+        dog[late] = WATCHDOG_TRIPPED
+        return late
+
 
 FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""

@@ -13,8 +13,13 @@ from snakewalk.config.camera import MappingConfig
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.schedule import ScheduleConfig
-from snakewalk.controller.rehearsal.rehearsal import LATE_S, errors_of, generator, moved
-from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.rehearsal.rehearsal import (
+    LATE_S,
+    SimulatedPort,
+    errors_of,
+    generator,
+    moved,
+)
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
 from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of

@@ -2,21 +2,71 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround
+from snakewalk.controller.console.plugins import plugins
 from snakewalk.controller.mechanics.thrust import forward_speed_m_s
+from snakewalk.controller.motion.joint_motion import JointReader, JointRequest, onto_robot
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
-from snakewalk.controller.run.kinds.joint_file import foreign_joints
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.track.recorded_joints import recorded_joints
+
+_HEAD_BYTES = 4096
+
+
+def foreign_joints(
+    track: str, robot: RobotConfig, asked: PlaybackConfig
+) -> tuple[Floats, Floats, tuple[str, ...]] | None:
+    """Times (T,), joint angles (T, J) and lines about the mapping; None for midlines.
+
+    Raises:
+        InputError: a fault of the file, or it needs a choice.
+
+    """
+    path = Path(track)
+    reader = _reader(path)
+    chosen = {"joints": asked.joints, "unit": asked.unit, "topic": asked.topic}
+    given = [
+        name
+        for name, value in {**chosen, "episode": asked.episode}.items()
+        if value not in (None, {})
+    ]
+    if reader is None:
+        if given:
+            option = "--joint" if given[0] == "joints" else f"--{given[0]}"
+            raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
+        return None
+    motion = reader.read(path, JointRequest(asked.unit, asked.topic, asked.episode))
+    angles, lines = onto_robot(motion, robot, asked.joints, track)
+    return motion.time_s, angles, lines
+
+
+def _reader(path: Path) -> JointReader | None:
+    if not path.exists():
+        return None
+    head = b""
+    if path.is_file():
+        try:
+            with path.open("rb") as stream:
+                head = stream.read(_HEAD_BYTES)
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}") from None
+    for plugin in plugins("joints"):
+        reader: JointReader = plugin.load()()
+        if reader.accepts(path, head):
+            return reader
+    return None
+
 
 _LINEAR = 0.9  # of the limit: angles up to it are played as they are
 _NO_THRUST_1_S = 0.02

@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.verification.film_check import agreeing_ends, verified
+from snakewalk.controller.capture.verification.film_check import (
+    agreeing_ends,
+    possible_form,
+    verified,
+)
 from snakewalk.controller.capture.verification.frame_store import FrameStore
-from snakewalk.controller.capture.verification.lines import possible_form
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.images.silhouette import Polarity

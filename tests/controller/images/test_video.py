@@ -11,8 +11,7 @@ from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.images.body_detector import make_detector
-from snakewalk.controller.images.image_sequence import frame_numbers_of
-from snakewalk.controller.images.video import frame_times, in_8_bits, open_footage
+from snakewalk.controller.images.video import frame_numbers_of, frame_times, in_8_bits, open_footage
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines

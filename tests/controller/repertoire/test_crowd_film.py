@@ -11,14 +11,15 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.commands.crowd import crowd
-from snakewalk.controller.repertoire.crowd_film import CrowdScene, film_crowd
-from snakewalk.controller.repertoire.detail import (
+from snakewalk.controller.repertoire.crowd_film import (
     FAR,
     HIDDEN,
     MIDDLE,
     NEAR,
+    CrowdScene,
     DetailedCrowd,
     detail_levels,
+    film_crowd,
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.sim.rendering.view_frustum import ViewFrustum

@@ -13,7 +13,7 @@ pytest.importorskip("mujoco")
 from snakewalk.config.errors import InputError
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console.result_files import RUN_FILES
-from snakewalk.controller.rehearsal.rehearsed_port import SimulatedPort
+from snakewalk.controller.rehearsal.rehearsal import SimulatedPort
 from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait

@@ -408,8 +408,9 @@ def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() ->
     defaults = make_gait("sidewinding").params.model_dump()
     panel.show("sidewinding", defaults)
     assert "rolling" in panel._gait.options
-    assert set(panel._inputs) == set(defaults)
-    assert panel._inputs["frequency_hz"].label == "frequency, Hz"
+    inputs = panel._inputs
+    assert set(inputs) == set(defaults)
+    assert inputs["frequency_hz"].label == "frequency, Hz"
     assert panel.commands(1.0) == []  # what `show` sets is no command
     for value in (0.6, 0.61, 0.62):
         moved_by_a_browser(panel, "frequency_hz", value)
