@@ -266,6 +266,7 @@ def test_a_reading_of_another_servo_that_could_be_the_joints_own_is_no_goal_of_a
     assert tally.complaints == []
 
 
+@pytest.mark.slow
 def test_a_hold_where_the_joints_just_were_is_not_too_fast() -> None:
     """Between the read and the hold the line is drained: fast joints go on for 10 ms."""
     tally = run_scenario(("mute", "shock"), 5001, 240)

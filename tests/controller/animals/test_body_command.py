@@ -179,7 +179,7 @@ def test_an_obj_that_lies_another_way_is_turned(tmp_path: Path) -> None:
     assert body_skin(str(tmp_path / "a.obj"), Cut(forward="-z", curves=12)).skin.length_m > 1.99
 
 
-@pytest.mark.costs("deforms a mesh")
+@pytest.mark.slow
 def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) -> None:
     made("tropical-fish", "-o", str(tmp_path / "f.obj"))
     how = ("--surface", "--curves", "15")

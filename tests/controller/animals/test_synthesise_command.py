@@ -114,7 +114,7 @@ def test_aimed_as_printed_the_snake_leaves_its_path() -> None:
     assert worst[0] < 0.7 * worst[1]
 
 
-@pytest.mark.costs("synthesises a whole motion")
+@pytest.mark.slow
 def test_the_command_writes_a_recording_that_other_commands_take(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(BEHAVIOUR)
     words = [
@@ -157,6 +157,7 @@ def test_what_is_not_a_walk_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_the_bones_lie_on_the_skeleton_and_the_film_draws_the_posed_skin(
     traverse: SynthesisedWalk,
 ) -> None:
@@ -194,7 +195,7 @@ def test_rings_turn_green_when_the_mass_centre_is_there(traverse: SynthesisedWal
         assert np.hypot(*(centre - waypoint)) < run.waypoint_radius_m
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a film of a skin: 4 s of CPU")
 def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
     words = [
         "animal",

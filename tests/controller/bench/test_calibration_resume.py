@@ -44,6 +44,7 @@ def faults(trio: Trio, *tables: dict[str, object], seed: int = 1) -> None:
     FaultPlayer(trio.line, FaultPlan.model_validate(plan))
 
 
+@pytest.mark.slow
 def test_answers_before_an_interruption_are_not_asked_again(trio: Trio) -> None:
     broken = trio(answers="3\nr\n1\n")
     part = trio.folder / "mine.toml.part"
@@ -60,6 +61,7 @@ def test_answers_before_an_interruption_are_not_asked_again(trio: Trio) -> None:
     assert not part.exists()
 
 
+@pytest.mark.slow
 def test_a_range_that_was_not_swept_is_swept_after_a_restart(trio: Trio) -> None:
     file, script = ProgressFile(trio.out), Script()
     like = load_robot(str(trio.folder / "like.toml"))
@@ -101,6 +103,7 @@ def test_a_progress_file_of_another_robot_or_bus_is_rejected(trio: Trio) -> None
         file.start(like, resume=True, force=False)
 
 
+@pytest.mark.slow
 def test_every_repeated_question_has_its_reason(trio: Trio) -> None:
     answers = "what\n0\n3\nx\nr\n1\nl\n1\n2\nl\nd\n\n"
     result = trio(answers=answers)

@@ -286,7 +286,7 @@ def trio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Trio:
     return Trio(robot, line, tmp_path)
 
 
-@pytest.mark.costs("a calibration and a walk")
+@pytest.mark.slow
 def test_a_person_answers_at_the_terminal(trio: Trio) -> None:
     result = trio()
     assert result.exit_code == 0, result.output
@@ -316,7 +316,7 @@ def joints_rad(trio: Trio) -> Floats:
         chain.disable()
 
 
-@pytest.mark.costs("a calibration and a walk")
+@pytest.mark.slow
 def test_zeros_go_into_the_servos_and_the_file_has_none(trio: Trio) -> None:
     trio.line.bank["Homing Offset"][0] = -70  # of somebody before
     trio.line.bank["Drive Mode"][1] = 1  # reverse: its sign turns, the offset's does not

@@ -86,7 +86,7 @@ def test_a_bus_of_another_make_is_named_as_a_cause() -> None:
     )
 
 
-@pytest.mark.costs("the doctor examines a chain")
+@pytest.mark.slow
 def test_the_doctor_finds_nothing_on_a_new_chain_and_names_no_dynamixel() -> None:
     findings = doctor(a_line())
     assert {each.grade for each in findings} == {"ok"}
@@ -111,8 +111,6 @@ def register(name: str, value: int) -> Callable[[FeetechLine], None]:
 
 
 @pytest.mark.slow_cases(3, "a complete examination each: 1.4 s of CPU")
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("the doctor examines a chain")
 @pytest.mark.parametrize(
     ("plant", "check", "found"),
     slow_after(
@@ -159,6 +157,7 @@ def test_stop_switches_torque_off(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "3 servos confirm it" in str(outcome)
 
 
+@pytest.mark.slow
 def test_settings_of_a_feetech_servo_outlast_power_off() -> None:
     line = a_line("1-2:STS3215")
     bus = open_servo(line, 1, 0.004)

@@ -429,6 +429,7 @@ def test_a_silent_servo_next_to_protocol_1_is_named_by_itself() -> None:
     assert rows[1][1].startswith("look at the cable in front of servo 4")
 
 
+@pytest.mark.slow
 def test_feetech_servos_of_a_robot_with_dynamixel_servos_are_named() -> None:
     """They were reported as DYNAMIXEL servos of Protocol 1.0."""
     line = bench_line(parse_chain("1-4:STS3215"), 1_000_000)

@@ -93,8 +93,7 @@ def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_pa
         )
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("the doctor examines two chains")
+@pytest.mark.slow
 @pytest.mark.parametrize(("servo_id", "limit"), [(2, "PWM Limit(36)"), (5, "PWM Limit(16)")])
 def test_the_doctor_names_the_registers_of_the_port(
     service: TwoMakes, tmp_path: Path, servo_id: int, limit: str
@@ -108,6 +107,7 @@ def test_the_doctor_names_the_registers_of_the_port(
     assert f"a {limit} below {full}: weak and slow" in weak[0]
 
 
+@pytest.mark.slow
 def test_a_backup_has_both_makes_and_restores_them(service: TwoMakes, tmp_path: Path) -> None:
     file = tmp_path / "servos.json"
     assert service("bus", "backup", "-o", file).returncode == 0

@@ -77,12 +77,14 @@ def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_pat
     assert finished.pose.facts()["frames_used"] < finished.pose.facts()["frames"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn")
 def test_a_robot_out_of_view_at_its_start_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not seen whole at its start: nothing seen"):
         run_robot(RunRequest(short(pose="camera", camera={"centre_m": (30.0, 0.0)}), tmp_path))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("drawn")
 def test_the_rendered_view_agrees_with_the_camera_model() -> None:
     """A pinhole drawn by MuJoCo, turned and off the origin, against the homography."""
@@ -101,6 +103,7 @@ def test_the_rendered_view_agrees_with_the_camera_model() -> None:
         assert change[y, x] > 40
 
 
+@pytest.mark.slow
 def test_joints_alone_are_told_to_be_off(tmp_path: Path) -> None:
     finished = run_robot(RunRequest(short(pose="joints", time_limit_s=3.0), tmp_path))
     assert float(str(finished.pose.facts()["head_error_rms_m"])) > 0.0

@@ -41,7 +41,7 @@ def swim(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_film(tmp_path_factory.mktemp("films") / "swim.avi", film(SCENE))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 4 s of CPU")
 def test_a_trail_holds_the_darkest_value_of_each_pixel(swim: Path, tmp_path: Path) -> None:
     trail = tmp_path / "trail.png"
     done = snakewalk(
@@ -193,7 +193,7 @@ def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path)
     assert np.array_equal(next(footage.read()), next(film(SCENE)))
 
 
-@pytest.mark.costs("a film from its frames to the pictures")
+@pytest.mark.slow
 def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
     ground = tmp_path / "ground.png"
     cv2.imwrite(str(ground), empty(SCENE))
@@ -215,6 +215,7 @@ def test_markers_give_the_scale(tmp_path: Path) -> None:
         scale_of_marker("0.05", image[:, 150:])
 
 
+@pytest.mark.slow
 def test_the_steps_show_the_animal_as_large_as_the_panel(tmp_path: Path) -> None:
     """It was 64 of 300 pixels wide in a film of the whole arena, under its own dots."""
     arena = tmp_path / "arena"
@@ -281,7 +282,7 @@ def test_bad_options_are_told_before_any_work(
     assert not (tmp_path / "t.npz").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 4 s of CPU")
 def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path) -> None:
     """Some frames of a colour film are exactly grey: they become two-dimensional arrays."""
     folder = tmp_path / "film"
@@ -297,7 +298,7 @@ def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path)
     assert facts.head_by == "travel"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 6 s of CPU")
 def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     swim: Path, tmp_path: Path
 ) -> None:

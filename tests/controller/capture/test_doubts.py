@@ -191,7 +191,7 @@ CHANCE: dict[str, tuple[list[FrameStatus], int, bool]] = {
 }
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CHANCE)
 def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_path: Path) -> None:
     used, count, rejected = CHANCE[kind]

@@ -69,7 +69,7 @@ def with_something(draw: object) -> tuple[list[np.ndarray], np.ndarray]:
     return frames, empty(SCENE)
 
 
-@pytest.mark.costs("a film of a disturbed animal")
+@pytest.mark.slow
 def test_a_small_animal_that_touches_the_body_is_noticed() -> None:
     def beside(frame: np.ndarray, line: np.ndarray) -> None:
         ahead = line[50] - line[44]

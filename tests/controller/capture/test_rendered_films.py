@@ -53,6 +53,7 @@ def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
 
+@pytest.mark.slow
 def test_a_light_animal_on_dark_ground_with_a_given_background() -> None:
     scene = replace(CLEAN, length_px=90.0, ground=50.0, body=190.0)
     frames = list(film(scene))
@@ -63,6 +64,7 @@ def test_a_light_animal_on_dark_ground_with_a_given_background() -> None:
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
+@pytest.mark.slow
 def test_colours_of_equal_brightness_are_told_apart() -> None:
     scene = replace(CLEAN, length_px=90.0, frames=8)
     frames = [np.dstack([f, np.full_like(f, 90), 230 - f]) for f in film(scene)]

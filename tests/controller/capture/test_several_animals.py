@@ -50,7 +50,7 @@ def test_identities_are_kept_through_crossings(seed: int) -> None:
     assert count.swapped_silently == 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 5 s of CPU")
 def test_animals_that_hardly_move_are_not_part_of_the_background() -> None:
     """In 24 frames each worm crawls 0.7 of its length: most of its pixels stay covered."""
     scene = replace(PLATE, animals=10, rows=420, columns=520, roam=0.38, frames=24, seed=3101)
@@ -241,7 +241,7 @@ def test_a_part_of_an_animal_that_joins_it_again_is_no_contact() -> None:
     assert one.ends_in is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 5 s of CPU")
 def test_an_interrupted_capture_of_several_animals_is_continued(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

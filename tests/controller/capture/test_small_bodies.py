@@ -69,7 +69,7 @@ def test_corresponding_points_are_within_a_hundredth(change: dict[str, Any]) -> 
     )
 
 
-@pytest.mark.costs("a film of small bodies")
+@pytest.mark.slow
 def test_a_body_too_blurred_and_noisy_for_its_size_is_told_rough_and_keeps_its_points() -> None:
     scene = replace(SMALL, length_px=20.0, noise=8.0, blur_px=1.5)
     seen, errors = watch(scene)
@@ -82,6 +82,7 @@ def test_a_body_too_blurred_and_noisy_for_its_size_is_told_rough_and_keeps_its_p
     assert (seen.expected_px[rough] > 0.01 * seen.length_px[rough]).all()
 
 
+@pytest.mark.slow
 def test_the_length_is_the_same_in_every_frame_and_chords_are_equal() -> None:
     seen, _ = watch(SMALL)
     assert np.ptp(seen.length_px) < 0.01
@@ -185,6 +186,7 @@ def test_what_is_no_line_is_not_fitted_as_one() -> None:
     assert fitted(line, rng.normal(0.0, 20.0, (25, 28)).astype(np.float32), 3.0) is None
 
 
+@pytest.mark.slow
 def test_a_stretch_from_the_wrong_end_is_turned_and_a_lost_frame_found() -> None:
     truth = true_midlines(SMALL)
     bodies, cut_outs = [], {}

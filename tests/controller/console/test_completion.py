@@ -101,7 +101,7 @@ heavy([], slow, _SNAKEWALK_COMPLETE="complete_bash", **words)
     assert [line for line in lines if not line.endswith(" []")] == []
 
 
-@pytest.mark.costs("reads the help of every command")
+@pytest.mark.slow
 def test_help_loses_no_words_to_markup() -> None:
     """Text in brackets is a style to what draws the help: ``[power]`` would not be shown."""
 

@@ -59,7 +59,7 @@ def test_the_declaration_equals_that_of_the_function(listed: Any) -> None:
     assert options(declared) == options(function)
 
 
-@pytest.mark.costs("starts an interpreter")
+@pytest.mark.slow
 def test_the_help_of_no_command_imports_what_the_command_uses() -> None:
     words = [each.name for each in COMMANDS]
     done = subprocess.run(

@@ -51,7 +51,7 @@ def test_an_item_that_always_ends_its_worker_is_named(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) in {3, 4}  # maybe once beside the other, then alone
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("starts a cluster: 4 s of CPU")
 def test_a_cluster_whose_worker_is_killed_loses_no_item(tmp_path: Path) -> None:
     items = dying(tmp_path, 0, 0, 1, *[0] * 17)
     with distributed.LocalCluster(
@@ -149,7 +149,7 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
                 os.killpg(parent.pid, signal.SIGKILL)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a pool of trials: 5 s of CPU")
 def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     def forked() -> int:
         raise AssertionError("forked: a worker must be a fresh interpreter")

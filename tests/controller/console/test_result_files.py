@@ -370,6 +370,7 @@ print(json.dumps([said, sorted(heavy)]))
 """
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_is_told_before_anything_heavy_is_imported(
     tmp_path: Path,
 ) -> None:

@@ -126,7 +126,7 @@ def test_studies_of_logs_execute_no_file_of_the_working_folder(folder: Folder) -
         assert ended.returncode in {0, 1}, ended.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a process that imports planted files: 6 s of CPU")
 def test_the_drawing_of_a_served_bus_executes_no_file_of_the_working_folder(
     folder: Folder,
 ) -> None:

@@ -92,7 +92,7 @@ def test_short_links_climb_a_pole_as_rolling_without_slip_does() -> None:
     assert climb == pytest.approx(gait.advance_m(), rel=0.05)
 
 
-@pytest.mark.costs("simulates a climb")
+@pytest.mark.slow
 def test_a_pipe_that_lies_is_crept_through_and_backward_goes_back() -> None:
     lying = PipeObstacle(radius_m=0.15, upright=False)
     world = load_world("pipe").model_copy(update={"obstacle": lying})
@@ -137,7 +137,7 @@ def test_a_coil_starts_just_clear_of_what_it_will_hold() -> None:
         assert away.max() <= outer
 
 
-@pytest.mark.costs("simulates a climb")
+@pytest.mark.slow
 def test_compiled_and_numpy_steps_agree_at_a_pole() -> None:
     ends = [
         follow(HelixPole(), "alternating16", "pole", 0.5, hold_s=0.2, make_plant=make).centre_m

@@ -108,6 +108,7 @@ def test_rectilinear_motion_goes_straight_forward_on_any_ground() -> None:
     assert crept.upright
 
 
+@pytest.mark.slow
 def test_concertina_goes_forward_without_wheels_and_with_yaw_joints_alone() -> None:
     known = load_gait("concertina-yaw16")
     drawn = way(known.gait, known.robot, cycles=1, **known.parameters)

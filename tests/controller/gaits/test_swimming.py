@@ -173,7 +173,7 @@ def test_a_salamander_swims_thrice_as_far_with_its_legs_folded() -> None:
     assert 0.2 < ways[0][0] / 0.63 < 0.5
 
 
-@pytest.mark.costs("simulates a swimmer")
+@pytest.mark.slow
 def test_compiled_and_numpy_water_agree() -> None:
     ends = [
         follow(Anguilliform(), "yaw16", "pool", 0.5, grow_s=0.25, make_plant=make).centre_m

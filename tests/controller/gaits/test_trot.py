@@ -99,7 +99,7 @@ def travel(gait: LegGait, cycles: int = 3) -> tuple[np.ndarray, float]:
     return (last - first)[:2] / cycles / ROBOT.length_m, float((last - first)[2]) / cycles
 
 
-@pytest.mark.costs("simulates a walk")
+@pytest.mark.slow
 def test_it_walks_forward_by_less_than_its_strides_and_farther_with_a_bent_spine() -> None:
     limb = ROBOT.limbs[0]
     way: dict[float, float] = {}

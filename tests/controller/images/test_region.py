@@ -47,7 +47,7 @@ def off_px(track: Path) -> float:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("two further films: 4 s of CPU")
 def test_the_region_or_the_mask_leaves_the_clutter_out(cluttered: Path, tmp_path: Path) -> None:
     plain = replace(CaptureOptions(cluttered, tmp_path / "t.npz"), force=True)
     with pytest.raises(InputError, match="give --background"):

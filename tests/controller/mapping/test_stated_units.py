@@ -249,6 +249,7 @@ def test_several_bands_are_noted(tmp_path: Path) -> None:
     assert noted(found, "band 1 of 3 is read")
 
 
+@pytest.mark.slow
 def test_a_large_tile_is_read_in_strips(tmp_path: Path) -> None:
     """The medians of the cells nearest to each sample, as of a small one read at once."""
     rng = np.random.default_rng(0)
@@ -407,6 +408,7 @@ def test_the_result_and_the_worlds_file_hold_the_notes(tmp_path: Path) -> None:
     assert "this file does not need it" in str(ran.exception)
 
 
+@pytest.mark.slow
 def test_broken_rasters_end_with_a_line(tmp_path: Path) -> None:
     rng = np.random.default_rng(2)
     whole = geotiff(tmp_path / "a.tif", unit="ft", compress="deflate").read_bytes()

@@ -62,7 +62,7 @@ def test_points_without_a_ground_have_no_stand() -> None:
         fit_ground(ball, np.full(2000, 0.01))
 
 
-@pytest.mark.costs("renders hills")
+@pytest.mark.slow
 def test_heights_of_rendered_hills_and_what_is_hidden_stays_unknown() -> None:
     world, robot = load_world("jacksboro-basin"), load_robot("alternating16")
     ground = build_ground(world)

@@ -72,7 +72,7 @@ def test_one_look_shows_the_ground_ahead_of_the_head(look: tuple[GrowingMap, np.
     assert not grown.is_known(*links_m[8, :2])
 
 
-@pytest.mark.costs("walks with a pair of cameras")
+@pytest.mark.slow
 def test_the_body_is_not_taken_for_ground() -> None:
     """A head that is bent right round has its own body in the picture."""
     ground = build_ground(HILLS)

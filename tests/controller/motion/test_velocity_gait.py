@@ -51,6 +51,7 @@ def lag_of_the_wave_s(goals: np.ndarray) -> float:
     return DT_S * (int(np.argmin(wrong)) - 50)
 
 
+@pytest.mark.slow
 def test_the_wave_runs_as_fast_and_to_the_side_that_the_velocity_says() -> None:
     full = VelocityGait(make_gait("lateral-undulation"), ROBOT).full_speed_m_s
     fast, slow, back = Bench(), Bench(), Bench()
@@ -65,7 +66,7 @@ def test_the_wave_runs_as_fast_and_to_the_side_that_the_velocity_says() -> None:
     assert fast.events == [("command", "velocities, by gait lateral-undulation")]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("forward", [0.08, -0.08])
 def test_the_axis_bends_so_that_the_body_turns_at_the_rate(forward: float) -> None:
     bench, turn_rad_s = Bench(), 0.05
@@ -128,6 +129,7 @@ def test_a_rejected_velocity_does_not_renew_the_one_before() -> None:
     assert ("stale", "no velocity for 1 s: the body comes to rest") in bench.events
 
 
+@pytest.mark.slow
 def test_the_gait_that_was_started_follows_velocities_with_its_parameters() -> None:
     bench = Bench(gait=make_gait("lateral-undulation", {"winding_rad": 0.3}))
     bench.run(1.0)

@@ -58,7 +58,7 @@ def estimated(
     return [each for each in found if each is not None], used
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("along", [0.1, 0.3])
 def test_intervals_contain_the_true_friction(along: float) -> None:
     """At 1 cm and 3 degrees the ratio is found, and the file is used while it is right."""
@@ -112,7 +112,7 @@ def slope(degrees: float) -> HeightField:
     return HeightField(np.tile(np.tan(np.radians(degrees)) * x_m, (81, 1)), 0.1, -4.0, -4.0)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("along", "across"), [(0.1, 0.7), (0.06, 0.3)])
 def test_a_slope_shows_both_frictions(along: float, across: float) -> None:
     """Gravity sets the scale: both are found, and used when they contradict the file."""

@@ -89,6 +89,7 @@ def test_a_body_that_slides_on_is_not_placed() -> None:
     assert "jump" in str(scene.pose.fault())
 
 
+@pytest.mark.slow
 def test_markers_that_swap_after_a_slide_change_nothing() -> None:
     slide = Slide()
 
@@ -123,8 +124,7 @@ def mirrored_place(time_s: float, sample: PoseSample) -> list[ArrivedPose | Pose
     return [moved(sample, MIRROR @ sample.position_m - sample.position_m)]
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("a simulated run")
+@pytest.mark.slow
 @pytest.mark.parametrize("rest_s", [np.inf, 4.5])
 def test_a_mirrored_feed_is_never_believed(rest_s: float) -> None:
     scene = Scene(PoseConfig(latency_s=0.06), rest_s=rest_s)

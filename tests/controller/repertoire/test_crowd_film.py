@@ -66,7 +66,7 @@ def test_levels_fall_with_the_distance() -> None:
     assert detail_levels(frustum, ahead, np.full(4, 0.5)).tolist() == [NEAR, MIDDLE, FAR, HIDDEN]
 
 
-@pytest.mark.costs("plans a crowd")
+@pytest.mark.slow
 def test_bodies_lie_on_the_ground_and_near_ones_keep_their_length(
     repertoire: Repertoire, hills: HeightField
 ) -> None:

@@ -32,8 +32,7 @@ WANTED = ScheduleConfig(
 )
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("records and repeats actions")
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1.4])
 def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(
     file: Path, tmp_path: Path, size: float
@@ -143,6 +142,7 @@ def test_an_action_that_is_much_slower_than_requested_is_reported(
     assert "the nearest action to 1.5 m/s and 0 rad/s (from 0.0 s) is forward-fast" in caplog.text
 
 
+@pytest.mark.slow
 def test_a_body_that_goes_backward_comes_to_rest_without_going_forward(
     file: Path, tmp_path: Path
 ) -> None:

@@ -98,7 +98,7 @@ def test_an_interrupted_body_goes_on_from_its_own_shape(repertoire: Repertoire) 
     assert moved < -0.2
 
 
-@pytest.mark.costs("a crowd wanders")
+@pytest.mark.slow
 def test_a_crowd_wanders_without_intersections(repertoire: Repertoire) -> None:
     ground = HeightField(np.zeros((9, 9)), 1.0, -4.0, -4.0)
     sizes = np.full(40, 0.4)

@@ -131,7 +131,7 @@ def point(time_s: float, *angles: float, **more: Any) -> JointTrajectoryPoint:
     return JointTrajectoryPoint(positions=angles, time_from_start=duration, **more)
 
 
-@pytest.mark.costs("starts a ROS client in another process")
+@pytest.mark.slow
 def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_path: Path) -> None:
     states = client.listen(JointState, "/robot_joint_states")
     sent = client.listen(JointState, "/robot_joint_goals")

@@ -77,7 +77,7 @@ def test_an_unknown_covariance_and_a_lost_body() -> None:
             decode_pose(pose_of(message, 0, has_covariance=False))
 
 
-@pytest.mark.costs("starts a ROS client in another process")
+@pytest.mark.slow
 def test_poses_arrive_over_dds(monkeypatch: pytest.MonkeyPatch) -> None:
     for key, value in {**LOOPBACK, "ROS_DOMAIN_ID": str(DOMAIN)}.items():
         monkeypatch.setenv(key, value)

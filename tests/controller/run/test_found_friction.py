@@ -46,7 +46,7 @@ def test_what_was_planted_is_found_told_and_summarised(
     assert told[0].startswith("found 0.1")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("two whole walks: 6 s of CPU")
 def test_a_body_as_its_files_say_walks_as_if_nothing_looked(tmp_path: Path) -> None:
     """Heavier or weaker by a fifth is no other friction."""
     looked, summary = walked(tmp_path / "looked", "flat-slalom")

@@ -132,6 +132,7 @@ def test_its_pitch_joints_are_stiff_enough_to_lift(sidewound) -> None:
     assert robot.servo.pitch_p_gain == robot.servo.position_p_gain
 
 
+@pytest.mark.slow
 def test_a_log_of_a_gait_replays_exactly_and_becomes_a_job_again(sidewound, tmp_path: Path) -> None:
     record = read_log(sidewound.log)
     again = read_log(replay(record, tmp_path / "again.mcap"))
@@ -156,7 +157,7 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
     assert events[0].level == "warning"
 
 
-@pytest.mark.costs("a command and its run")
+@pytest.mark.slow
 def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
     prepared = prepare_gait("lateral-undulation", seconds=6.0, look_heading_rad=0.3)
     record = read_log(run_robot(RunRequest(prepared, tmp_path)).log)
@@ -166,7 +167,7 @@ def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
     assert np.sqrt(np.mean((heading - 0.3) ** 2)) < 0.15
 
 
-@pytest.mark.costs("a command and its run")
+@pytest.mark.slow
 def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
     presses = iter(["right", "down", "m", "n"])
     beat = iter(range(10**6))

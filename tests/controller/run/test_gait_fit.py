@@ -32,6 +32,7 @@ def write(path: Path, points_m: np.ndarray) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_helix_becomes_the_angles_of_the_library(tmp_path: Path) -> None:
     curve = write(tmp_path / "helix.csv", HELIX_M)
     out, picture = tmp_path / "joints.npz", tmp_path / "fit.png"

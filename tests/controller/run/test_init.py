@@ -56,6 +56,7 @@ def test_a_run_from_another_folder_keeps_its_track_and_is_prepared(tmp_path: Pat
     assert again.exit_code != 0
 
 
+@pytest.mark.slow
 def test_a_typo_is_told_before_anything_heavy_is_imported(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_text('name = "r"\njoint_axis = "yyyy"\n')
     (tmp_path / "run.toml").write_text(

@@ -12,7 +12,7 @@ from snakewalk.controller.run.factory import prepare_walk
 from tests.helpers.command import snakewalk
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("run", ["flat-square", "flat-slalom"])
 @pytest.mark.parametrize("motion", ["walk", "serpenoid"])
 def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motion: str) -> None:
@@ -22,7 +22,7 @@ def test_the_walk_and_the_baseline_reach_every_waypoint_on_paper(run: str, motio
     assert ahead.joint_speed_rad_s.max() <= 1.1 * prepared.robot.joint_speed_limit_rad_s
 
 
-@pytest.mark.costs("plans a route")
+@pytest.mark.slow
 def test_without_feedback_slip_carries_the_body_off_its_path() -> None:
     prepared = prepare_walk("flat-slalom", motion="walk-blind", time_limit_s=80.0)
     assert prepared.forecast().reached < 5
@@ -42,8 +42,7 @@ def test_a_plan_as_json() -> None:
     assert found["waypoints_reached"] == found["waypoints"] == 5
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("plans a route")
+@pytest.mark.slow
 @pytest.mark.parametrize(("program", "warnings"), [("/nosuch/relay", 1), (sys.executable, 0)])
 def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warnings: int) -> None:
     """The run rejected it after a plan without a warning."""

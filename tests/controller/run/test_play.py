@@ -75,6 +75,7 @@ def test_a_recording_that_bends_too_far_is_refused_scaled_or_clipped(tmp_path: P
     assert told[0] == f"joint angles scaled by {least:g}"
 
 
+@pytest.mark.slow
 def test_joints_of_a_synthesis_are_played_as_they_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -136,8 +136,7 @@ def test_a_command_is_listed_and_runs(folder: Path) -> None:
     assert snakewalk("hello").stdout == "hello from another package\n"
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["zigzag", "demo-gait"])
 def test_a_motion_and_a_kind_of_run_run(folder: Path, motion: str) -> None:
     pytest.importorskip("mujoco")
@@ -147,7 +146,7 @@ def test_a_motion_and_a_kind_of_run_run(folder: Path, motion: str) -> None:
     assert Path("out/log.mcap").exists()
 
 
-@pytest.mark.costs("a whole run")
+@pytest.mark.slow
 def test_a_pose_source_and_an_observer_are_used(folder: Path) -> None:
     pytest.importorskip("mujoco")
     install(folder)

@@ -73,6 +73,7 @@ def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         yield Bench(opened, monkeypatch)
 
 
+@pytest.mark.slow
 def test_a_gait_runs_over_two_ports(bench: Bench, tmp_path: Path) -> None:
     port = f"1-8={bench.paths[0]},9-16={bench.paths[1]}"
     gait = prepare_gait("lateral-undulation", seconds=1.0)
@@ -84,6 +85,7 @@ def test_a_gait_runs_over_two_ports(bench: Bench, tmp_path: Path) -> None:
     assert [each.port for each in finished.record.header.robot.ports] == bench.paths
 
 
+@pytest.mark.slow
 def test_a_port_that_vanishes_in_a_run_is_told_by_name(bench: Bench, tmp_path: Path) -> None:
     gone = {"seed": 1, "fault": [{"kind": "port", "at_s": 1.5, "for_s": 60.0}]}
     FaultPlayer(bench.lines[1], checked(FaultPlan, gone, "faults"))

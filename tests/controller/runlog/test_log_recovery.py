@@ -80,7 +80,7 @@ def holds_only(part: RunRecord, full: RunRecord) -> int:
     return int((~kept).sum())
 
 
-@pytest.mark.costs("cuts a log at many places")
+@pytest.mark.slow
 def test_a_flipped_bit_is_noticed_and_costs_the_rows_of_its_chunk(
     whole: tuple[bytes, RunRecord], tmp_path: Path
 ) -> None:

@@ -44,6 +44,7 @@ def test_the_friction_that_a_body_slides_by_is_found(factors: tuple[float, float
     assert last.differs == (factors[0] != factors[1])
 
 
+@pytest.mark.slow
 def test_a_body_as_the_file_says_leaves_the_file_in_force() -> None:
     found, used = watched(FILE)
     assert used == []
@@ -51,7 +52,7 @@ def test_a_body_as_the_file_says_leaves_the_file_in_force() -> None:
     assert found[-1].friction.along == pytest.approx(0.1, rel=0.03)
 
 
-@pytest.mark.costs("a long simulated run")
+@pytest.mark.slow
 def test_a_change_of_ground_is_found_though_it_had_settled() -> None:
     other, used = FrictionConfig(along=0.15, across=0.5), list[FrictionConfig]()
     monitor = FrictionMonitor(FILE, OnPaper(), CYCLE_S, used.append)

@@ -49,7 +49,7 @@ def test_four_gaps_do_not_change_the_wave(gap: int, rate_hz: float, noise: float
     assert track.absent == 4 * gap
 
 
-@pytest.mark.costs("analyses a recording several times")
+@pytest.mark.slow
 def test_four_gaps_hardly_change_the_other_figures() -> None:
     gap = 50
     track = cut(four_gaps(gap), 25.0, 0.002)

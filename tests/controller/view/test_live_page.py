@@ -179,6 +179,7 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     assert "trip: stop requested" in view.shown("_events")
 
 
+@pytest.mark.slow
 def test_what_is_set_in_the_page_changes_the_gait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -263,6 +264,7 @@ def pad_state(*pressed: int) -> str:
     return json.dumps(state)
 
 
+@pytest.mark.slow
 def test_the_body_walks_to_where_the_ground_was_clicked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -316,7 +318,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
     assert 1.0 < at["end"] - at["reached"] < 1.5
 
 
-@pytest.mark.costs("starts a page of its own")
+@pytest.mark.slow
 def test_on_servos_it_is_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, servo_bus: Callable[..., ServoBus]
 ) -> None:

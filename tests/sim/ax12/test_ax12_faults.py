@@ -99,6 +99,7 @@ def test_a_mute_servo_obeys() -> None:
     assert line.servos["LED"].tolist() == [0, 1, 0]
 
 
+@pytest.mark.slow
 def test_a_stuck_servo_pushes_until_it_trips_and_works_again_with_a_torque_limit() -> None:
     line = scripted(fault("stuck", ids=[1], at_s=0.5, for_s=4.0))
     wait(line, 0.5)

@@ -128,8 +128,7 @@ ROBOT_SHARES = np.array(
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("the steps in plain numpy")
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["isotropic", "pool"])
 def test_compiled_and_numpy_steps_agree_with_legs(world: str) -> None:
     ends = []
@@ -194,6 +193,7 @@ def test_legs_that_stand_out_brake_in_water_as_rods_across_the_way() -> None:
         assert np.abs(way[1:]).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_level_field_bears_the_feet_as_the_floor_does() -> None:
     ends = []
     level = HeightField(np.zeros((41, 41)), 0.1, -2.0, -2.0)

@@ -105,6 +105,7 @@ def test_every_name_of_a_robot_makes_a_model(name: str) -> None:
     assert made.names[: len(name.encode())] == name.encode()
 
 
+@pytest.mark.slow
 def test_a_body_that_is_placed_once_lies_as_one_that_is_placed_again() -> None:
     robot, world = load_robot("alternating16"), load_world("random-10")
     ground, at = build_ground(world), ((0.3, -0.2), 0.4, np.zeros(robot.joint_count))

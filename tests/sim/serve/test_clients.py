@@ -160,7 +160,7 @@ def test_lerobots_bus_with_two_models(servo_bus: Make, lerobot_motors: ModuleTyp
     assert not bus["Torque Enable"].any()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("the bus of LeRobot at a served chain: 11 s of CPU")
 def test_lerobots_feetech_bus(
     servo_bus: Make, lerobot_motors: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -70,7 +70,7 @@ def film_of_station(folder: Path, marks: float, frames: int = 9, length_px: floa
         cv2.imwrite(str(folder / f"{k:03d}.png"), picture)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 5 s of CPU")
 def test_a_fish_that_holds_station_is_found_or_the_film_is_refused(tmp_path: Path) -> None:
     """The median of its frames holds the fish itself: lengths of 40 % came with exit code 0."""
     film_of_station(tmp_path / "calm", 10.0)
@@ -85,7 +85,7 @@ def test_a_fish_that_holds_station_is_found_or_the_film_is_refused(tmp_path: Pat
     assert not (tmp_path / "none.npz").exists()
 
 
-@pytest.mark.costs("a film of a fish")
+@pytest.mark.slow
 def test_synthesised_motion_is_a_recording(tmp_path: Path) -> None:
     save_postures(tmp_path / "p.npz", swim())
     made = snakewalk(

@@ -52,7 +52,7 @@ def test_climb_finds_the_top_of_a_ridge_and_never_falls() -> None:
     assert held[0] == 3.0
 
 
-@pytest.mark.costs("fits a body to each frame")
+@pytest.mark.slow
 def test_spine_angles_of_a_rendered_film_are_found() -> None:
     frames = range(20, 150, 20)
     top, _, _ = film(TRUTH, frames, 120.0)
@@ -66,8 +66,7 @@ def test_spine_angles_of_a_rendered_film_are_found() -> None:
     assert np.median(errors.skeleton) < 0.035
 
 
-@pytest.mark.fast_cases(1)
-@pytest.mark.costs("fits a body to each frame")
+@pytest.mark.slow
 @pytest.mark.parametrize("fins", [0.0, 0.12])
 def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
     """[TH] 3.2.2: plates on the body; a model without them took 1.3 px of the fins for width."""

@@ -67,7 +67,7 @@ def test_steering_keeps_ends_and_turns_the_head_with_the_way() -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a long simulation of two fish: 4 s of CPU")
 def test_a_fish_keeps_away_from_another_one(tmp_path: Path) -> None:
     other = synthesise_motion(TRUTH, SynthesisOptions(through=((3.0, 0.0),), mirror=True))
     other.save(tmp_path / "other.npz")

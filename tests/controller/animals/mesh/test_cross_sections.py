@@ -31,6 +31,7 @@ def test_an_ellipsoid_is_cut_into_its_ellipses() -> None:
     np.testing.assert_allclose(y[:, 0], -y[:, AROUND // 2], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_fins_and_a_forked_tail_are_no_part_of_the_tube() -> None:
     """A detached fin is larger than the body where it stands; the lobes begin behind the tail."""
     body = ellipsoid()

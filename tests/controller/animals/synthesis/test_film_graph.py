@@ -82,7 +82,7 @@ def swing(angles_rad: Floats) -> Floats:
     return angles_rad - angles_rad.mean(axis=1, keepdims=True)
 
 
-@pytest.mark.costs("builds a graph")
+@pytest.mark.slow
 def test_the_body_keeps_the_waves_of_the_recording_and_pushes() -> None:
     """The printed graph fails here: see the next test."""
     made = SnakeSynthesis(prepare_walk("jacksboro-traverse", motion="kp", on_paper=True))

@@ -35,7 +35,7 @@ def test_the_morph_begins_at_one_model_and_ends_at_the_next() -> None:
     np.testing.assert_allclose(morph.points_m(0.5), half)
 
 
-@pytest.mark.costs("morphs a whole model")
+@pytest.mark.slow
 def test_the_flow_of_a_wall_is_its_growth() -> None:
     morph = approach()
     rows, columns = np.nonzero(morph.common)

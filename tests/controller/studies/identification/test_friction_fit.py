@@ -44,7 +44,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_robot(RunRequest(short, folder, stoppable=False)).log
 
 
-@pytest.mark.costs("fits a simulated body under three laws")
+@pytest.mark.slow
 def test_a_planted_law_is_found(log: Path) -> None:
     """The same goals on ground with the law of scales, which moves the body far less."""
     given = FrictionLog.of(read_log(log), load_world("flat"))
@@ -77,7 +77,7 @@ def refused(*words: str | Path) -> str:
     return str(done.exception)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a whole identification: 8 s of CPU")
 def test_planted_friction_comes_back_and_goes_into_a_world(log: Path, tmp_path: Path) -> None:
     out = tmp_path / "found.toml"
     words = (

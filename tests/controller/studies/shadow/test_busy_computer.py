@@ -106,7 +106,7 @@ def test_a_weak_servo_gives_an_alarm_on_a_busy_computer(
     assert text.startswith("joint yaw_02 (ID 2) differs from its shadow")
 
 
-@pytest.mark.costs("a run with its shadow")
+@pytest.mark.slow
 def test_a_smaller_fault_gives_an_alarm_if_only_the_host_is_late(alarms: Alarms) -> None:
     """The host measures its own delays, so they cost no sensitivity."""
     weak = Deviation(torque=np.array([1.0, 0.6, 1.0]))
