@@ -14,7 +14,9 @@ from typing import IO, Final
 
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.child_process import start_module
+from snakewalk.controller.console.messages import LOGGER
 from snakewalk.drivers.compilation import observe_compilation
+from snakewalk.drivers.fallbacks import fallbacks_in_use
 
 _SHARES: Final = (("drivers", "sim"), ("controller",))
 """Packages of each child: they compile about equally long, and no loop of both."""
@@ -49,6 +51,7 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
     """
     total = sum(len(loop_modules(f"snakewalk.{each}")) for share in _SHARES for each in share)
     lock = threading.Lock()
+    notes: dict[str, None] = {}  # of both children, in the order of arrival
     done = 0
     compiled = 0
     children = [start_module(__name__, *share) for share in _SHARES]
@@ -60,7 +63,10 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
             with lock:
                 compiled += kind == "loop"
                 done += kind == "module"
-                on_module(min(done, total), total, name)
+                if kind == "note":
+                    notes[name] = None
+                else:
+                    on_module(min(done, total), total, name)
 
     threads = [
         threading.Thread(target=follow, args=(child.stdout,), daemon=True) for child in children
@@ -74,6 +80,8 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
     finally:
         for child in children:
             child.kill()
+    for note in notes:
+        LOGGER.warning("%s", note)
     if any(codes):
         raise RuntimeError("a loop was not compiled; the reason is above")
     return compiled
@@ -105,6 +113,8 @@ def _compile_share(packages: list[str]) -> None:
             print("module", name, flush=True)
     if "sim" in packages:
         _step_a_body()
+    for note in fallbacks_in_use():
+        print("note", note, flush=True)
 
 
 if __name__ == "__main__":

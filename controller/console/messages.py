@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 LOGGER: Final = logging.getLogger("snakewalk")
 LOGGER.addHandler(logging.NullHandler())
+# it reports a home folder that is not writable, in two lines of its own
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
 _KEPT_LINES: Final = 10_000
 """Messages that are kept to restore a deleted file (ours)."""
 FAULT: Final = "fault"

@@ -1,7 +1,6 @@
 """All loops are found and compiled in advance; a command that compiles reports it."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -43,10 +42,17 @@ def test_every_module_with_a_loop_is_found() -> None:
     assert sorted(found) == sorted(written)
 
 
-def test_a_failed_child_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+def test_a_failed_child_is_reported_and_a_note_of_both_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Both children printed that the folder is not writable."""
+    child = tmp_path / "child"
+    child.write_text("#!/bin/sh\necho note loops are stored elsewhere\nexit 1\n")
+    child.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(child))
     with pytest.raises(RuntimeError, match="not compiled"):
         compile_loops(lambda done, total, name: None)
+    assert caplog.messages == ["loops are stored elsewhere"]
 
 
 @pytest.mark.slow

@@ -1,7 +1,10 @@
 """What a command says beside its result: from a level on to standard error, all to a log file."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -35,6 +38,16 @@ def say() -> None:
         bar.on_event("gait", "a choice")
         bar.update(2.0)
     LOGGER.warning("a fault\x1b")
+
+
+def test_a_home_folder_that_is_not_writable_is_no_message_of_matplotlib() -> None:
+    """A service account got two lines about its configuration with each report."""
+    code = "import snakewalk.controller.console.messages, matplotlib; matplotlib.get_configdir()"
+    environ = os.environ | {"HOME": "/dev/null/none", "MPLCONFIGDIR": "", "XDG_CONFIG_HOME": ""}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environ, capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""
 
 
 @pytest.mark.parametrize("level", SAID)
