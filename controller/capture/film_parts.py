@@ -26,7 +26,8 @@ PART_FRAMES: Final = 1000
 """Frames of a part (ours)."""
 _LONGEST_PART: Final = 1500
 _CALM: Final = 5  # good frames before the end of a part
-_EVIDENCE: Final = ("given", "travel", "wave", "taper")
+_GIVEN: Final = 1e9  # weight of a part whose head the user has named
+_SUREST: Final = 0.9999
 _ARRAYS: Final = ("points_px", "radius_px", "length_px", "expected_px", "distractors")
 
 
@@ -170,17 +171,16 @@ def _signs(parts: Sequence[FinishedPart]) -> list[int]:
 
 
 def _head_of(parts: Sequence[FinishedPart], sign: Sequence[int]) -> tuple[float, str]:
-    """Whether the first end of the first part is the head: the best evidence of all parts."""
-    for kind in _EVIDENCE:
-        some = [
-            (s * one.head_sure, one.used)
-            for one, s in zip(parts, sign, strict=True)
-            if one.head_by == kind and one.used
-        ]
-        total = sum(count for _, count in some)
-        if total:
-            return sum(score * count for score, count in some) / total, kind
-    return 0.0, _EVIDENCE[-1]
+    """Whether the first end of the first part is the head: the mean log-odds of all parts."""
+    weights = [one.used * (one.head_by != "given" or _GIVEN) for one in parts]
+    if not any(weights):
+        return 0.0, "taper"
+    odds = [
+        weight * s * float(np.arctanh(min(one.head_sure, _SUREST)))
+        for weight, one, s in zip(weights, parts, sign, strict=True)
+    ]
+    strongest = int(np.argmax(np.abs(odds)))
+    return float(np.tanh(sum(odds) / sum(weights))), parts[strongest].head_by
 
 
 def _reversed(one: Capture) -> Capture:

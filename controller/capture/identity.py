@@ -1,8 +1,8 @@
 """Head and tail keep their identity over time, and which end the head is.
 
 From frame to frame the body is compared with itself and with itself reversed; over a gap its
-thickness along the body decides as well. The user may name the head; else it is found from the
-direction of travel, the direction of the wave, or at last the taper.
+thickness along the body decides as well. The user may name the head; else the direction of travel,
+the direction of the wave, and the taper add their log-odds.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,13 @@ from snakewalk.controller.track.wave import measure_wave
 
 _SURE = 0.2  # margin from which one frame is enough to distinguish the ends
 _WAVE_FRAMES = 8  # from which a wave's direction is looked at
-_TRAVEL = 0.2  # travel score from which the travel decides which end is the head
+_BY_TRAVEL = 4.0  # log-odds of the first end, by its sign (from films with known heads)
+_BY_SLOW_TRAVEL = 1.0  # the same where the travel may be that of the camera
+_BY_WAVE = 4.0
+_BY_TAPER, _MOST_BY_TAPER = 8.0, 6.0
+_EVEN = 0.1  # of the mean thickness: a smaller taper says nothing
+_SHARED = 0.5  # share of the weaker of travel and wave: both turn if an animal moves backwards
+_DECIDES = 1.0  # log-odds from which a sign is named as the reason, in the order of the signs
 _TRAVEL_S = 0.25
 _TRAVEL_PX = 1.0  # over that time; less is what a camera that goes with the animal by pixels leaves
 _TRAVEL_OF_WAVE = 0.075  # of the wave's speed: less travel is that of the camera, not of the animal
@@ -155,10 +161,10 @@ def head_end(
     *,
     fixed: bool,
 ) -> tuple[float, str]:
-    """Which end is the head: given, or by travel, the wave's direction, or the taper.
+    """Which end is the head: given, or by the log-odds of travel, wave and taper.
 
-    An animal that moves backwards leads with its tail. If the trailing end is clearly the thicker
-    one, the score is at most ``_DOUBTED``.
+    Both motions turn together if an animal moves backwards, so the weaker one counts half. If a
+    clear taper contradicts the motion, the score is at most ``_DOUBTED``.
 
     Args:
         points: (T, P, 2) pixels, the same end first in all; NaN for a frame without a body.
@@ -168,7 +174,8 @@ def head_end(
         fixed: whether the camera stands still.
 
     Returns:
-        A score from -1 to 1, above 0 where the first end is the head, and what it rests on.
+        A score from -1 to 1, above 0 where the first end is the head, and its strongest reason.
+        ``(1 + score) / 2`` is the probability of the first end.
 
     """
     good = np.isfinite(points[:, 0, 0])
@@ -176,26 +183,36 @@ def head_end(
         first = points[np.argmax(good)]
         one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
         return (1.0 if one <= other else -1.0), "given"
-    taper = taper_score(radius[good])
     wave = None
     if int(good.sum()) >= _WAVE_FRAMES:
         wave = measure_wave(track_from_points("", points, rate_hz))
+    by_travel = 0.0
     if fixed:
         step = max(1, round(_TRAVEL_S * rate_hz))
-        travel = travel_score(points, step)
         least_px = _TRAVEL_PX
         if wave is not None:
             pulse = abs(wave.pulse_body_lengths_s) * median_length(points) * step / rate_hz
             least_px = max(least_px, _TRAVEL_OF_WAVE * pulse)
-        if abs(travel) > _TRAVEL and usual_travel(points, step) > least_px:
-            return _doubted(travel, taper), "travel"
-    if wave is not None and abs(wave.headward - 0.5) > 0.05:
-        return _doubted(1.0 - 2.0 * wave.headward, taper), "wave"
-    return taper, "taper"
+        usual_px = usual_travel(points, step)
+        weight = _BY_TRAVEL if usual_px > least_px else _BY_SLOW_TRAVEL * (usual_px > _TRAVEL_PX)
+        by_travel = weight * travel_score(points, step)
+    by_wave = 0.0 if wave is None else _BY_WAVE * (1.0 - 2.0 * wave.headward)
+    weaker, stronger = sorted((by_travel, by_wave), key=abs)
+    taper = taper_score(radius[good])
+    return _weighed(stronger + _SHARED * weaker, taper, {"travel": by_travel, "wave": by_wave})
 
 
-def _doubted(score: float, taper: float) -> float:
-    """The score of a motion, small if the taper contradicts it."""
-    if score * taper >= 0.0 or abs(taper) < _CONTRARY:
-        return score
-    return float(np.clip(score, -_DOUBTED, _DOUBTED))
+def _weighed(motion: float, taper: float, signs: dict[str, float]) -> tuple[float, str]:
+    """The score by the log-odds of the motion and by a taper, and its reason among all signs."""
+    by_taper = np.copysign(min(_BY_TAPER * max(abs(taper) - _EVEN, 0.0), _MOST_BY_TAPER), taper)
+    total = motion + float(by_taper)
+    signs = {**signs, "taper": float(by_taper)}
+    agreeing = {by: abs(one) for by, one in signs.items() if one * total > 0.0}
+    if not agreeing:
+        return taper, "taper"
+    clear = (by for by, one in agreeing.items() if one >= _DECIDES)
+    by = next(clear, max(agreeing, key=lambda name: agreeing[name]))
+    score = float(np.tanh(0.5 * total))
+    if motion * taper < 0.0 and abs(taper) >= _CONTRARY:
+        score = float(np.clip(score, -_DOUBTED, _DOUBTED))
+    return score, by

@@ -55,6 +55,21 @@ def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
     assert head_end(points[::-1], even, 15.0, None, fixed=True)[0] < -0.9
 
 
+def test_a_weak_wave_does_not_overrule_a_clear_taper() -> None:
+    """A wave that runs to the thick end in a little more than half of the time."""
+    turn = np.concatenate([np.arange(24.0), 23.0 - np.arange(16.0)])[:, None] * 0.4
+    angle = 0.8 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 101) + turn)
+    points = np.cumsum(np.stack([np.cos(angle), np.sin(angle)], axis=2), axis=1)
+    thick_first = np.tile(np.linspace(5.0, 2.5, 101), (40, 1))
+    score, by = head_end(points, thick_first, 15.0, None, fixed=False)
+    assert by == "taper"
+    assert score > 0.0
+    alike = np.ones_like(thick_first)
+    score, by = head_end(points, alike, 15.0, None, fixed=False)
+    assert by == "wave"
+    assert -0.9 < score < 0.0
+
+
 @pytest.mark.slow
 def test_a_slow_larva_with_a_faint_tail_is_seen_whole() -> None:
     scene = replace(SCENE, head=1.8, faint=0.15, tip=0.05, taper=0.6, slender=18.0)
