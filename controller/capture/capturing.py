@@ -26,6 +26,7 @@ from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
+from snakewalk.controller.capture.remedies import remedy
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
@@ -181,7 +182,11 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         scale = picture_scale(film.some[::3], footage.count, str(options.recording))
     parts = _parts(options, film, folder, finished)
     with ProgressBar("frames", footage.count, transient=True, remaining=True) as bar:
-        captured = _captured_clearly(options, parts, film, detector, bar)
+        try:
+            captured = _captured_clearly(options, parts, film, detector, bar)
+        except InputError as error:
+            better = remedy(options, film, detector)
+            raise error if better is None else InputError(f"{error}; {better}") from None
         captured = in_whole_film(options, film, captured)
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
@@ -198,6 +203,10 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         parts.folder.clear()
     facts = facts_of(options, footage, detector, captured, m_per_px, options.output)
     warn_of(options, footage, facts)
+    if len(_unexplained(captured)) >= _MANY * len(captured.status):
+        better = remedy(options, film, detector)
+        if better is not None:
+            LOGGER.warning("%s: %s", options.recording, better)
     return facts
 
 
@@ -395,7 +404,7 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
             f"head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
             f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
         )
-    unused = [one for one in captured.status if not one.has_points and one not in _EXPLAINED]
+    unused = _unexplained(captured)
     if len(unused) >= _MANY * len(captured.status):
         reason = max(dict.fromkeys(unused), key=unused.count)
         doubts.append(
@@ -412,6 +421,11 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
                 "is not found"
             )
     return f"{options.recording}: {'. '.join(doubts)}" if doubts else None
+
+
+def _unexplained(captured: Capture) -> list[FrameStatus]:
+    """Statuses of the frames that should show an animal and have no points."""
+    return [one for one in captured.status if not one.has_points and one not in _EXPLAINED]
 
 
 def _unsure_heads(captured: Capture) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from snakewalk.config.arrays import DeepImage, SignedInts
+from snakewalk.config.arrays import Bools, DeepImage, SignedInts
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
@@ -14,6 +14,8 @@ from snakewalk.controller.capture.several.blobs import (
     SMALLEST,
     Blobs,
     blobs_of,
+    count_of,
+    detector_of_several,
     others_mask,
     own_window,
     usual_area,
@@ -108,6 +110,29 @@ def find_animals(
     return AnimalsFound(
         tuple(kept), len(every) - len(kept), usual, count, smaller=int(np.median(small))
     )
+
+
+def share_of_several(
+    frames: Sequence[DeepImage],
+    background: DeepImage | None,
+    inside: Bools | None,
+    threshold: float | None,
+) -> float:
+    """Share of whole animals among all in some frames; 0 if they show fewer than two."""
+    detector = detector_of_several(frames, background, inside=inside, threshold=threshold)
+    grounds = [detector.ground_of(one) for one in frames]
+    seen = [blobs_of(one, ground, detector) for one, ground in zip(frames, grounds, strict=True)]
+    count, _ = count_of(seen)
+    if count < 2:
+        return 0.0
+    least = SMALLEST * usual_area(seen)
+    whole = sum(
+        _detected(frame, ground, detector, blobs, int(number))[1].skeleton.status
+        is FrameStatus.GOOD
+        for frame, ground, blobs in zip(frames, grounds, seen, strict=True)
+        for number in np.flatnonzero(blobs.area_px >= least)[:count]
+    )
+    return whole / (count * len(frames))
 
 
 def films_of(

@@ -14,6 +14,7 @@ from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture import film_parts
 from snakewalk.controller.capture.capture import capture, load_capture, save_capture
+from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.commands.capture import show_several
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.options import CaptureOptions
@@ -204,6 +205,17 @@ def test_two_animals_in_a_film_of_one_are_rejected() -> None:
     images = list(crossing_film(scene, crossing_midlines(scene)))
     with pytest.raises(InputError, match="several animals: give --animals"):
         capture(images, make_detector(images), 15.0)
+
+
+@pytest.mark.slow
+def test_a_film_that_is_mostly_lost_names_the_option_that_captures_it(
+    dish: tuple[Path, AnimalsFacts], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The fixture shows that the option gives a track of each animal."""
+    folder, _ = dish
+    options = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz")
+    capture_recording(options)
+    assert "with --animals auto; try: snakewalk animal capture" in caplog.text
 
 
 @pytest.mark.slow
