@@ -26,11 +26,11 @@ from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
-from snakewalk.controller.capture.remedies import remedy
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 from snakewalk.controller.capture.verification.film_check import REJECTED
+from snakewalk.controller.capture.verification.remedies import remedy
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite

@@ -16,7 +16,7 @@ from snakewalk.controller.images.body_detector import BodyDetector, make_detecto
 
 _FRAMES: Final = 20
 _THRESHOLDS: Final = (0.4, 0.6, 1.6)  # of the contrast at the boundary
-_MORE: Final = 0.25  # of the frames: so many more must show a whole animal
+_MORE: Final = 0.25  # of the frames: this share more must show a whole animal
 _MOST: Final = 0.5  # of the frames, at least
 
 
