@@ -174,7 +174,6 @@ def _terminated(holder: PortHolder, port: str) -> StopOutcome:
             f"process {holder.process} belongs to user {holder.user}; end it by: sudo kill "
             f"{holder.process}",
             safe=False,
-            process=holder.process,
             ports=(resolved(port),),
         )
     text = f"process {holder.process} had {port} open"
@@ -244,7 +243,8 @@ class Stop:
             devices = []
         # a run that was killed, or may not be ended, leaves its servos with torque on
         devices += [port for each in outcomes if not each.safe for port in each.ports]
-        outcomes += _torque_off(dict.fromkeys(devices), self.bauds, are_runs_ended=bool(outcomes))
+        is_only = not outcomes and len(devices) == 1
+        outcomes += _torque_off(dict.fromkeys(devices), self.bauds, is_only=is_only)
         return self._report(outcomes)
 
     def _report(self, outcomes: Sequence[StopOutcome]) -> int:
@@ -302,22 +302,20 @@ def _free_ports(port: str | None) -> list[str]:
 
 
 def _torque_off(
-    devices: Iterable[str], bauds: Sequence[int], *, are_runs_ended: bool
+    devices: Iterable[str], bauds: Sequence[int], *, is_only: bool
 ) -> list[StopOutcome]:
     """Switch torque off on ports; the module is imported only if there are any.
 
     Raises:
-        PortError: no port can be opened, and no run was ended.
+        PortError: the only port cannot be opened, and no run was ended.
 
     """
     outcomes = []
-    faults: list[str] = []
     for device in devices:
         try:
             outcomes.append(import_module(_TORQUE_OFF).torque_off(device, bauds))
         except PortError as fault:  # the other ports still get torque off
-            faults += fault.faults
+            if is_only:
+                raise
             outcomes.append(StopOutcome(device, "not stopped", str(fault), safe=False))
-    if faults and len(faults) == len(outcomes) and not are_runs_ended:
-        raise PortError(faults)
     return outcomes

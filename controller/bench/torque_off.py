@@ -129,9 +129,8 @@ def _send_past(device: str) -> str:
                 clock.sleep_until_s(clock.now_s() + _PAST_EVERY_S)
         finally:
             os.close(line)
-    holder = ", ".join(map(str, holders_of(device)))
-    where = "" if holder else ", outside of this container"
-    holder = holder or "a program that is hidden from here"
+    holders = ", ".join(map(str, holders_of(device)))
+    holder = holders or "a program that is hidden from here"
     if sent == 0:
         text = f"torque off was not sent: {holder} has the port open, and lets no other write"
     else:
@@ -139,7 +138,7 @@ def _send_past(device: str) -> str:
             f"torque off was sent {sent} times, but no servo was asked; {holder} has the port open "
             "and may switch torque on again"
         )
-    return f"{text}; end that program{where}: sudo snakewalk stop --port {device}"
+    return f"{text}; end that program, on the host by: sudo snakewalk stop --port {device}"
 
 
 def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:

@@ -157,7 +157,7 @@ def test_torque_off_is_sent_past_a_program_that_is_hidden(
     assert out == (
         f"{port}: port in use: torque off was sent 20 times, but no servo was asked; a program "
         "that is hidden from here has the port open and may switch torque on again; end that "
-        f"program, outside of this container: sudo snakewalk stop --port {port}\n"
+        f"program, on the host by: sudo snakewalk stop --port {port}\n"
     )
 
 
