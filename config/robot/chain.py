@@ -96,7 +96,9 @@ class RobotConfig(JointValues):
             raise ValueError("links: radius_m and body_profile: one of them says the radii")
         if self.body_radius_m != max(radii_m):
             raise ValueError(
-                f"body_radius_m = {self.body_radius_m:g}: is the thickest link's, {max(radii_m):g}"
+                f"body_radius_m = {self.body_radius_m:g}: the thickest link has radius_m = "
+                f"{max(radii_m):g}; write body_radius_m = {max(radii_m):g}, and radius_m in each "
+                "thinner link of [[links]]"
             )
         return self
 

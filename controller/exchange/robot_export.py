@@ -5,15 +5,28 @@ from collections.abc import Mapping
 from typing import Final, Literal
 from xml.etree import ElementTree as ET
 
+from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WorldConfig
+from snakewalk.config.world import FrictionConfig, WorldConfig
 from snakewalk.sim.servo.motor import gears_of, motors_of, p_gain_per_rad
 
 Ros2Control = Literal["topic", "dynamixel"]
 """Hardware that ros2_control drives: our ROS node, or the servos themselves."""
 Actuators = Literal["dcmotor"]
 """MuJoCo's actuators that stand for the servos."""
+Contact = Literal["rollers", "isotropic", "none"]
+"""Friction of an exported body."""
+CONTACT_NOTES: Final[dict[Contact, str]] = {
+    "rollers": "friction: a passive roller under each link, 1.06 to 1.22 of the speed in snakewalk",
+    "isotropic": "friction: equal in all directions, 0.00 to 1.19 of the speed in snakewalk",
+    "none": "friction: none, 0.00 to 0.01 of the speed in snakewalk",
+}
+"""Remaining difference of the friction, measured by ``benchmarks.exported_body``."""
+_ROLLER_OUT_M: Final = 5e-4
+"""Distance by which a roller stands out of the belly (ours)."""
+_ROLLER_SHARE: Final = 0.01
+"""Share of a link's mass that its roller has (ours)."""
 _DEVICE: Final = "/dev/ttyUSB0"
 _POSITION_MODE: Final = 3
 
@@ -161,11 +174,19 @@ def _add_params(parent: ET.Element, values: Mapping[str, str]) -> None:
         ET.SubElement(parent, "param", name=name).text = value
 
 
-def mjcf_text(robot: RobotConfig, actuators: Actuators | None = None) -> str:
+def mjcf_text(
+    robot: RobotConfig, actuators: Actuators | None = None, contact: Contact = "rollers"
+) -> str:
     """MuJoCo model of a robot on a level floor, as the simulator builds it.
 
-    Its contacts have no friction: the simulator adds its own, which knows a direction along the
-    body. With ``actuators`` each joint has one, whose control is the goal position in rad.
+    MuJoCo's friction cone has no direction along a body, and the simulator adds its own friction.
+    The model has instead, with the coefficients of the default world:
+
+    - ``rollers``: a passive ball under each link, which rolls along the link and slips across it;
+    - ``isotropic``: bellies with the friction across the body in all directions;
+    - ``none``: bellies without friction.
+
+    With ``actuators`` each joint has one, whose control is the goal position in rad.
 
     Raises:
         InputError: the installed MuJoCo does not have these actuators, or a servo has no motor
@@ -174,19 +195,56 @@ def mjcf_text(robot: RobotConfig, actuators: Actuators | None = None) -> str:
     """
     from snakewalk.sim.physics import body, plant  # noqa: PLC0415  an extra
 
-    text = body.mjcf(robot, WorldConfig(name="floor"), None, plant.FLOOR_STEP_S)
-    if actuators is None:
-        return text + "\n"
-    root = ET.fromstring(text)  # our own text
-    _add_dc_motors(root, robot)
+    world = WorldConfig(name="floor")
+    root = ET.fromstring(body.mjcf(robot, world, None, plant.FLOOR_STEP_S))  # our own text
+    _add_friction(root, robot, world.friction, contact)
+    if actuators is not None:
+        _add_dc_motors(root, robot)
     ET.indent(root)
-    text = ET.tostring(root, encoding="unicode") + "\n"
-    fault = body.load_fault(text)
+    text = f"<!-- {CONTACT_NOTES[contact]} -->\n{ET.tostring(root, encoding='unicode')}\n"
+    fault = body.load_fault(text) if actuators is not None else None
     if fault is not None:
         raise InputError(
             f"--actuators dcmotor: {fault}; install mujoco 3.17 or newer, or remove the option"
         )
     return text
+
+
+def _add_friction(
+    root: ET.Element, robot: RobotConfig, friction: FrictionConfig, contact: Contact
+) -> None:
+    """Give the model contacts with friction; the simulator's own have none."""
+    if contact == "none":
+        return
+    for option in root.iter("option"):
+        option.attrib.update({"cone": "elliptic", "impratio": "10"})
+    grip = {"condim": "3", "friction": f"{friction.across!r} 0.005 0.0001"}
+    if contact == "isotropic":
+        for geom in root.iter("geom"):
+            if geom.get("name", "").startswith("belly"):
+                geom.attrib.update(grip)
+        return
+    bodies = {each.get("name"): each for each in root.iter("body")}
+    rows = zip(
+        robot.link_lengths_m,
+        robot.link_radii_m,
+        robot.link_masses_kg,
+        robot.link_shapes,
+        strict=True,
+    )
+    for link, (length_m, belly_m, mass_kg, shape) in enumerate(rows):
+        if shape == "none":
+            continue
+        radius_m = belly_m + _ROLLER_OUT_M
+        roller_kg = _ROLLER_SHARE * mass_kg
+        for own in bodies[f"link{link}"].findall("inertial"):
+            own.set("mass", repr(float(own.get("mass", "0")) - roller_kg))
+        place = f"{0.0 if link == 0 else -0.5 * length_m!r} 0 0"
+        roller = ET.SubElement(bodies[f"link{link}"], "body", name=f"roller{link}", pos=place)
+        hinge = ET.SubElement(roller, "joint", name=f"roller{link}", axis="0 1 0")
+        hinge.set("frictionloss", repr(friction.along * mass_kg * GRAVITY_M_S2 * radius_m))
+        ball = ET.SubElement(roller, "geom", type="sphere", size=repr(radius_m), **grip)
+        ball.attrib.update({"mass": repr(roller_kg), "contype": "0", "conaffinity": "1"})
 
 
 def _add_dc_motors(root: ET.Element, robot: RobotConfig) -> None:

@@ -149,8 +149,9 @@ def onto_robot(
         by_order = True
     if lost:
         raise InputError(
-            f"{where}: no joint for {', '.join(lost)} of {robot.name}; it has {', '.join(found)}: "
-            f"say --joint {lost[0]}=NAME for each; {REST} as NAME keeps a joint at 0"
+            f"{where}: the file has no joint for {', '.join(lost)} of {robot.name}, but "
+            f"{', '.join(found)}; add --joint {lost[0]}=NAME for each; {REST} as NAME keeps a "
+            "joint at 0"
         )
     zeros = np.zeros(len(motion.time_s))
     columns = [

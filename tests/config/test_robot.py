@@ -100,7 +100,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
         ),
         (
             {"joint_axes": "y", "links": [{"radius_m": 0.05}, {}]},
-            "body_radius_m = 0.03: is the thickest link's, 0.05",
+            "write body_radius_m = 0.05, and radius_m in each thinner link of [[links]]",
         ),
         (
             {"joint_axes": "y", "links": [{"shape": "rails"}, {}]},

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from benchmarks.exported_body import exported_speeds
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world, shipped
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
+from snakewalk.controller.exchange.robot_export import CONTACT_NOTES, mjcf_text, urdf_text
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.plant import MujocoPlant
@@ -55,7 +56,7 @@ def test_links_of_the_urdf_are_where_ours_are(robot: RobotConfig) -> None:
 
 @pytest.mark.parametrize("robot", [*ROBOTS, UNEVEN], ids=lambda robot: robot.name)
 def test_links_of_the_mjcf_are_where_ours_are(robot: RobotConfig) -> None:
-    model = mujoco.MjModel.from_xml_string(mjcf_text(robot))
+    model = mujoco.MjModel.from_xml_string(mjcf_text(robot, contact="none"))
     data = mujoco.MjData(model)
     assert abs(model.body_mass.sum() - robot.mass_kg) < 1e-9
     mass_kg = model.body_mass[1 : 1 + robot.link_count, None]
@@ -209,7 +210,7 @@ def test_dc_motors_answer_a_step_as_our_servos_do(name: str, most_rad: float) ->
     robot = load_robot(name)
     plant = MujocoPlant(robot, load_world("flat"))
     plant.mechanics.mu = (0.0, 0.0, 0.0, 0.0)  # a model for others has no friction of the ground
-    model = mujoco.MjModel.from_xml_string(mjcf_text(robot, "dcmotor"))
+    model = mujoco.MjModel.from_xml_string(mjcf_text(robot, "dcmotor", "none"))
     data, drive = mujoco.MjData(model), drive_of(robot)
     data.qpos[:] = plant.qpos
     drive.current_limit_a[:] = robot.current_limits_a
@@ -239,3 +240,29 @@ def test_a_mujoco_without_dc_motors_is_named(
     assert not out.exists()
     urdf = ["robot", "export", "yaw16", "--urdf", str(out), "--actuators", "dcmotor"]
     assert "give --mjcf FILE" in str(CliRunner().invoke(app, urdf).exception)
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_rollers_keep_masses_and_the_order_of_the_joints(robot: RobotConfig) -> None:
+    model = mujoco.MjModel.from_xml_string(mjcf_text(robot))
+    assert abs(model.body_mass.sum() - robot.mass_kg) < 1e-9
+    names = [model.joint(j).name for j in range(1, model.njnt)]
+    assert [name for name in names if not name.startswith("roller")] == list(robot.joint_names)
+
+
+def test_the_exported_body_says_how_its_friction_differs(tmp_path: Path) -> None:
+    out = tmp_path / "yaw16.xml"
+    words = ["robot", "export", "yaw16", "--mjcf", str(out), "--contact"]
+    done = CliRunner().invoke(app, [*words, "isotropic", "--json"])
+    assert json.loads(done.output)["contact"] == CONTACT_NOTES["isotropic"]
+    assert CONTACT_NOTES["isotropic"] in out.read_text(encoding="utf-8")
+    alone = ["robot", "export", "yaw16", "--urdf", f"{out}.urdf", "--contact", "none"]
+    assert "give --mjcf FILE" in str(CliRunner().invoke(app, alone).exception)
+
+
+@pytest.mark.costs("runs a gait in snakewalk and in plain MuJoCo")
+def test_rollers_slip_across_and_roll_along() -> None:
+    """A body without them stays where it is: 0.00 of our speed, with them 1.13."""
+    ours_m_s, rollers, ice = exported_speeds("lateral-undulation", "yaw16", ("rollers", "none"))
+    assert 0.8 < rollers / ours_m_s < 1.3
+    assert ice / ours_m_s < 0.05

@@ -171,7 +171,9 @@ def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
 def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
     motion = joint_motion(Path("a"), TIME_S, [f"m{k}" for k in range(17)],
                           np.column_stack([ANGLES, TIME_S]))  # fmt: skip
-    with pytest.raises(InputError, match=f"a: no joint for {NAMES[0]},.*--joint {NAMES[0]}=NAME"):
+    with pytest.raises(
+        InputError, match=f"a: the file has no joint for {NAMES[0]},.*but .*--joint {NAMES[0]}=NAME"
+    ):
         onto_robot(motion, ROBOT, {}, "a")
     asked = {name: f"m{k}" for k, name in enumerate(NAMES)} | {NAMES[3]: "rest"}
     joints, lines = onto_robot(motion, ROBOT, asked, "a")
