@@ -9,8 +9,10 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
+from snakewalk.config.key_types import SEED, Seed
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
-from snakewalk.controller.console.option import Flag, from_words, numbers, parameters
+from snakewalk.controller.console.option import Flag, from_words, key_parameter, numbers, parameters
 
 
 def _even(value: int) -> int:
@@ -29,6 +31,7 @@ class Options(Strict):
         (1.0, 0.5), description="place"
     )
     seed: Annotated[int, AfterValidator(_even)] | None = Field(None, description="seed")
+    names: Annotated[dict[str, str], Flag(("--of",))] = Field({}, description="names by key")
     name: Annotated[str, Flag(is_argument=True)] = Field(description="name")
 
 
@@ -60,8 +63,24 @@ def test_a_field_becomes_the_option_of_a_command() -> None:
 
 def test_the_values_of_a_command_line_become_the_model() -> None:
     assert from_words(Options, words()) == Options(name="a")
-    made = from_words(Options, words(place="2,3", files=[Path("x")], seed=2))
+    given = words(place="2,3", files=[Path("x")], seed=2, names=["a=1", "b=c"])
+    made = from_words(Options, given)
     assert (made.place, made.files, made.seed) == ((2.0, 3.0), (Path("x"),), 2)
+    assert made.names == {"a": "1", "b": "c"}
+    with pytest.raises(InputError, match="--of a: expected KEY=VALUE"):
+        from_words(Options, words(names=["a"]))
+
+
+def test_the_named_type_of_a_key_becomes_an_option() -> None:
+    def of(annotation: Any, default: Any) -> tuple[Any, Any, Any]:
+        given = inspect.Parameter("one", inspect.Parameter.KEYWORD_ONLY, default=default)
+        made = key_parameter(given.replace(annotation=annotation))
+        return (*get_args(made.annotation), made.default)
+
+    for annotation, kind, default in ((Seed, int, SEED), (Seed | None, int | None, None)):
+        found, info, shown = of(annotation, default)
+        assert (found, info.min, shown) == (kind, 0, default)
+        assert info.help == RunConfig.model_fields["seed"].description
 
 
 @pytest.mark.parametrize(
