@@ -37,6 +37,9 @@ class PlaybackConfig(Strict):
     unit: Literal["rad", "deg"] | None = Field(
         None, description="unit of joint angles if the file states none: rad or deg"
     )
+    time_unit: Literal["s", "ms", "us", "ns"] | None = Field(
+        None, description="unit of times if a table states none: s, ms, us or ns"
+    )
     topic: str | None = Field(
         None, description="topic of a bag that has several topics of joint angles"
     )

@@ -15,6 +15,7 @@ from snakewalk.controller.mapping.las_file import in_metres, read_las
 from snakewalk.controller.mapping.length_units import DEGREE, unit_m
 from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
+from snakewalk.controller.mapping.point_units import points_in_metres
 from snakewalk.controller.mapping.raster_file import (
     GEO_RASTERS,
     RASTERS,
@@ -193,9 +194,11 @@ def _read(file: Path, options: MapOptions) -> FileMap:
         return _solid(file, options)
     if ending == ".csv":
         notes: list[str] = []
-        table = read_numbers(file, notes)
+        names: list[str] = []
+        table = read_numbers(file, notes, names)
         if table.shape[1] == 3:
-            return _of_points(file, _upright(file, table, options), None, options, notes)
+            points_m = points_in_metres(file, table, names, options.units, notes)
+            return _of_points(file, _upright(points_m, options), None, options, notes)
     if ending in GEO_RASTERS:
 
         def spacing_of(dx_m: float, dy_m: float) -> float:
@@ -231,6 +234,7 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
     ending = file.suffix.lower()
     faces = None
     notes: list[str] = []
+    names: list[str] = []
     if ending in LASERS:
         return _of_laser(file, options)
     if ending == ".pcd":
@@ -244,7 +248,7 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
             )
         notes += cloud.notes
     elif ending == ".xyz":
-        points = read_numbers(file, notes)[:, :3]
+        points = read_numbers(file, notes, names)[:, :3]
     elif ending == ".ply":
         points, faces = read_ply(file)
     else:
@@ -254,7 +258,8 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         mesh = read_mesh(file, "+x", "+z").mesh
         points = mesh.vertices
         faces = mesh.faces
-    return _of_points(file, _upright(file, points, options), faces, options, notes)
+    points_m = points_in_metres(file, points, names, options.units, notes)
+    return _of_points(file, _upright(points_m, options), faces, options, notes)
 
 
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
@@ -265,20 +270,10 @@ def _of_laser(file: Path, options: MapOptions) -> FileMap:
     return _of_points(file, points_m, None, left, [*held.notes, *notes])
 
 
-def _upright(file: Path, points: Floats, options: MapOptions) -> Floats:
-    """Finite points (n, 3) in metres, z up."""
-    units = options.units
-    if units.unit == DEGREE:
-        raise InputError(f"{file}: degrees are the unit of rasters and laser scans alone")
-    if points.shape[1] != 3:
-        raise InputError(f"{file}: holds {points.shape[1]} numbers a point; x, y and z are needed")
-    if units.no_data is not None:
-        points = np.where(points == units.no_data, np.nan, points)
+def _upright(points_m: Floats, options: MapOptions) -> Floats:
+    """Points (n, 3) in metres, z up."""
     order, signs = _TURNS[options.up or "z"]
-    length_m = unit_m(units.unit or "m")
-    rise_m = unit_m(units.height_unit or units.unit or "m")
-    turned = points[:, order] * signs * [length_m, length_m, rise_m]
-    return np.ascontiguousarray(turned)
+    return np.ascontiguousarray(points_m[:, order] * signs)
 
 
 def _of_points(

@@ -41,6 +41,8 @@ _COARSER: Final = 2.0
 """Spacing of a map over a raster's from which strips are read (ours)."""
 _CACHE_BYTES: Final = 64_000_000
 """Cache of GDAL's blocks (ours)."""
+_COLOURS: Final = ("palette", "red", "green", "blue", "alpha", "hue", "cyan", "magenta")
+"""Meanings of a band (GDAL's color interpretation) that exclude heights."""
 _DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
 """Largest cell that may be one of degrees: a minute, 1.8 km (ours)."""
 
@@ -100,6 +102,13 @@ def _read(
 ) -> Raster:
     if opened.count != 1 and opened.dtypes[0] == "uint8":
         raise InputError(f"{file}: is a picture of {opened.count} bands, and holds no heights")
+    colour = opened.colorinterp[0].name
+    if colour in _COLOURS:
+        meaning = "classes" if colour == "palette" else "a picture"
+        raise InputError(
+            f"{file}: its band is marked as {colour}: its values are {meaning}, not heights; "
+            "choose a file of heights"
+        )
     turn = opened.transform
     if not (math.isclose(turn.b, 0.0) and math.isclose(turn.d, 0.0)):
         raise InputError(f"{file}: its rows do not run west to east: warp it north up")

@@ -15,11 +15,14 @@ _THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
 _MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 
 
-def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
+def read_numbers(
+    file: Path, notes: list[str] | None = None, names: list[str] | None = None
+) -> Floats:
     """Numbers (rows, columns) of a table, with or without a line of names.
 
     Commas, semicolons, tabs or blanks separate them. Empty cells, ``NaN`` and ``NA`` are NaN.
-    Without comma separators a table may have decimal commas.
+    Without comma separators a table may have decimal commas. Names of columns are appended to
+    ``names``.
 
     Raises:
         InputError: the file is not such a table; names the first cell that is not a number.
@@ -42,25 +45,31 @@ def read_numbers(file: Path, notes: list[str] | None = None) -> Floats:
     rows = [(number, [cell.strip() for cell in line.split(mark)]) for number, line in lines]
     comma = mark != "," and _has_decimal_commas(file, rows)
     if not all(_is_number(cell, comma) for cell in rows[0][1]):
+        if names is not None:
+            names += rows[0][1]
         rows = rows[1:]
     widths = {len(cells) for _, cells in rows}
     if len(widths) != 1:
         raise InputError(_uneven(file, rows, widths))
     values = np.full((len(rows), widths.pop()), np.nan)
     for k, (number, cells) in enumerate(rows):
-        if not comma and (plain := _plain(cells)) is not None:
-            values[k] = plain
-            continue
-        for column, cell in enumerate(cells):
-            value = _number(cell, comma)
-            if value is None:
-                raise InputError(
-                    f"{file}: line {number}, column {column + 1}: {cell!r} is not a number; "
-                    "leave cells without a value empty"
-                )
-            values[k, column] = value
+        plain = None if comma else _plain(cells)
+        values[k] = _row(file, number, cells, comma) if plain is None else plain
     if comma and notes is not None:
         notes.append("numbers have decimal commas")
+    return values
+
+
+def _row(file: Path, line: int, cells: list[str], comma: bool) -> list[float]:
+    values = []
+    for column, cell in enumerate(cells, start=1):
+        value = _number(cell, comma)
+        if value is None:
+            raise InputError(
+                f"{file}: line {line}, column {column}: {cell!r} is not a number; leave cells "
+                "without a value empty"
+            )
+        values.append(value)
     return values
 
 

@@ -3,6 +3,7 @@
 A reader is a plug-in of the kind ``joints`` (``docs/how-to/add-a-plug-in.md``).
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +17,17 @@ from snakewalk.config.robot import RobotConfig
 
 UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0}
 """Units of angles and their size in radians."""
+TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units of times and their size in seconds."""
 MOST_CELLS: Final = 20_000_000
 """Angles of a motion (ours): an hour of 50 joints at 100 Hz."""
 REST: Final = "rest"
 """Name that keeps a joint of the robot at 0."""
 _STILL_RAD: Final = 1e-6
+_NUMBERED: Final = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
+"""Name of a joint with a number near its end."""
+_STEPS_S: Final = (0.0005, 0.5)
+"""Steps between rows of a motion of servos, s (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +36,8 @@ class JointRequest:
 
     unit: str | None = None
     """One of ``UNITS``."""
+    time_unit: str | None = None
+    """One of ``TIME_UNITS``."""
     topic: str | None = None
     """Topic of a bag."""
     episode: int | None = None
@@ -72,6 +81,30 @@ def likely_unit(angles: Floats) -> tuple[str, float]:
     return ("deg" if largest > 2.0 * np.pi else "rad"), largest
 
 
+def time_unit(path: Path, time: Floats, column: str) -> float:
+    """Return the size in seconds of the unit of times (T,) without a stated one.
+
+    Seconds are assumed if no other unit gives steps that a recording of servos has.
+
+    Raises:
+        InputError: another unit is possible; proposes those that are.
+
+    """
+    steps = np.diff(time[np.isfinite(time)])
+    step = float(np.median(steps)) if len(steps) else 0.01
+    least_s, most_s = _STEPS_S
+    possible = [unit for unit, size in TIME_UNITS.items() if least_s <= step * size <= most_s]
+    if possible in ([], ["s"]):
+        return 1.0
+    length = float(np.nanmax(time) - np.nanmin(time))
+    readings = " or ".join(
+        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz (--time-unit {unit})"
+        for unit, size in TIME_UNITS.items()
+        if unit in {"s", *possible}
+    )
+    raise InputError(f"{path}: column {column} states no unit of time: {readings}")
+
+
 def joint_motion(
     path: Path,
     time_s: Floats,
@@ -110,9 +143,33 @@ def joint_motion(
     if missing:
         lines.append(
             f"{missing} rows are missing in {int((step_s > 1.5 * usual_s).sum())} gaps of up to "
-            f"{float(step_s.max()):.3g} s; the joints move evenly over them"
+            f"{float(step_s.max()):.3g} s"
         )
     return JointMotion(time_s - time_s[0], tuple(names), joint_rad, tuple(lines))
+
+
+def _in_order(names: Sequence[str], where: str) -> tuple[list[str], str]:
+    """Return names from head to tail, and what decides it.
+
+    Raises:
+        InputError: names of several stems are sorted as text: 10 stands before 2.
+
+    """
+    parts = [_NUMBERED.match(name) for name in names]
+    numbered = [(part[1], int(part[2])) for part in parts if part is not None]
+    stems = [stem for stem, _ in numbered]
+    if len(numbered) == len(names) and len(set(stems)) == 1:
+        by_number = sorted(zip([number for _, number in numbered], names, strict=True))
+        return [name for _, name in by_number], "number"
+    for stem in stems:
+        numbers = [number for each, number in numbered if each == stem]
+        if numbers != sorted(numbers):
+            raise InputError(
+                f"{where}: its joints {', '.join(names)} are in the order of the alphabet, which "
+                f"is not that of a body ({stem}{numbers[0]} to {stem}{numbers[-1]}); say --joint "
+                "ROBOT=FILE for each"
+            )
+    return list(names), "their order"
 
 
 def onto_robot(
@@ -121,7 +178,7 @@ def onto_robot(
     """Return angles (T, J) in the order of a robot's joints, and lines about the mapping.
 
     ``asked`` has priority, then equal names. If no name is equal and the numbers of joints agree,
-    joints are mapped in their order.
+    joints are mapped by the numbers in their names if all have one stem, else in their order.
 
     Args:
         motion: from a file.
@@ -130,7 +187,8 @@ def onto_robot(
         where: name of the file in messages.
 
     Raises:
-        InputError: a joint of the robot has no counterpart.
+        InputError: a joint of the robot has no counterpart, or the order contradicts the numbers
+            in the names.
 
     """
     wanted = robot.joint_names
@@ -142,11 +200,11 @@ def onto_robot(
             raise InputError(f"--joint {ours}={theirs}: {where} has {', '.join(found)}")
     pairs = {name: asked.get(name, name) for name in wanted}
     lost = [name for name, theirs in pairs.items() if theirs not in (*found, REST)]
-    by_order = False
+    source = "name"
     if lost and not asked and len(lost) == len(wanted) == len(found):
-        pairs = dict(zip(wanted, found, strict=True))
+        ordered, source = _in_order(found, where)
+        pairs = dict(zip(wanted, ordered, strict=True))
         lost = []
-        by_order = True
     if lost:
         raise InputError(
             f"{where}: the file has no joint for {', '.join(lost)} of {robot.name}, but "
@@ -159,7 +217,7 @@ def onto_robot(
         for theirs in (pairs[name] for name in wanted)
     ]
     listed = ", ".join(f"{ours} = {theirs}" for ours, theirs in pairs.items())
-    lines = [f"joints {'by their order' if by_order else 'by name'}: {listed}"]
+    lines = [f"joints by {source}: {listed}"]
     unused = [name for name in found if name not in pairs.values()]
     if unused:
         moved = np.ptp(motion.joint_rad, axis=0) > _STILL_RAD

@@ -18,9 +18,9 @@ from snakewalk.config.run import MOTIONS, WALKS, RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.plugins import find, require, unknown
 from snakewalk.controller.console.plugins import names as plugin_names
+from snakewalk.controller.motion.parted_recording import recording
 from snakewalk.controller.motion.policy import load_policy
 from snakewalk.controller.motion.policy_motion import PolicyMotion
-from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.run.assembly import assemble, load_body
 from snakewalk.controller.run.kinds.commanded_run import CommandedRun, MakeCommanded
 from snakewalk.controller.run.kinds.gait_run import GaitRun
@@ -228,19 +228,12 @@ def prepare_playback(
     *,
     robot: str | None = None,
     world: str | None = None,
-    speed: float | None = None,
-    scale: float = 1.0,
-    clip: bool = False,
     keys: Mapping[str, object] | None = None,
-    joints: Mapping[str, str] | None = None,
-    unit: str | None = None,
-    topic: str | None = None,
-    episode: int | None = None,
+    **playback: object,
 ) -> PlaybackRun:
     """Prepare to play a recording; ``keys`` as in ``prepare_walk``.
 
-    ``joints``, ``unit``, ``topic`` and ``episode`` state facts that a file of joint angles omits,
-    like the keys of ``[playback]``.
+    ``playback`` contains fields of ``PlaybackConfig``.
 
     Raises:
         InputError: the recording does not exist, bends joints too far, or is too fast.
@@ -254,15 +247,12 @@ def prepare_playback(
         "world": world or "flat",
         "track": track,
         "motion": "playback",
-        "playback": {
-            **{"speed": speed, "scale": scale, "clip": clip, "joints": dict(joints or {})},
-            **{"unit": unit, "topic": topic, "episode": episode},
-        },
+        "playback": playback,
     }
     _reject_legs(body)
     run, ground = assemble(fields, keys, body)
     prepared = PlaybackRun(run, body, ground)
-    Recorded(body, *prepared.joint_track).needs.check(body, "this recording")
+    recording(body, *prepared.joint_track).needs.check(body, "this recording")
     if "run.time_limit_s" in keys:
         return prepared
     limit = {"time_limit_s": prepared.duration_s + 30.0}

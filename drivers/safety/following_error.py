@@ -10,7 +10,7 @@ positions also count as slow.
 A constant current reading may hide a dead output stage. The current at rest is proportional to the
 output, which follows the error. If the joint is at rest and its error changes while its current
 does not, output stage or sensor is dead. A constant error shows nothing: an obstacle also causes a
-constant current.
+constant current. A current at the joint's own limit, towards the goal, shows a motor that pushes.
 """
 
 import math
@@ -44,6 +44,9 @@ that stands has to draw another current (ours). The current in a supply line gro
 of the output: a sensor there shows at least a fifth of the change."""
 CHANGED_LIMIT = 0.6
 """The same as a share of a lower limit of the current (ours): the limit varies with the supply."""
+AT_LIMIT = 0.15
+"""A current this close to a joint's own limit, as a share of it, is at the limit (ours). Towards
+the goal it shows that the motor pushes: a soft joint is held off its goal by the ground."""
 _FLOATS = readonly_array()
 
 
@@ -260,6 +263,9 @@ def _steady_joint(
             continue
         steady[3, k] = min(steady[3, k], expected_a)
         steady[4, k] = max(steady[4, k], expected_a)
+        pushing_a = current_a[k] if error > 0.0 else -current_a[k]
+        if (1.0 - AT_LIMIT) * limit_a <= pushing_a <= (1.0 + AT_LIMIT) * limit_a:
+            continue  # it pushes with all that it may, and friction holds it there
         if (
             found < 0
             and share >= IDLE_OUTPUT

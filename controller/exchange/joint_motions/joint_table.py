@@ -11,18 +11,23 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
+    TIME_UNITS,
     UNITS,
     JointMotion,
     JointRequest,
     joint_motion,
     likely_unit,
+    time_unit,
 )
 
 _TIME: Final = {
-    **dict.fromkeys(("time", "time_s", "t", "t_s", "timestamp", "seconds"), 1.0),
-    **dict.fromkeys(("time_ms", "t_ms"), 1e-3),
-    **dict.fromkeys(("time_ns", "timestamp_ns"), 1e-9),
+    **dict.fromkeys(("time", "t", "timestamp"), None),
+    **dict.fromkeys(("time_s", "t_s", "timestamp_s", "seconds"), "s"),
+    **dict.fromkeys(("time_ms", "t_ms", "timestamp_ms"), "ms"),
+    **dict.fromkeys(("time_us", "t_us", "timestamp_us"), "us"),
+    **dict.fromkeys(("time_ns", "t_ns", "timestamp_ns"), "ns"),
 }
+"""Names of the column of time, and the unit that each states."""
 _OTHERS: Final = {"frame", "point", "frame_idx", "scorer"}
 _UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
 _SEPARATORS: Final = (",", ";", "\t")
@@ -81,8 +86,19 @@ class JointTable:
                         f"{path}: line {line}: {cells[k]}: expected a number, found {text!r}"
                     ) from None
         unit = _unit_of(path, units, request, values[:, 1:])
-        time_s = values[:, 0] * _TIME[_plain(cells[0])]
+        time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])
+
+
+def _second(path: Path, column: str, request: JointRequest, time: Floats) -> float:
+    """Return the size in seconds of the unit that the column of time or the user states."""
+    unit = _TIME[_plain(column)]
+    if unit is not None and request.time_unit not in (None, unit):
+        raise InputError(
+            f"--time-unit {request.time_unit}: {path} states {unit}; leave the option out"
+        )
+    unit = unit or request.time_unit
+    return time_unit(path, time, column) if unit is None else TIME_UNITS[unit]
 
 
 def _plain(name: str) -> str:

@@ -77,10 +77,17 @@ Row = tuple[float, tuple[str, ...], Any]
 
 
 def _states(messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
-    """Times, names and positions of JointState messages, by their stamps where they have one."""
+    """Times, names and positions of JointState messages.
+
+    All times are stamps if any message has one: in simulated time the first stamp may be 0.
+    """
+    rows = []
     for received, message in messages:
         stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
-        yield stamp_s or 1e-9 * received, tuple(message.name), message.position
+        rows.append((stamp_s, 1e-9 * received, tuple(message.name), message.position))
+    has_stamps = any(stamp_s for stamp_s, *_ in rows)
+    for stamp_s, received_s, names, positions in rows:
+        yield stamp_s if has_stamps else received_s, names, positions
 
 
 def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:

@@ -281,6 +281,10 @@ def _plan_limits(
     return keys
 
 
+_TURN_RAD: Final = 4.0 * math.pi
+_DEGREES: Final = "; if the file means degrees, convert its limits to radians"
+
+
 def _joints(
     model: mujoco.MjModel,
     tree: BodyTree,
@@ -314,7 +318,7 @@ def _joints(
         elif half < high:
             notes.append(
                 f"joint {hinge.name}: its range of {high:.3g} rad is cut to {half:g}: a servo "
-                "knows one turn"
+                f"knows one turn{_DEGREES if high > _TURN_RAD else ''}"
             )
         sign = _sign(hinge, yaw, directions, reverse)
         tables.append({"axis": "y" if yaw else "p", "sign": sign, "limit_rad": half})

@@ -61,6 +61,7 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
                 "here is a servo"
             )
     _drop_repeated(source)
+    _check_limits(root, path)
     driven = _driven(root)
     source.actuated = driven or None
     source.friction = _friction(root)
@@ -127,7 +128,10 @@ def _drop_unread(source: ModelSource) -> None:
 
 
 def _first_link(source: ModelSource, path: Path) -> str:
-    """Name of the link on which all hang; a ``world`` that only holds it is dropped.
+    """Name of the link on which all hang; a frame that only holds it is dropped.
+
+    Such a frame is the link ``world``, or a link without mass and shape that holds the robot by a
+    floating or planar joint.
 
     Raises:
         InputError: no link is the root, several are, or the root is bolted to the world.
@@ -150,9 +154,9 @@ def _first_link(source: ModelSource, path: Path) -> str:
         listed = ", ".join(first) or "each hangs on another"
         raise InputError(f"{path}: one link must be the first, on which all hang: {listed}")
     here = first[0]
-    if here != "world":
-        return here
     holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == here]
+    if here != "world" and not _is_free_base(root, here, holding):
+        return here
     turning = [j for j in holding if j.get("type") not in ("fixed", "floating", "planar")]
     if turning:
         raise InputError(
@@ -162,15 +166,41 @@ def _first_link(source: ModelSource, path: Path) -> str:
         )
     if len(holding) != 1:
         held = ", ".join(str(_end(joint, "child")) for joint in holding) or "nothing"
-        raise InputError(f"{path}: link world holds {held}; one robot is read at a time")
+        raise InputError(f"{path}: link {here} holds {held}; one robot is read at a time")
     root.remove(holding[0])
     root.remove(next(link for link in root.findall("link") if link.get("name") == here))
     name_held = _end(holding[0], "child")
     kind = holding[0].get("type")
     source.notes.append(
-        f"link world is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
+        f"link {here} is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
     )
-    return str(name_held)
+    return _first_link(source, path)
+
+
+def _is_free_base(root: LineElement, name: str, holding: list[LineElement]) -> bool:
+    """Whether a link is a mere frame from which the robot moves freely."""
+    link = next(each for each in root.findall("link") if each.get("name") == name)
+    is_frame = not any(child.tag in ("inertial", "visual", "collision") for child in link)
+    return is_frame and [joint.get("type") for joint in holding] in (["floating"], ["planar"])
+
+
+def _check_limits(root: LineElement, path: Path) -> None:
+    """Reject limits in the wrong order; MuJoCo would ignore both.
+
+    Raises:
+        InputError: with the joint and its line.
+
+    """
+    for joint in children(root, "joint"):
+        limit = joint.find("limit")
+        low, high = (
+            numbers(None if limit is None else limit.get(key), 1) for key in ("lower", "upper")
+        )
+        if low is not None and high is not None and low[0] > high[0]:
+            raise InputError(
+                f"{path}: joint {joint.get('name')}, {joint.where}: its lower limit of {low[0]:g} "
+                f"is above its upper limit of {high[0]:g}; exchange them"
+            )
 
 
 def _end(joint: object, end: str) -> str | None:

@@ -14,6 +14,7 @@ from snakewalk.config.world import WaterGround
 from snakewalk.controller.console.plugins import plugins
 from snakewalk.controller.mechanics.thrust import forward_speed_m_s
 from snakewalk.controller.motion.joint_motion import JointReader, JointRequest, onto_robot
+from snakewalk.controller.motion.parted_recording import PartedRecording, gaps, recording
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
@@ -35,18 +36,16 @@ def foreign_joints(
     """
     path = Path(track)
     reader = _reader(path)
-    chosen = {"joints": asked.joints, "unit": asked.unit, "topic": asked.topic}
-    given = [
-        name
-        for name, value in {**chosen, "episode": asked.episode}.items()
-        if value not in (None, {})
-    ]
+    names = ("joints", "unit", "time_unit", "topic", "episode")
+    given = [name for name in names if getattr(asked, name) not in (None, {})]
     if reader is None:
         if given:
-            option = "--joint" if given[0] == "joints" else f"--{given[0]}"
+            option = "--joint" if given[0] == "joints" else f"--{given[0].replace('_', '-')}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None
-    motion = reader.read(path, JointRequest(asked.unit, asked.topic, asked.episode))
+    motion = reader.read(
+        path, JointRequest(asked.unit, asked.time_unit, asked.topic, asked.episode)
+    )
     angles, lines = onto_robot(motion, robot, asked.joints, track)
     return motion.time_s, angles, lines
 
@@ -115,7 +114,17 @@ class PlaybackRun(PathlessRun):
     @property
     def notes(self) -> tuple[str, ...]:
         """Lines about the mapping of joints, and about omitted or changed parts."""
-        return () if self._foreign is None else self._foreign[2]
+        lines = () if self._foreign is None else self._foreign[2]
+        time_s = self.joint_track[0]
+        cuts = gaps(time_s)
+        if not len(cuts):
+            return lines
+        longest_s = float((time_s[cuts] - time_s[cuts - 1]).max())
+        return (
+            *lines,
+            f"the joints come to rest at each of {len(cuts)} gaps, of up to {longest_s:.3g} s, "
+            "and move evenly from the row before to the row after",
+        )
 
     @property
     def _asked(self) -> PlaybackConfig:
@@ -125,7 +134,7 @@ class PlaybackRun(PathlessRun):
     def speed(self) -> float:
         """Speed of the playback over the animal's own."""
         asked = self._asked.speed
-        most = 1.0 / Recorded(self.robot, *self.joint_track).slowed
+        most = 1.0 / self._recorded(1.0).slowed
         if asked is not None and asked > most > 0.0 and self._recorded(asked).slowed > 1.0:
             raise InputError(
                 f"--speed {asked:g}: the joints of {self.robot.name} follow {self.run.track} up to "
@@ -190,6 +199,5 @@ class PlaybackRun(PathlessRun):
             on_event("limit", f"played at {self.speed:.2f} times the animal's speed")
         return self._recorded(self.speed)
 
-    def _recorded(self, speed: float) -> Recorded:
-        time_s, joints = self.joint_track
-        return Recorded(self.robot, time_s / speed, joints)
+    def _recorded(self, speed: float) -> Recorded | PartedRecording:
+        return recording(self.robot, *self.joint_track, speed)

@@ -263,3 +263,63 @@ def test_real_points_of_a_hillside(shared_data: Path) -> None:
     rows, columns = read.elevation.z_m.shape
     middle = read.elevation.z_m[rows // 2 - 4 : rows // 2 + 5, columns // 2 - 4 : columns // 2 + 5]
     assert np.nanmedian(middle) == pytest.approx(0.03 * np.median(ground[near, 2]), abs=0.1)
+
+
+DEGREES = np.stack(
+    [8.0 + 1e-5 * X.ravel(), 47.0 + 1e-5 * Y.ravel(), 100.0 + 10.0 * HILL.ravel()], axis=-1
+)
+"""Longitude, latitude and height: 4 m of x are 4e-5 degrees."""
+SIZE_M = (3.038, 3.224)
+"""4e-5 degrees of longitude at 47 degrees north, and 2.9e-5 of latitude: 75.96 km and 111.17 km a
+degree (WGS 84, e.g. the table of the National Geospatial-Intelligence Agency)."""
+
+
+@pytest.mark.parametrize("ending", ["csv", "xyz"])
+def test_points_that_may_be_degrees_are_asked_about_with_both_readings(
+    tmp_path: Path, ending: str
+) -> None:
+    file = tmp_path / f"a.{ending}"
+    np.savetxt(file, DEGREES, fmt="%.9f", delimiter="," if ending == "csv" else " ")
+    with pytest.raises(InputError, match=r"--unit deg.*3\.0\d* m by 3\.2\d* m.*--unit m"):
+        read_elevation(file, MapOptions())
+    found = read_elevation(file, MapOptions(RasterUnits(unit="deg")))
+    np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
+    assert found.relief_m == pytest.approx(10.0 * np.ptp(HILL), rel=0.1)
+    far = POINTS + np.array([500.0, 0.0, 0.0])
+    np.savetxt(file, far, delimiter="," if ending == "csv" else " ")
+    with pytest.raises(InputError, match="longitude, latitude and height"):
+        read_elevation(file, MapOptions(RasterUnits(unit="deg")))
+
+
+@pytest.mark.parametrize("names", ["lon,lat,z", "longitude,latitude,elevation"])
+def test_columns_named_as_degrees_are_degrees_in_any_order(tmp_path: Path, names: str) -> None:
+    np.savetxt(tmp_path / "a.csv", DEGREES, fmt="%.9f", delimiter=",", header=names, comments="")
+    first, second, height = names.split(",")
+    turned = f"{second},{first},{height}"
+    swapped = DEGREES[:, [1, 0, 2]]
+    np.savetxt(tmp_path / "b.csv", swapped, fmt="%.9f", delimiter=",", header=turned, comments="")
+    for name in ("a.csv", "b.csv"):
+        found = read_elevation(tmp_path / name, MapOptions())
+        np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
+        assert any("degrees, as their names state" in note for note in found.notes)
+
+
+def test_small_scans_near_their_origin_are_metres(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.xyz", 0.2 * POINTS)
+    assert read_elevation(tmp_path / "a.xyz", MapOptions()).size_m == pytest.approx((0.8, 0.58))
+
+
+def test_a_raster_of_classes_is_rejected(tmp_path: Path) -> None:
+    file = tmp_path / "classes.tif"
+    size = {"height": ROWS, "width": COLUMNS, "count": 1, "dtype": "uint8"}
+    place = {"transform": from_origin(500.0, 700.0, 0.1, 0.1), "crs": "EPSG:32632"}
+    with rasterio.open(file, "w", driver="GTiff", **size, **place) as out:
+        out.write((HILL * 10).astype("uint8"), 1)
+        out.write_colormap(1, {k: (k, k, 0, 255) for k in range(256)})
+    with pytest.raises(InputError, match="marked as palette: its values are classes, not heights"):
+        read_elevation(file, MapOptions())
+    rgba = {"height": ROWS, "width": COLUMNS, "count": 4, "dtype": "uint16", "photometric": "RGB"}
+    with rasterio.open(file, "w", driver="GTiff", **rgba, **place) as out:
+        out.write(np.repeat((HILL * 1000).astype("uint16")[None], 4, axis=0))
+    with pytest.raises(InputError, match="marked as red: its values are a picture, not heights"):
+        read_elevation(file, MapOptions())

@@ -412,19 +412,20 @@ def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() ->
     assert "rolling" in panel._gait.options
     inputs = panel._inputs
     assert set(inputs) == set(defaults)
-    assert inputs["frequency_hz"].label == "frequency, Hz"
+    frequency = inputs["frequency_hz"]
+    assert frequency.label == "frequency, Hz"
     assert panel.commands(1.0) == []  # what `show` sets is no command
     for value in (0.6, 0.61, 0.62):
         moved_by_a_browser(panel, "frequency_hz", value)
-    panel._inputs["frequency_hz"].value = 0.62
+    frequency.value = 0.62
     assert panel.commands(1.0) == ["frequency_hz=0.62"]
     moved_by_a_browser(panel, "mirror", True)
     assert panel.commands(1.1) == []  # too soon after the last
     panel.show("sidewinding", defaults | {"frequency_hz": 0.61})
-    assert panel._inputs["frequency_hz"].value == 0.62  # it is being moved
+    assert frequency.value == 0.62  # it is being moved
     assert panel.commands(1.25) == ["mirror=1"]
     panel.commands(2.3)
-    assert panel._inputs["frequency_hz"].value == 0.61  # as the run has it
+    assert frequency.value == 0.61  # as the run has it
     panel.show("rolling", make_gait("rolling").params.model_dump())
     assert panel._gait.value == "rolling"
     assert "waves" not in panel._inputs

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from snakewalk.drivers.safety.following_error import IDLE_TIME_S, FollowingError
-from tests.drivers.safety.test_following_error import JUDGED
+from tests.drivers.safety.test_following_error import JUDGED, LIMIT_A
 from tests.drivers.safety.test_safety_vet import J, one, state
 
 
@@ -89,6 +89,16 @@ def test_the_expected_current_must_change_enough(
 def test_an_error_that_friction_can_hold_shows_nothing() -> None:
     assert steady(ramp(-0.049, 0.049), amps=0.5) is None
     assert steady(ramp(-0.049, 0.05), amps=0.5) is not None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_soft_joint_that_pushes_at_its_own_limit_is_held_off_by_the_ground(sign: float) -> None:
+    """A pitch joint that pressed against a steep ground ended a sound run."""
+    errors = [sign * error for error in ramp(0.004, 0.12)]
+    assert steady(errors, joint=1, amps=sign * LIMIT_A) is None
+    assert steady(errors, joint=1, amps=0.9 * sign * LIMIT_A) is None
+    assert steady(errors, joint=1, amps=0.8 * sign * LIMIT_A) is not None
+    assert steady(errors, joint=1, amps=-sign * LIMIT_A) is not None, "away from the goal"
 
 
 @pytest.mark.parametrize(("joint", "change_a"), [(0, 0.02), (0, -0.02), (1, 0.003)])

@@ -28,7 +28,13 @@ def table(path: Path, header: list[str], values: np.ndarray = ANGLES, separator:
     path.write_text("\n".join(rows) + "\n")
 
 
-def bag(path: Path, joints: tuple[str, ...] = NAMES, *, trajectory: bool = False) -> None:
+def bag(
+    path: Path,
+    joints: tuple[str, ...] = NAMES,
+    *,
+    trajectory: bool = False,
+    start_s: float = 7.0,
+) -> None:
     from mcap.writer import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -61,7 +67,7 @@ def bag(path: Path, joints: tuple[str, ...] = NAMES, *, trajectory: bool = False
         for k, (at, row) in enumerate(zip(TIME_S, ANGLES, strict=True)):
             order = np.roll(np.arange(len(joints)), k % 2)  # publishers may change the order
             named = [joints[n] for n in order]
-            stamp = header(time(*parts(7.0 + at)), "")
+            stamp = header(time(*parts(start_s + at)), "")
             send("/joint_states", kind, 7.0 + at, types[kind](stamp, named, row[order], none, none))
     writer.finish()
 
@@ -165,7 +171,7 @@ def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
     notes = plays(tmp_path / "set", 0.5 * ANGLES, episode=1, unit="deg", joints=joints)
     assert f"{NAMES[0]} = {NAMES[0]}.pos" in notes[0]
     assert notes[1] == f"episode 1 of 2, observation.state, LeRobot {version}"
-    assert plays(tmp_path / "set", episode=0, unit="deg")[0].startswith("joints by their order")
+    assert plays(tmp_path / "set", episode=0, unit="deg")[0].startswith("joints by number")
 
 
 def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
@@ -193,7 +199,7 @@ def test_gaps_and_rows_without_a_value_are_counted() -> None:
     motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles)
     assert motion.notes == (
         "1 of 51 rows lack a value and are left out",
-        "10 rows are missing in 2 gaps of up to 0.5 s; the joints move evenly over them",
+        "10 rows are missing in 2 gaps of up to 0.5 s",
     )
 
 
@@ -223,7 +229,77 @@ def test_faults_of_a_table(make: Callable[[Path], None], said: str, tmp_path: Pa
 def test_options_of_joint_files_are_rejected_for_midlines() -> None:
     with pytest.raises(InputError, match="--unit: worm-like has no joint angles with names"):
         prepare_playback("worm-like", unit="rad")
-    assert snakewalk("play", "worm-like", "--unit", "grad").stderr.count("expected rad or deg") == 1
+    assert (
+        snakewalk("play", "worm-like", "--unit", "grad").stderr.count("is not one of 'rad', 'deg'")
+        == 1
+    )
+
+
+def in_order(path: Path, joints: list[str]) -> str:
+    """Return how the joints of a table are mapped onto yaw16."""
+    table(path, ["time_s", *(f"{name}_rad" for name in joints)])
+    (line, *_) = prepare_playback(str(path)).notes
+    return line
+
+
+def test_names_of_one_stem_are_mapped_by_their_numbers(tmp_path: Path) -> None:
+    alphabet = sorted(f"joint_{k}" for k in range(1, 17))
+    assert alphabet[1] == "joint_10"
+    line = in_order(tmp_path / "a.csv", alphabet)
+    assert line.startswith("joints by number: yaw_01 = joint_1, yaw_02 = joint_2, yaw_03 = joint_3")
+    prepared = prepare_playback(str(tmp_path / "a.csv"))
+    np.testing.assert_allclose(
+        prepared.joint_track[1][:, 1], ANGLES[:, alphabet.index("joint_2")], atol=1e-5
+    )
+
+
+def test_names_of_several_stems_are_mapped_in_their_order_unless_their_numbers_are_not(
+    tmp_path: Path,
+) -> None:
+    mixed = [f"{'ab'[k % 2]}{k}" for k in range(16)]
+    assert in_order(tmp_path / "a.csv", mixed).startswith("joints by their order: yaw_01 = a0")
+    with pytest.raises(InputError, match=r"in the order of the alphabet.*--joint ROBOT=FILE"):
+        in_order(tmp_path / "b.csv", sorted(mixed))
+
+
+@pytest.mark.parametrize(
+    ("column", "size", "said"),
+    [
+        ("timestamp", 1e3, r"5\.98 s at 50 Hz|\(--time-unit ms\)"),
+        ("time", 1e9, r"\(--time-unit ns\)"),
+        ("t", 1e6, r"\(--time-unit us\)"),
+    ],
+)
+def test_a_unit_of_time_that_no_column_states_is_asked_for(
+    column: str, size: float, said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.csv"
+    table(path, [column, *(f"{name}_rad" for name in NAMES)])
+    lines = path.read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    path.write_text(
+        "\n".join(
+            [lines[0], *(",".join([f"{size * float(row[0]):.0f}", *row[1:]]) for row in rows)]
+        )
+    )
+    with pytest.raises(InputError, match=said):
+        prepare_playback(str(path))
+    unit = {1e3: "ms", 1e6: "us", 1e9: "ns"}[size]
+    time_s, _ = prepare_playback(str(path), time_unit=unit).joint_track
+    np.testing.assert_allclose(time_s, TIME_S, atol=1e-3)
+
+
+def test_a_stated_unit_of_time_is_not_asked_for(tmp_path: Path) -> None:
+    table(tmp_path / "a.csv", ["time_s", *(f"{name}_rad" for name in NAMES)])
+    with pytest.raises(InputError, match="states s; leave the option out"):
+        prepare_playback(str(tmp_path / "a.csv"), time_unit="ms")
+
+
+def test_a_bag_whose_first_stamp_is_zero_has_one_clock(tmp_path: Path) -> None:
+    bag(tmp_path / "b.mcap", start_s=0.0)
+    prepared = prepare_playback(str(tmp_path / "b.mcap"))
+    np.testing.assert_allclose(prepared.joint_track[0], TIME_S, atol=1e-6)
+    assert not [line for line in prepared.notes if "missing" in line]
 
 
 def test_a_run_logs_the_mapping(tmp_path: Path) -> None:

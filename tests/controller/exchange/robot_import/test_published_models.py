@@ -203,6 +203,32 @@ def test_a_link_world_is_dropped(tmp_path: Path) -> None:
     assert noted(made, "link world is dropped: nothing joins it")
 
 
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_a_frame_that_holds_the_robot_freely_is_dropped_whatever_its_name(
+    tmp_path: Path, kind: str
+) -> None:
+    def free(name: str, child: str) -> str:
+        return (
+            f'<link name="{name}"/><joint name="to_{child}" type="{kind}"><parent link="{name}"/>'
+            f'<child link="{child}"/></joint>'
+        )
+
+    made = imported(tmp_path, urdf(before=free("map", "odom") + free("odom", "l0")))
+    assert made.robot.model_dump() == imported(tmp_path, urdf()).robot.model_dump()
+    assert noted(made, f"link map is dropped: it holds odom by the {kind} joint to_odom")
+    assert noted(made, f"link odom is dropped: it holds l0 by the {kind} joint to_l0")
+
+
+def test_limits_in_the_wrong_order_are_rejected_and_large_ones_may_be_degrees(
+    tmp_path: Path,
+) -> None:
+    text = urdf()
+    with pytest.raises(InputError, match=r"joint j0, line \d+: its lower limit of 1.2 is above"):
+        imported(tmp_path, text.replace('lower="-1.2" upper="1.2"', 'lower="1.2" upper="-1.2"'))
+    made = imported(tmp_path, text.replace('lower="-1.2" upper="1.2"', 'lower="-90" upper="90"'))
+    assert noted(made, "if the file means degrees, convert its limits to radians")
+
+
 def test_repeated_elements_count_once_and_are_named_with_the_users_lines(tmp_path: Path) -> None:
     twice = '<dynamics damping="0.1"/>\n<dynamics damping="0.7"/>'
     made = imported(tmp_path, urdf(inside=twice))

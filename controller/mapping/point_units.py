@@ -1,0 +1,92 @@
+"""Points of a file in metres: their unit is stated by the user or column names, or asked for."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.length_units import DEGREE, degree_cell_m, unit_m
+from snakewalk.controller.mapping.raster_file import RasterUnits
+
+_LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
+_LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
+_MOST_DEGREES: Final = 1.0
+"""Larger ground is not a ground for a robot (ours)."""
+_FAR: Final = 20.0
+"""Points that are this many times their extent from the origin may be places on earth (ours)."""
+
+
+def points_in_metres(
+    file: Path, points: Floats, names: Sequence[str], units: RasterUnits, notes: list[str]
+) -> Floats:
+    """Return points (n, 3) in metres; longitude and latitude become metres east and north.
+
+    Args:
+        file: for errors.
+        points: as in the file.
+        names: of its columns, or none.
+        units: stated by the user.
+        notes: lines about what was concluded are appended.
+
+    Raises:
+        InputError: the points may be degrees (the question), or a point has too few numbers.
+
+    """
+    if points.shape[1] != 3:
+        raise InputError(f"{file}: holds {points.shape[1]} numbers a point; x, y and z are needed")
+    if units.no_data is not None:
+        points = np.where(points == units.no_data, np.nan, points)
+    unit = units.unit
+    columns = _columns(names)
+    if columns is not None:
+        points = points[:, columns]
+        if unit is None:
+            unit = DEGREE
+            notes.append(f"columns {', '.join(names)}: degrees, as their names state")
+    if unit is None:
+        _ask(file, points)
+        unit = "m"
+    rise_m = unit_m(units.height_unit or ("m" if unit == DEGREE else unit))
+    if unit != DEGREE:
+        return np.asarray(points * [unit_m(unit), unit_m(unit), rise_m])
+    if not _is_on_earth(points):
+        raise InputError(f"{file}: --unit deg: expected longitude, latitude and height in columns")
+    return np.asarray(points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m])
+
+
+def _columns(names: Sequence[str]) -> list[int] | None:
+    """Columns of longitude, latitude and height; None if names do not state them."""
+    latitudes = [k for k, name in enumerate(names) if _LATITUDE.fullmatch(name.strip(" \"'"))]
+    longitudes = [k for k, name in enumerate(names) if _LONGITUDE.fullmatch(name.strip(" \"'"))]
+    if len(names) != 3 or len(latitudes) != 1 or len(longitudes) != 1:
+        return None
+    return [longitudes[0], latitudes[0], 3 - longitudes[0] - latitudes[0]]
+
+
+def _latitude(points: Floats) -> float:
+    return float(np.nanmedian(points[:, 1]))
+
+
+def _is_on_earth(points: Floats) -> bool:
+    size = np.nanmax(np.abs(points[:, :2]), axis=0, initial=0.0)
+    return bool(size[0] <= 360.0 and size[1] <= 90.0)
+
+
+def _ask(file: Path, points: Floats) -> None:
+    """Ask for the unit of points that may be degrees: small, and far from the origin."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) < 2 or not _is_on_earth(finite):
+        return
+    extent = np.ptp(finite[:, :2], axis=0)
+    distance = np.abs(finite[:, :2].mean(axis=0)).max()
+    if extent.max() > _MOST_DEGREES or distance < _FAR * extent.max():
+        return
+    east_m, north_m = degree_cell_m(float(extent[0]), float(extent[1]), _latitude(finite))
+    raise InputError(
+        f"{file}: states no unit of x and y: degrees (--unit deg) make a ground of {east_m:.4g} m "
+        f"by {north_m:.4g} m, metres (--unit m) one of {extent[0]:.4g} m by {extent[1]:.4g} m"
+    )
