@@ -2,15 +2,17 @@
 
 ::
 
-    DriverError                    everything below ├── ProtocolError              bytes that are
-    not a packet │   └── StuffingError          ``FF FF FD`` in a payload without its stuffed ``FD``
-    ├── BusError                   a servo did not do what an instruction asked │   ├──
-    NoAnswerError          no status packet before the deadline │   └── ServoError             a
-    status packet that carries a result error ├── SafetyTrippedError         the safety layer has
-    latched; an operator must reset it ├── PortError (InputError)     the port is missing, denied,
-    busy, or vanished ├── ChainError (InputError)    the servos found are not the robot described
-    ├── ControlTableError (InputError)  unknown servo model, register or unit └── BudgetError
-    (InputError)   the cycle does not fit the wire
+    DriverError                         everything below
+    ├── ProtocolError                   bytes that are not a packet
+    │   └── StuffingError               ``FF FF FD`` in a payload without its stuffed ``FD``
+    ├── BusError                        a servo did not do what an instruction asked
+    │   ├── NoAnswerError               no status packet before the deadline
+    │   └── ServoError                  a status packet that carries a result error
+    ├── SafetyTrippedError              the safety layer has latched; an operator must reset it
+    ├── PortError (InputError)          the port is missing, denied, busy, or vanished
+    ├── ChainError (InputError)         the servos found are not the robot described
+    ├── ControlTableError (InputError)  unknown servo model, register or unit
+    └── BudgetError (InputError)        the cycle does not fit the wire
 
 The last four state faults of the user's input, one line each; the command line prints them and
 exits with code 2.

@@ -243,8 +243,8 @@ def _add_friction(
         roller = ET.SubElement(bodies[f"link{link}"], "body", name=f"roller{link}", pos=place)
         hinge = ET.SubElement(roller, "joint", name=f"roller{link}", axis="0 1 0")
         hinge.set("frictionloss", repr(friction.along * mass_kg * GRAVITY_M_S2 * radius_m))
-        ball = ET.SubElement(roller, "geom", type="sphere", size=repr(radius_m), **grip)
-        ball.attrib.update({"mass": repr(roller_kg), "contype": "0", "conaffinity": "1"})
+        ball = ET.SubElement(roller, "geom", type="sphere", size=repr(radius_m))
+        ball.attrib.update(grip | {"mass": repr(roller_kg), "contype": "0", "conaffinity": "1"})
 
 
 def _add_dc_motors(root: ET.Element, robot: RobotConfig) -> None:
