@@ -8,7 +8,10 @@ in the cache of its home folder, or in the folder for temporary files.
 import os
 import stat
 import tempfile
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache
+from types import CodeType
 from typing import Any
 
 from numba.core import caching
@@ -72,11 +75,13 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
     def __init__(self, py_func: Any) -> None:
         super().__init__(py_func)
         impl = self._impl
+        stamp = (impl.locator.get_source_stamp(), tuple(sorted(_called(py_func, {py_func}))))
         stored = caching.InTreeCacheLocator(py_func, impl.locator._py_file)
-        self._stored = caching.IndexDataCacheFile(
-            cache_path=stored.get_cache_path(),
-            filename_base=impl.filename_base,
-            source_stamp=impl.locator.get_source_stamp(),
+        self._cache_file, self._stored = (
+            caching.IndexDataCacheFile(
+                cache_path=path, filename_base=impl.filename_base, source_stamp=stamp
+            )
+            for path in (self._cache_path, stored.get_cache_path())
         )
         self._has_stored = isinstance(impl.locator, caching.UserWideCacheLocator)
 
@@ -116,6 +121,38 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
             return None
         finally:
             self._cache_file = usual
+
+
+def _called(loop: Any, known: set[Any]) -> Iterator[str]:
+    """Describe the numbers and the functions of other files that are compiled into a loop.
+
+    numba compares only the loop's own file, and would go on with the former text of the others.
+    """
+    for name in _names(loop.__code__):
+        value = loop.__globals__.get(name)
+        if isinstance(value, int | float | str | tuple):
+            yield f"{name} = {value!r}"
+            continue
+        function = getattr(value, "py_func", value)
+        if not hasattr(function, "__code__") or function in known:
+            continue
+        known.add(function)
+        with suppress(OSError):  # in an archive
+            yield f"{name}: {_file_stamp(function.__code__.co_filename)}"
+        yield from _called(function, known)
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+@cache
+def _file_stamp(file: str) -> tuple[float, int]:
+    info = os.stat(file)
+    return info.st_mtime, info.st_size
 
 
 def _folder_name() -> str:

@@ -91,3 +91,31 @@ def test_stored_loops_serve_accounts_that_cannot_write_next_to_them(folder: Path
         lines = start(folder, READ_ONLY="1", TMPDIR=str(temporary))
         assert lines == ["4.0 6.0 0"]
     assert not list((folder / "tmp").rglob("*.nb?"))
+
+
+@pytest.mark.slow
+def test_a_loop_is_compiled_again_if_a_function_or_number_of_another_file_changes(
+    folder: Path,
+) -> None:
+    (folder / "loops.py").write_text(
+        "from snakewalk.drivers.compiling import compiled\n"
+        "from numbers_of_it import FACTOR\n"
+        "from parts import part\n"
+        '@compiled("float64(float64)")\n'
+        "def loop(value):\n"
+        "    return FACTOR * part(value)\n"
+        "print(loop(2.0), loop.stats.cache_misses.total())\n"
+    )
+    part = "from snakewalk.drivers.compiling import compiled\nfrom inner import inner\n"
+    part += '@compiled("float64(float64)")\ndef part(value):\n    return inner(value)\n'
+    inner = "from numba import njit\n@njit\ndef inner(value):\n    return value + {}\n"
+    (folder / "numbers_of_it.py").write_text("FACTOR = 2.0\n")
+    (folder / "parts.py").write_text(part)
+    (folder / "inner.py").write_text(inner.format("1.0"))
+    assert start(folder) == ["6.0 1"]
+    assert start(folder) == ["6.0 0"]
+    (folder / "numbers_of_it.py").write_text("FACTOR = 3.0\n")
+    assert start(folder) == ["9.0 1"]
+    (folder / "inner.py").write_text(inner.format("10.0"))
+    assert start(folder) == ["36.0 1"]
+    assert start(folder) == ["36.0 0"]

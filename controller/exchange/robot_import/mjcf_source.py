@@ -1,5 +1,6 @@
 """MJCF prepared for MuJoCo: one file, without the parts that a robot file does not use."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,6 +44,8 @@ _OLD: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
 """Attributes of older MuJoCo versions that this one does not know."""
 _FILES: Final = ("file",)
 _MOST_INCLUDES: Final = 50
+_ROLLER: Final = re.compile(r"roller\d+")
+"""Name of a body that an exported robot rolls on."""
 _MARK_M: Final = "0.0001"
 """Radius of the ball that carries a missing mesh's mass."""
 
@@ -73,10 +76,27 @@ def prepare_mjcf(root: LineElement, path: Path, assumed: Assumptions) -> ModelSo
         if name
     )
     _drop_unread(source)
+    _join_rollers(source)
     defaults = _Defaults.of(root)
     _resolve_meshes(source, path, defaults, assumed)
     source.massless_geoms = frozenset(_massless(root, defaults))
     return source
+
+
+def _join_rollers(source: ModelSource) -> None:
+    """Give the mass of the rollers of an exported robot back to their links."""
+    joined = 0
+    for link, roller in parents_of(source.root):
+        inertial = link.find("inertial")
+        if not _ROLLER.fullmatch(roller.get("name", "")) or roller.tag != "body":
+            continue
+        if inertial is not None:
+            parts = [inertial, *roller.findall("geom")]
+            inertial.set("mass", repr(sum(float(part.get("mass", "0")) for part in parts)))
+        link.remove(roller)
+        joined += 1
+    if joined:
+        source.notes.append(f"{joined} rollers of an exported robot are part of their links")
 
 
 def _include(root: LineElement, path: Path) -> None:

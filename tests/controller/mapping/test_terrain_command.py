@@ -68,6 +68,7 @@ def test_a_file_becomes_a_world_that_is_planned_on(tmp_path: Path) -> None:
         planner.plan([(-3.0, 0.0), (0.5, 0.0)])
 
 
+@pytest.mark.costs("runs the command for each fault")
 def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path: Path) -> None:
     file, world = hollow(tmp_path), tmp_path / "w.toml"
     words = ("world", "from", file, "-o", world)

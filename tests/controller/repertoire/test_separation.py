@@ -47,6 +47,7 @@ def test_two_bodies_that_meet_head_on_stop_before_they_touch(repertoire: Reperto
     assert not len(separated.intersecting())
 
 
+@pytest.mark.slow
 def test_the_body_that_moves_into_a_resting_one_is_the_one_that_waits(
     repertoire: Repertoire,
 ) -> None:
