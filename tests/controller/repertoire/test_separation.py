@@ -13,6 +13,8 @@ from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.separation import NONE, SeparatedCrowd
 
+pytestmark = pytest.mark.costs("the first test compiles the loops of a crowd")
+
 RADIUS_M = np.full(17, 0.025)
 
 
@@ -47,7 +49,6 @@ def test_two_bodies_that_meet_head_on_stop_before_they_touch(repertoire: Reperto
     assert not len(separated.intersecting())
 
 
-@pytest.mark.slow
 def test_the_body_that_moves_into_a_resting_one_is_the_one_that_waits(
     repertoire: Repertoire,
 ) -> None:
