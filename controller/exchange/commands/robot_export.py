@@ -11,12 +11,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, RobotName, show
 from snakewalk.controller.console.result_files import atomic_write
-from snakewalk.controller.exchange.robot_export import (
-    CONTACT_NOTES,
-    Contact,
-    mjcf_text,
-    urdf_text,
-)
+from snakewalk.controller.exchange.robot_export import CONTACT_NOTES, mjcf_text, urdf_text
 
 
 @command(
@@ -41,7 +36,7 @@ def export_robot(
         ),
     ] = None,
     contact: Annotated[
-        Contact | None,
+        Literal["rollers", "isotropic", "none"] | None,
         typer.Option(
             help="friction of the MuJoCo model: a passive roller under each link, equal in all "
             "directions, or none; default: rollers (1.06 to 1.22 of the speed in snakewalk)",

@@ -38,11 +38,18 @@ def options(function: Callable[..., Any]) -> dict[str, Any]:
     found = {}
     for name, one in inspect.signature(function, eval_str=True).parameters.items():
         kind, *infos = get_args(one.annotation) or [one.annotation]
-        found[name] = kind, one.default, [plain(info) for info in infos]
+        found[name] = name_of(kind), one.default, [plain(info) for info in infos]
     return found
 
 
-def plain(info: Any) -> dict[str, Any]:
+def name_of(kind: Any) -> Any:
+    """Return a class by its name: the declaration evaluates a model of the command once more."""
+    return kind.__qualname__ if getattr(kind, "__module__", "").startswith("snakewalk") else kind
+
+
+def plain(info: Any) -> dict[str, Any] | str:
+    if not hasattr(info, "__dict__"):  # a field of pydantic
+        return repr(info)
     return {
         key: getattr(value, "__qualname__", value) if callable(value) else value
         for key, value in vars(info).items()
