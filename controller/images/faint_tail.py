@@ -27,6 +27,7 @@ _BESIDE_PX = 2.5  # beyond the half width: the ground on both sides of the ridge
 _CLEAR = 3.0  # standard deviations of a ray on bare ground
 _MOST = 2.0  # times the length of the silhouette's line: a longer tail is a trail
 _AVERAGED = 6  # steps whose clearness is the usual one at the tip
+_UNSURE = 2.0  # clearness of a tail that may go on below the limit for stains (ours)
 _SAMPLES = 400  # rays on bare ground
 _LEAST_PX = 4.0  # a shorter extension is ignored
 _THINNEST_PX, _WIDEST_PX = 1.0, 3.0  # half width of a tail
@@ -55,7 +56,8 @@ class FollowedTail:
     points: Floats
     """(K, 2) from the end of the line to the tip, one pixel apart."""
     clearness: float
-    """Median contrast of the ridge over its noise."""
+    """Median contrast of the ridge over its noise; less if it ends at the limit for stains, because
+    the tail may go on."""
 
 
 def follow_tail(
@@ -77,6 +79,7 @@ def follow_tail(
     noise = _noise(level, half, away_px > _FREE_PX)
     if noise is None:
         return None
+    is_limited = noise < faintest / _CLEAR
     noise = max(noise, faintest / _CLEAR)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     back = max(1, round(_AHEAD_PX * (len(line) - 1) / max(length, 1e-6)))
@@ -107,7 +110,10 @@ def follow_tail(
         clear.append(float(seen[best]))
     if len(clear) - 1 < _LEAST_PX or _returns(np.array(points), away_px):
         return None
-    return FollowedTail(np.array(points), float(np.median(clear[1:])))
+    clearness = float(np.median(clear[1:]))
+    if is_limited:
+        clearness = min(clearness, _UNSURE)
+    return FollowedTail(np.array(points), clearness)
 
 
 def _ridge(level: NDArray[np.float32], start: Floats, ways: Floats, half: float) -> Floats:
