@@ -24,7 +24,7 @@ import pytest
 LIMIT_S: Final = 1.0
 """CPU time of a test on the reference machine that needs no reason."""
 MARGIN: Final = 3.5
-"""A test fails above ``MARGIN * LIMIT_S``: a busy machine or a first compilation needs more (ours)."""
+"""A test fails above ``MARGIN * LIMIT_S``: a busy machine or a first compilation needs more."""
 REFERENCE_S: Final = 0.03
 """CPU time of ``calibration_s`` on the reference machine (2 cores of a cloud server, 2026)."""
 _TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
