@@ -4,6 +4,7 @@ A spline through both sides of a long gap leaves the recorded range; a servo mus
 that nobody measured.
 """
 
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -12,12 +13,7 @@ from snakewalk.config.arrays import Floats, SignedInts
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.kinematics.smoothstep import (
-    QUINTIC_BEND_MAX,
-    QUINTIC_SLOPE_MAX,
-    quintic,
-    quintic_slope,
-)
+from snakewalk.controller.kinematics.ramp import Ramp
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import HEADROOM, Pace
 
@@ -67,22 +63,22 @@ class PartedRecording:
         ]
         self.slowed = max(part.slowed for part in self._parts)
         """As ``Recorded.slowed``."""
-        self._from = [rows[-1] for rows in angles[:-1]]
-        self._to = [rows[0] for rows in angles[1:]]
-        reach = np.abs(np.subtract(self._to, self._from))
-        least_s = np.maximum(
-            reach * QUINTIC_SLOPE_MAX / (HEADROOM * robot.joint_speed_limit_rad_s),
-            np.sqrt(reach * QUINTIC_BEND_MAX / (HEADROOM * robot.joint_acceleration_limit_rad_s2)),
-        ).max(axis=1)
-        self._bridges_s = np.maximum(time_s[cuts] - time_s[cuts - 1], least_s)
+        speed_rad_s = HEADROOM * robot.joint_speed_limit_rad_s
+        acceleration_rad_s2 = HEADROOM * robot.joint_acceleration_limit_rad_s2
+        self._bridges = [
+            Ramp(before[-1], after[0], speed_rad_s, acceleration_rad_s2, float(gap_s))
+            for (before, after), gap_s in zip(
+                pairwise(angles), time_s[cuts] - time_s[cuts - 1], strict=True
+            )
+        ]
         paces = [part.pace() for part in self._parts]
-        slope = QUINTIC_SLOPE_MAX * reach / self._bridges_s[:, None]
-        bend = QUINTIC_BEND_MAX * reach / self._bridges_s[:, None] ** 2
+        paces += [Pace(*bridge.peaks()) for bridge in self._bridges]
         self._pace = Pace(
-            np.max([*(pace.speed_rad_s for pace in paces), *slope], axis=0),
-            np.max([*(pace.acceleration_rad_s2 for pace in paces), *bend], axis=0),
+            np.max([pace.speed_rad_s for pace in paces], axis=0),
+            np.max([pace.acceleration_rad_s2 for pace in paces], axis=0),
         )
-        self.duration_s = sum(part.duration_s for part in self._parts) + self._bridges_s.sum()
+        self.duration_s = sum(part.duration_s for part in self._parts)
+        self.duration_s += sum(bridge.duration_s for bridge in self._bridges)
         """From rest to rest."""
         self._at = 0
         self._bridge_s = 0.0
@@ -101,17 +97,13 @@ class PartedRecording:
         """(J,) present joint targets."""
         if self._bridge_s == 0.0:
             return self._parts[self._at].goal_rad()
-        share = quintic(self._bridge_s / float(self._bridges_s[self._at]))
-        start = self._from[self._at]
-        return np.asarray(start + share * (self._to[self._at] - start))
+        return self._bridges[self._at].at(self._bridge_s)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) their present speeds."""
         if self._bridge_s == 0.0:
             return self._parts[self._at].velocity_rad_s()
-        length_s = float(self._bridges_s[self._at])
-        rate = quintic_slope(self._bridge_s / length_s) / length_s
-        return np.asarray(rate * (self._to[self._at] - self._from[self._at]))
+        return self._bridges[self._at].velocity_rad_s(self._bridge_s)
 
     def pace(self) -> Pace:
         """Largest values of the whole recording."""
@@ -122,9 +114,9 @@ class PartedRecording:
         part = self._parts[self._at]
         if not part.done:
             return part.step(dt_s, view)
-        if self._at < len(self._bridges_s):
+        if self._at < len(self._bridges):
             self._bridge_s += dt_s
-            if self._bridge_s >= self._bridges_s[self._at]:
+            if self._bridge_s >= self._bridges[self._at].duration_s:
                 self._at += 1
                 self._bridge_s = 0.0
         return self.goal_rad()

@@ -14,7 +14,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import BodyView, SpineLinks
-from snakewalk.controller.kinematics.smoothstep import QUINTIC_BEND_MAX, QUINTIC_SLOPE_MAX, quintic
+from snakewalk.controller.kinematics.ramp import Ramp
 from snakewalk.controller.motion.compliance import Compliance
 from snakewalk.controller.motion.path_progress import OpenWaypoints, path_progress
 from snakewalk.controller.motion.source import MotionSource, StartsAnywhere
@@ -40,26 +40,6 @@ from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.link import HoldingLink, LoadedLink, VettedLink
 from snakewalk.drivers.types import BodyPose, JointCommand, JointState
-
-
-class Ramp:
-    """Quintic blend: speed and acceleration are zero at both ends."""
-
-    def __init__(
-        self, start_rad: Floats, goal_rad: Floats, speed_rad_s: float, acceleration_rad_s2: float
-    ) -> None:
-        self._start, self._goal = np.array(start_rad), np.array(goal_rad)
-        reach_rad = float(np.abs(self._goal - self._start).max(initial=0.0))
-        self.duration_s = max(
-            reach_rad * QUINTIC_SLOPE_MAX / speed_rad_s,
-            float(np.sqrt(reach_rad * QUINTIC_BEND_MAX / acceleration_rad_s2)),
-        )
-
-    def at(self, time_s: float) -> Floats:
-        """Joint angles (J,) after ``time_s``; the goal from ``duration_s`` on."""
-        t = 1.0 if self.duration_s == 0.0 else min(max(time_s / self.duration_s, 0.0), 1.0)
-        return np.asarray(self._start + quintic(t) * (self._goal - self._start))
-
 
 RUNS_PER_COLLECTION = 8
 """Runs of a process between two complete garbage collections (ours): one needs up to 0.3 s."""

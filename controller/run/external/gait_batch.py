@@ -11,6 +11,7 @@ from pathlib import Path
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.kinematics.links import SpineLinks
+from snakewalk.controller.kinematics.ramp import Ramp
 from snakewalk.controller.run.external.robot_batch import BatchRow, RobotBatch
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.servo_setup import motor_constants
@@ -19,7 +20,7 @@ from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.cycle_row import log_cycle
 from snakewalk.controller.runtime.derating import Derating
-from snakewalk.controller.runtime.drive import SETTLE_S, Ramp
+from snakewalk.controller.runtime.drive import SETTLE_S
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakewalk.controller.runtime.drive import Ramp
+from snakewalk.controller.kinematics.ramp import Ramp
 from snakewalk.controller.runtime.slip_monitor import SlipMonitor
 
 angles = st.lists(st.floats(-1.5, 1.5), min_size=4, max_size=4).map(np.array)
