@@ -274,6 +274,10 @@ class DeviationConfig(Strict):
     torque: float = Field(
         1.0, gt=0.0, le=10.0, description="of every servo for a current, over its model's"
     )
+    drawn: bool = Field(
+        False,
+        description="draw the errors of `trials rehearse --errors` from the seed instead",
+    )
 
 
 class RunConfig(Strict):

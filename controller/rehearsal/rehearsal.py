@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.friction_law import LAWS
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -83,13 +82,8 @@ RUNS: Final = (
 START_SD_M: Final = 0.05
 START_SD_DEG: Final = 5.0
 """How accurately the robot is laid down at the start (ours)."""
-FRICTION: Final = 1.25
-MASS: Final = 1.15
-WEAK: Final = 0.7
-HORN_DEG: Final = 2.0
 LATE_S: Final = 0.04
-"""Combined errors: factor on friction and mass or its inverse, torque of one servo, standard
-deviation of the horns, and delay of the goals (ours)."""
+"""Delay of the goals, in addition to ``Deviation.drawn`` (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,23 +135,6 @@ def case_of(row: dict[str, Any]) -> RehearsalCase:
     return RehearsalCase(row["run"], row["seed"], row["has_errors"], tracker)
 
 
-def errors_of(robot: RobotConfig, rng: np.random.Generator) -> Deviation:
-    """Draw errors of friction, mass, one servo, the horns, and the law of friction."""
-    along, across, mass = (
-        factor ** rng.choice([-1.0, 1.0]) for factor in (FRICTION, FRICTION, MASS)
-    )
-    torque = np.ones(robot.joint_count)
-    torque[rng.integers(robot.joint_count)] = WEAK
-    return Deviation(
-        float(along),
-        float(across),
-        (float(mass) - 1.0) * np.array(robot.link_masses_kg),
-        torque,
-        np.radians(HORN_DEG) * rng.standard_normal(robot.joint_count),
-        LAWS[rng.integers(len(LAWS))],
-    )
-
-
 def generator(seed: int) -> np.random.Generator:
     """Return the generator of a rehearsal's start and errors, which are drawn in this order."""
     return np.random.default_rng([seed, 0x42])
@@ -179,7 +156,7 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
         prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870", **changes)
         rng = generator(case.seed)
         place = moved(place_of(prepared), rng)
-        deviation = errors_of(prepared.robot, rng) if case.has_errors else NO_DEVIATION
+        deviation = Deviation.drawn(prepared.robot, rng) if case.has_errors else NO_DEVIATION
         serving = Serving(case.tracker, deviation, LATE_S if case.has_errors else 0.0, case.seed)
         truth = folder / "truth.jsonl"
         with ServedRobot(prepared.robot, prepared.world, place, serving, truth) as served:

@@ -1,19 +1,23 @@
 """Differences of a robot from its file and world: ground, loads, servos, horns."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.friction_law import LawName
+from snakewalk.config.friction_law import LAWS, LawName
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import DeviationConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.plant import Mounting
 
-if TYPE_CHECKING:
-    from snakewalk.sim.plant import Mounting
+FRICTION: Final = 1.25
+MASS: Final = 1.15
+WEAK: Final = 0.7
+HORN_DEG: Final = 2.0
+"""Drawn errors: factor on friction and mass or its inverse, torque of one servo, and standard
+deviation of the horns (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +38,28 @@ class Deviation:
     """Law of friction; None: the world's."""
 
     @classmethod
-    def of_run(cls, by: DeviationConfig, robot: RobotConfig) -> "Deviation":
-        """Return the deviation of a robot by the factors of a run."""
+    def drawn(cls, robot: RobotConfig, rng: np.random.Generator) -> "Deviation":
+        """Draw errors of friction, mass, one servo, the horns, and the law of friction."""
+        along, across, mass = (
+            factor ** rng.choice([-1.0, 1.0]) for factor in (FRICTION, FRICTION, MASS)
+        )
+        torque = np.ones(robot.joint_count)
+        torque[rng.integers(robot.joint_count)] = WEAK
+        return cls(
+            float(along),
+            float(across),
+            (float(mass) - 1.0) * np.array(robot.link_masses_kg),
+            torque,
+            np.radians(HORN_DEG) * rng.standard_normal(robot.joint_count),
+            LAWS[rng.integers(len(LAWS))],
+        )
+
+    @classmethod
+    def of_run(cls, run: RunConfig, robot: RobotConfig) -> "Deviation":
+        """Return the deviation of a robot in a run: by its factors, or drawn from its seed."""
+        by = run.deviation
+        if by.drawn:
+            return cls.drawn(robot, np.random.default_rng(run.seed))
         more = by.mass - 1.0
         return cls(
             by.friction_along,

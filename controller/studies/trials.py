@@ -189,10 +189,11 @@ def config_digest(case: Case, changes: Mapping[str, object]) -> str:
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
     """Whether all seeds give the same run, so that it counts once.
 
-    The seed draws the start, the walk's shapes, a camera's noise, and an IMU's bias and noise.
+    The seed draws the start, errors of the robot and its ground, the walk's shapes, a camera's
+    noise, and an IMU's bias and noise.
     """
     run = prepare_case(case, 0, 0.0, changes).run
-    drawn = run.pose in {"camera", "imu"}
+    drawn = run.deviation.drawn or run.pose in {"camera", "imu"}
     return spread_m == 0.0 and run.motion in {"serpenoid", "gait"} and not drawn
 
 

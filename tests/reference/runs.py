@@ -16,12 +16,12 @@ from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.controller.rehearsal.rehearsal import (
     LATE_S,
     SimulatedPort,
-    errors_of,
     generator,
     moved,
 )
 from snakewalk.controller.repertoire.prepare_schedule import prepare_schedule
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
+from snakewalk.controller.run.deviation import Deviation
 from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import changed, prepare_job, prepare_playback
 from snakewalk.controller.runlog.record import RunRecord
@@ -99,7 +99,7 @@ def _served(prepared: Any, folder: Path) -> Iterator[SimulatedPort]:
     rng = generator(1)
     place = moved(place_of(prepared), rng)
     tracker = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
-    serving = Serving(tracker, errors_of(prepared.robot, rng), LATE_S, 1)
+    serving = Serving(tracker, Deviation.drawn(prepared.robot, rng), LATE_S, 1)
     truth = folder.parent / f"{folder.name}.jsonl"
     with ServedRobot(prepared.robot, prepared.world, place, serving, truth) as served:
         yield SimulatedPort(served)

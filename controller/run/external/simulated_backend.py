@@ -68,7 +68,7 @@ def simulated(
 
     """
     if deviation is None:
-        deviation = Deviation.of_run(run.deviation, robot)
+        deviation = Deviation.of_run(run, robot)
     made = _SimulatedBody(run, robot, world, ground, deviation)
     body = made.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
@@ -120,7 +120,7 @@ def split(
     """
     (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
     rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
-    deviation = Deviation.of_run(run.deviation, robot)
+    deviation = Deviation.of_run(run, robot)
     made = _SimulatedBody(run, robot, world, ground, deviation)
     plant = made.plant
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)

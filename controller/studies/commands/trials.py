@@ -154,6 +154,14 @@ def trials(
             autocompletion=completion.WORLDS,
         ),
     ] = None,
+    errors: Annotated[
+        bool,
+        typer.Option(
+            "--errors",
+            help="add wrong friction and mass, any law of friction, a weak servo, and horns off "
+            "by 2 degrees",
+        ),
+    ] = False,
     track: TrackFile = None,
     workers: Workers = 2,
     out: TrialsOut = None,
@@ -171,6 +179,8 @@ def trials(
     _check_results(picture, parquet, out)
     require_extra("trials need", "mujoco" if dask is None else "distributed")
     overs = [study.parse_over(text) for text in over or ()]
+    if errors:
+        overs.append(("run.deviation.drawn", (True,)))
     _check_keys([key for key, _ in overs])
     cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
     _check_used(cases, track, seconds)

@@ -261,6 +261,14 @@ def test_an_estimated_pose_is_judged_by_where_the_body_truly_is(tmp_path: Path) 
     assert study.is_fixed(known, 0.0, {})
 
 
+def test_errors_are_drawn_for_each_seed() -> None:
+    case = replace(FLAT, keys=(("run.deviation.drawn", True),))
+    assert plan_trials([case], range(2), 0.0, {}) == [(case, 0), (case, 1)]
+    run = prepare_case(case, 1, 0.0, {}).run
+    assert run.deviation.drawn
+    assert run.seed == 1
+
+
 def test_a_kept_table_is_not_run_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -269,10 +277,11 @@ def test_a_kept_table_is_not_run_again(
     run, out, picture = tmp_path / "near.toml", tmp_path / "t.csv", tmp_path / "t.png"
     run.write_text('name = "near"\nwaypoints_m = [[0.4, 0.0]]\ntime_limit_s = 0.5\n')
     over = ["world.friction.across=0.3,0.7", "world.friction.along=0.1"]
-    options = {"motion": ["serpenoid"], "workers": 1, "as_json": True, "out": out}
+    options = {"motion": ["serpenoid"], "workers": 1, "as_json": True, "out": out, "errors": True}
     command([str(run)], seeds=1, over=over, picture=picture, **options)
     rows = json.loads(capsys.readouterr().out)["table"]
     assert [row["keys"]["world.friction.across"] for row in rows] == [0.3, 0.7]
+    assert [row["keys"]["run.deviation.drawn"] for row in rows] == [True, True]
     assert [row["runs"] for row in rows] == [1, 1]
     assert picture.stat().st_size > 0
 
