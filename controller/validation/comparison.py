@@ -104,7 +104,7 @@ class _Results:
 
     def compared(self, row: MeasuredRow) -> Compared:
         measured, simulated = row.value, None
-        cause = row.cause
+        cause = self._measurement.cause(row)
         travels = False
         try:
             conditions = self._measurement.conditions(row, self._name)

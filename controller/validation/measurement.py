@@ -97,7 +97,9 @@ class MeasuredRow(Strict):
         description="evidence: measured, data sheet, published model, held out, fitted"
     )
     range: tuple[float, float] = Field(description="lowest and highest ratio without a failure")
-    cause: str = Field("", description="most likely cause of a ratio outside 0.8 to 1.25")
+    cause: str = Field(
+        "", description="most likely cause of a ratio outside 0.8 to 1.25, or a key of [causes]"
+    )
     set: dict[str, Any] = Field({}, description="replaced keys: robot.…, world.… or motion.…")
 
     @model_validator(mode="after")
@@ -119,6 +121,7 @@ class PublishedResults(Strict):
     method: str = Field(min_length=10, description="how the source measured")
     uncertainty: str = Field(min_length=2, description="uncertainty of the results")
     assumed: tuple[str, ...] = Field((), description="values that the source does not state")
+    causes: dict[str, str] = Field({}, description="causes that several rows name by their key")
     robot: str | dict[str, Any] = Field(description="a shipped robot, or a table [robot]")
     world: str | dict[str, Any] = Field("flat", description="a shipped world, or a table [world]")
     motion: Motion
@@ -137,6 +140,10 @@ class PublishedResults(Strict):
     def row(self, name: str) -> MeasuredRow:
         """Return a row by its name."""
         return next(row for row in self.rows if row.name == name)
+
+    def cause(self, row: MeasuredRow) -> str:
+        """Return the most likely cause of a row's ratio in words."""
+        return self.causes.get(row.cause, row.cause)
 
     def conditions(self, row: MeasuredRow, place: str) -> "Conditions":
         """Return body, ground and motion of a row.

@@ -102,6 +102,16 @@ def test_a_range_beyond_a_quarter_needs_a_cause() -> None:
         MeasuredRow(**fields, range=(1.25, 0.8), cause="none")
 
 
+def test_rows_name_a_cause_of_their_file() -> None:
+    _, measurement = load_measurement("sts3215-pendulum")
+    rows = [row for row in measurement.rows if row.cause == "protection"]
+    assert len(rows) > 1
+    assert {measurement.cause(row) for row in rows} == {measurement.causes["protection"]}
+    assert "its output" in measurement.causes["protection"]
+    other = rows[0].model_copy(update={"cause": "a cause of its own"})
+    assert measurement.cause(other) == "a cause of its own"
+
+
 def changed(tmp_path: Path, old: str, new: str) -> str:
     text = (PAGE.parents[1] / "config/measurements/mx-no-load.toml").read_text(encoding="utf-8")
     assert old in text
