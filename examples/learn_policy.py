@@ -17,7 +17,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import snakewalk.gym  # noqa: F401  registers the environment
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.motion.policy import (
     Layer,
     Origin,
@@ -55,6 +55,7 @@ def learnt(agent: PPO, given: argparse.Namespace) -> Policy:
         seed=given.seed,
         steps=agent.num_timesteps,
         world=given.world,
+        law=load_world(given.world).friction.law_name,
         software=", ".join(f"{name} {version(name)}" for name in used),
     )
     return Policy(

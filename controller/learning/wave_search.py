@@ -15,6 +15,7 @@ from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Strict
+from snakewalk.config.loader import load_world
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.learning.environment import SnakeEnvironment
 from snakewalk.controller.motion.policy import WAVE_SPAN, Origin, Policy, PolicyWave
@@ -81,13 +82,19 @@ def search_wave(
     seed = progress.seed
     steps = progress.steps
     population = progress.population
+    law = load_world(world).friction.law_name
     software = progress.software
     options = {"popsize": population, "seed": seed + 1, "verbose": -9}  # 0 is the time of day
     strategy = cma.CMAEvolutionStrategy(np.zeros(len(start)), _SIGMA, options)
 
     def policy(genes: Floats, asked: int) -> Policy:
         origin = Origin(
-            method="cma", seed=seed, steps=asked * steps, world=world, software=software
+            method="cma",
+            seed=seed,
+            steps=asked * steps,
+            world=world,
+            law=law,
+            software=software,
         )
         wave = PolicyWave.of(start + WAVE_SPAN * genes)
         return Policy(name=name, robot=robot, origin=origin, wave=wave)

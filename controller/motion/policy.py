@@ -98,6 +98,7 @@ class Origin(Strict):
     seed: int = Field(description="of every random choice")
     steps: int = Field(ge=0, description="of the environment, all together")
     world: str = Field(description="that it was learnt on")
+    law: str = Field("", description="law of friction of that world; empty: not stated")
     software: str = Field(description="names and versions")
 
 

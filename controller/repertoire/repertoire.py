@@ -12,7 +12,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.repertoire.segment import REVERSE, SIDES, Segment
 
 FORMAT = "snakewalk-repertoire-1"
-_HEAD = ("robot", "joint_axes", "world", "length_m")
+_HEAD = ("robot", "joint_axes", "world", "length_m", "law")
+NO_LAW = "not stated"
+"""Text for files without the law of friction."""
 _ARRAYS = ("turn", "move_m", "link_m", "link_rotation", "goal_rad", "joint_rad")
 _PLAIN = tuple(f.name for f in fields(Segment) if f.name not in _ARRAYS)
 
@@ -28,6 +30,8 @@ class Repertoire:
     length_m: float
     """Length of the recorded body: another body is scaled by the ratio of lengths."""
     segments: tuple[Segment, ...]
+    law: str = NO_LAW
+    """Law of friction of the recorded runs."""
 
     @property
     def frame_s(self) -> float:
@@ -108,6 +112,7 @@ def load_repertoire(path: Path) -> Repertoire:
         about = parse_json(str(held["about"]))
         if about.get("format") != FORMAT:
             raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
+        about.setdefault("law", NO_LAW)
         about = {key: about[key] for key in (*_HEAD, "segments")}
         segments = tuple(
             Segment(**plain, **{name: held[f"{k}/{name}"] for name in _ARRAYS})

@@ -71,7 +71,8 @@ def record(
     """
     check_supply(robot)
     segments = tuple(record_action(robot, world, action, on_progress) for action in actions)
-    return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments)
+    law = world.friction.law_text
+    return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments, law)
 
 
 def record_action(

@@ -199,6 +199,8 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     ]
     if n.carrier_share is not None:
         tiles.insert(5, ("On wide waves", _pct(n.carrier_share), "of the walk's decisions"))
+    law = n.assumptions["friction_law"]
+    tiles.append(("Law of friction", str(law["value"]), f"{law['kind']}; {law['source']}"))
     found = n.friction_found
     if found is not None:
         (along, along_to), (across, across_to) = found.along_95, found.across_95

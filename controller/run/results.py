@@ -156,6 +156,7 @@ def _show(
     as_json: bool,
 ) -> None:
     """Print facts, files and verdict; the last line of a table is the verdict."""
+    facts = {**facts, "friction_law": result.record.header.world.friction.law_text}
     names = {"log": str(result.log), "summary": str(result.folder / SUMMARY)}
     files = {**names, **artifacts.to_dict()}
     if as_json:

@@ -6,7 +6,7 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.loader import checked, load_run, load_world, shipped
+from snakewalk.config.loader import checked, load_run, load_world, locate, shipped
 from snakewalk.config.world import WorldConfig
 
 
@@ -172,3 +172,11 @@ def test_shipped_runs_start_and_end_on_their_ground() -> None:
         behind = points[0] + 1.2 * away
         assert field.contains(*points.T).all(), name
         assert field.contains(*behind), name
+
+
+@pytest.mark.parametrize("name", shipped("worlds"))
+def test_a_shipped_world_names_its_law_and_the_reason(name: str) -> None:
+    assert load_world(name).friction.law is not None
+    text = locate("worlds", name).read_text(encoding="utf-8")
+    (line,) = (line for line in text.splitlines() if line.startswith("law ="))
+    assert len(line.partition("#")[2].split()) >= 4

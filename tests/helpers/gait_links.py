@@ -7,6 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.friction_law import LawName
 from snakewalk.config.loader import load_world
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.run.external.gait_batch import MakeBodies, run_together
@@ -17,15 +18,16 @@ from snakewalk.controller.runlog.reader import read_log
 SECONDS = 4.0
 
 
-def prepared_gaits(robot: str, gaits: Sequence[str]) -> list[GaitRun]:
-    """Prepare the gaits that fit a robot, on a level floor."""
+def prepared_gaits(robot: str, gaits: Sequence[str], law: LawName | None = None) -> list[GaitRun]:
+    """Prepare the gaits that fit a robot, on a level floor with a law of friction."""
+    keys = {} if law is None else {"world.friction.law": law}
     found = []
     for name in gaits:
         world = load_world(GAITS[name].world)
         flat = world.ground.kind == "flat" and world.obstacle is None
         where = world.name if flat else "isotropic"
         try:
-            run = prepare_gait(name, robot=robot, world=where, seconds=SECONDS + 1.0)
+            run = prepare_gait(name, robot=robot, world=where, seconds=SECONDS + 1.0, keys=keys)
             run.check_plan()
         except InputError as error:
             print(f"{robot:15} {name:22} left out: {error.faults[0]}")

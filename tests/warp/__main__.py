@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import warp
+from snakewalk.config.friction_law import LAWS
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.sim.batch.warp_bodies import WarpBodies
@@ -34,12 +35,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.warp", description=__doc__)
     parser.add_argument("--robot", nargs="+", default=["yaw16", "alternating16"])
     parser.add_argument("--gait", nargs="+", default=list(GAITS))
+    parser.add_argument("--law", choices=LAWS, help="law of friction; default: the worlds'")
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--copies", type=int, default=1, help="how often each gait is in the batch")
     given = parser.parse_args()
     kernels_s, rows, rates = [], [], {}
     for robot in given.robot:
-        prepared = prepared_gaits(robot, given.gait)
+        prepared = prepared_gaits(robot, given.gait, given.law)
         if not prepared:
             continue
         found, warp_s, compile_s = _compare(prepared, given.device, given.copies)

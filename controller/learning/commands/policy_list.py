@@ -27,13 +27,22 @@ def list_policies(as_json: Json = False) -> None:
         print(json.dumps({"policies": rows}))
         return
     table = Table(box=None, pad_edge=False)
-    for title in ("policy", "robot", "world", "learnt by", "seed", "steps", "Hz", "made with"):
+    for title in (
+        "policy",
+        "robot",
+        "world",
+        "law",
+        "learnt by",
+        "seed",
+        "steps",
+        "Hz",
+        "made with",
+    ):
         table.add_column(title, justify="right" if title in {"seed", "steps", "Hz"} else "left")
     for policy in policies:
         origin = policy.origin
         hz = "changing" if policy.network else f"{policy.wave.frequency_hz:.2f}"
+        ground = (origin.world, origin.law)
         numbers = (str(origin.seed), str(origin.steps), hz)
-        table.add_row(
-            policy.name, policy.robot, origin.world, origin.method, *numbers, origin.software
-        )
+        table.add_row(policy.name, policy.robot, *ground, origin.method, *numbers, origin.software)
     console.print(table)

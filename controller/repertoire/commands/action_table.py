@@ -38,7 +38,7 @@ def show_actions(file: Path, repertoire: Repertoire, as_json: bool) -> None:
     ]
     if as_json:
         about = {"file": str(file), "robot": repertoire.robot, "world": repertoire.world}
-        print(json.dumps(about | {"actions": rows}))
+        print(json.dumps(about | {"friction_law": repertoire.law, "actions": rows}))
         return
     heads = {
         "cycle_s": "cycle\ns",
@@ -52,5 +52,7 @@ def show_actions(file: Path, repertoire: Repertoire, as_json: bool) -> None:
         table.add_column(heads.get(key, key), justify="left" if name else "right", no_wrap=name)
     for row in rows:
         table.add_row(*(str(value) for value in row.values()))
-    console.print(f"{file}: {repertoire.robot} on {repertoire.world}")
+    console.print(
+        f"{file}: {repertoire.robot} on {repertoire.world}, law of friction: {repertoire.law}"
+    )
     console.print(table)

@@ -125,6 +125,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "run": prepared.run.name,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
+        "friction_law": prepared.world.friction.law_text,
         "motion": prepared.run.motion,
         "seed": prepared.run.seed,
         "waypoints": len(prepared.run.waypoints_m),

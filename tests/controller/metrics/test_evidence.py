@@ -99,6 +99,17 @@ def test_the_other_assumptions_are_listed_with_their_source(record: RunRecord) -
     assert assumed["supply_v"]["source"] == f"robot {header.robot.name}"
 
 
+def test_a_world_without_a_law_is_reported_as_the_assumed_ellipse(record: RunRecord) -> None:
+    world = record.header.world
+    friction = world.friction.model_copy(update={"law": None})
+    header = dataclasses.replace(
+        record.header, world=world.model_copy(update={"friction": friction})
+    )
+    law = summary(dataclasses.replace(record, header=header)).assumptions["friction_law"]
+    assert (law["value"], law["source"]) == ("ellipse", f"default: {world.name} has no law")
+    assert friction.law_text == "ellipse (assumed)"
+
+
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("words", "code", "source"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot, shipped
+from snakewalk.config.loader import load_robot, load_world, shipped
 from snakewalk.controller.motion.policy import (
     WAVE_ENDS,
     WAVE_SPAN,
@@ -62,6 +62,7 @@ def test_shipped_policies_say_where_they_come_from(name: str) -> None:
     policy = load_policy(name)
     assert policy.name == name
     assert policy.origin.steps > 10_000
+    assert policy.origin.law == load_world(policy.origin.world).friction.law
     assert "snakewalk" in policy.origin.software
     assert policy.observation in {(), observation_names(load_robot(policy.robot))}
     assert policy.wave != PolicyWave() or policy.network

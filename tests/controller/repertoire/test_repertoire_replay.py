@@ -1,5 +1,6 @@
 """Frames, segments, replay, bridges, scale: [YT] 3 and 4, and where the printed equations fail."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -191,10 +192,22 @@ def test_a_file_gives_back_what_was_saved(repertoire: Repertoire, tmp_path: Path
     repertoire.save(tmp_path / "r.npz")
     back = load_repertoire(tmp_path / "r.npz")
     assert (back.robot, back.world, back.length_m) == ("yaw16", "flat", repertoire.length_m)
+    assert back.law == repertoire.law == "ellipse"
     for one, two in zip(back.segments, repertoire.segments, strict=True):
         assert (one.name, one.kind, one.closure_m) == (two.name, two.kind, two.closure_m)
         np.testing.assert_array_equal(one.turn, two.turn)
         np.testing.assert_array_equal(one.goal_rad, two.goal_rad)
+
+
+def test_an_older_file_states_no_law(repertoire: Repertoire, tmp_path: Path) -> None:
+    repertoire.save(tmp_path / "r.npz")
+    with np.load(tmp_path / "r.npz") as held:
+        arrays = dict(held)
+    about = json.loads(str(arrays["about"]))
+    del about["law"]
+    arrays["about"] = np.array(json.dumps(about))
+    np.savez(tmp_path / "old.npz", **arrays)
+    assert load_repertoire(tmp_path / "old.npz").law == "not stated"
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

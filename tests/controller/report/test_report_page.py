@@ -78,6 +78,7 @@ def test_the_page_stands_alone(hills: Path) -> None:
         assert svg.tag.endswith("svg")
     assert not re.search(r"<script[^>]*src", html), "nothing is loaded"
     assert "waypoint 1 reached" in html
+    assert "Law of friction" in html
     assert (hills.parent / "summary.json").is_file()
 
 

@@ -40,6 +40,7 @@ def test_a_plan_as_json() -> None:
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     assert found["waypoints_reached"] == found["waypoints"] == 5
+    assert found["friction_law"] == "ellipse"
 
 
 @pytest.mark.slow
