@@ -33,6 +33,7 @@ def compiled(
     nogil: bool = False,
     divides_by_zero: bool = False,
     makes_arrays: bool = True,
+    fastmath: bool = False,
 ) -> Callable[[F], F]:
     """Compile a function for ``signature``; ``py_func`` is the original.
 
@@ -47,6 +48,7 @@ def compiled(
             which would need as much time as a short loop. Such a loop does not compile if it makes
             an array. If numba lacks the option, all loops count references, with the same bits as
             results.
+        fastmath: let sums be reordered, so that they can be vectorised; NaN is not expected.
 
     """
 
@@ -55,9 +57,9 @@ def compiled(
         if numba is None:
             return function
         model = "numpy" if divides_by_zero else "python"
-        options: dict[str, Any] = {}
+        options: dict[str, Any] = {"fastmath": True} if fastmath else {}
         if not makes_arrays and _can_skip_counting():
-            options = _UNCOUNTED
+            options |= _UNCOUNTED
         # numba's cache does not know the options: a forced fallback would share its files
         cached = makes_arrays or not is_forced("numba")
         made: F = _jitted(

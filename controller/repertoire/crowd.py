@@ -3,16 +3,18 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Indices, Int32s
+from snakewalk.config.arrays import Bools, Floats, Indices, Int32s, Singles
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.replay import bridge_frames, tip_travel_m
+from snakewalk.drivers.compiling import compiled, inlined
 
 LANES = 8
 """Links are padded to a multiple of this, so that vector units process them without a remainder."""
+_ROWS = "float64[:, ::1]"
+_LINKS = "float32[:, :, ::1]"
 
 
 class Crowd:
@@ -107,7 +109,7 @@ class Crowd:
         return np.asarray(self._points[body, :, : self._links].T, dtype=np.float64)
 
     @property
-    def points_m(self) -> NDArray[np.float32]:
+    def points_m(self) -> Singles:
         """(N, 3, links and padding) of the links."""
         return self._points
 
@@ -186,8 +188,8 @@ class Crowd:
             )
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def _orthonormalise(r):  # type: ignore[no-untyped-def]
+@inlined
+def _orthonormalise(r: Floats) -> None:
     """Remove rounding from the axes: x keeps its direction, y and z are computed again."""
     size = 1.0 / np.sqrt(r[0] * r[0] + r[3] * r[3] + r[6] * r[6])
     r[0], r[3], r[6] = r[0] * size, r[3] * size, r[6] * size
@@ -200,8 +202,8 @@ def _orthonormalise(r):  # type: ignore[no-untyped-def]
     r[8] = r[0] * r[4] - r[3] * r[1]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def _balance(r, most):  # type: ignore[no-untyped-def]
+@inlined
+def _balance(r: Floats, most: float) -> None:
     """Roll about the body's x, by ``most`` at most, towards where its z points up the most."""
     roll = min(max(np.arctan2(-r[7], r[8]), -most), most)
     c, s = np.cos(roll), np.sin(roll)
@@ -210,29 +212,36 @@ def _balance(r, most):  # type: ignore[no-untyped-def]
         r[3 * k + 1], r[3 * k + 2] = c * y + s * z, c * z - s * y
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def _step(  # type: ignore[no-untyped-def]  # noqa: C901  a compiled loop
-    turn,
-    move,
-    shape,
-    first,
-    last,
-    bridge,
-    rotation,
-    origin,
-    scale,
-    visible,
-    requested,
-    cycles,
-    playing,
-    following,
-    ended,
-    bridge_from,
-    bridge_frames_of,
-    bridge_remaining,
-    points,
-    balance,
-):
+@compiled(
+    f"void({_ROWS}, {_ROWS}, {_LINKS}, int32[::1], int32[::1], int32[:, ::1], {_ROWS}, {_ROWS},"
+    " float64[::1], boolean[::1], int32[::1], int32[::1], int32[::1], int32[::1], boolean[::1],"
+    f" int32[::1], int32[::1], int32[::1], {_LINKS}, float64)",
+    divides_by_zero=True,
+    makes_arrays=False,
+    fastmath=True,
+)
+def _step(  # noqa: C901  a compiled loop
+    turn: Floats,
+    move: Floats,
+    shape: Singles,
+    first: Int32s,
+    last: Int32s,
+    bridge: Int32s,
+    rotation: Floats,
+    origin: Floats,
+    scale: Floats,
+    visible: Bools,
+    requested: Int32s,
+    cycles: Int32s,
+    playing: Int32s,
+    following: Int32s,
+    ended: Bools,
+    bridge_from: Int32s,
+    bridge_frames_of: Int32s,
+    bridge_remaining: Int32s,
+    points: Singles,
+    balance: float,
+) -> None:
     """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
     lanes = shape.shape[2]
     for b in range(len(following)):

@@ -8,16 +8,18 @@ do not intersect, so a start without intersections keeps this property.
 from typing import Final
 
 import numpy as np
-from numba import njit
 
-from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints, Singles
 from snakewalk.controller.repertoire.crowd import Crowd
+from snakewalk.drivers.compiling import callable_in_loops, compiled
 
 NONE: Final = -1
 YIELDING_FRAMES: Final = 6
 """After which a body that waits moves sideways, too (ours)."""
 YIELDING_LENGTHS: Final = 0.005
 """By this much in a frame, body lengths (ours)."""
+_LINKS: Final = "float32[:, :, ::1]"
+_ROW: Final = "float64[::1]"
 
 
 class SeparatedCrowd:
@@ -31,7 +33,7 @@ class SeparatedCrowd:
         """
         self._crowd = crowd
         self._length_m = length_m
-        self._radius_m = np.asarray(radius_m, dtype=float)
+        self._radius_m = np.array(radius_m, dtype=float)
         self.blocker: Ints = np.full(len(crowd.scale), NONE)
         """(N,) the body that stops each body in this frame; -1: it moved."""
         self.met: Floats = np.zeros(len(crowd.scale))
@@ -77,7 +79,7 @@ class SeparatedCrowd:
         count = _find_pairs(self._crowd.points_m, self._crowd.scale, self._radius_m, pairs)
         return pairs[:count]
 
-    def _stopped(self, old_m: Floats) -> Ints:
+    def _stopped(self, old_m: Singles) -> Ints:
         """Mark further bodies that have to return to links ``old_m``, and return them."""
         known = self.blocker.copy()
         points = self._crowd.points_m
@@ -85,8 +87,10 @@ class SeparatedCrowd:
         return np.flatnonzero(self.blocker != known)
 
 
-@njit(cache=True, error_model="numpy")
-def _segment_gap(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
+@callable_in_loops
+def _segment_gap(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> float:
     """Distance of the segments ab and cd in the plane, 0 if they cross."""
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
     one = ux * (cy - ay) - uy * (cx - ax)
@@ -110,8 +114,10 @@ def _segment_gap(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def
     return least
 
 
-@njit(cache=True, error_model="numpy")
-def _meeting(one, scale_one, other, scale_other, radius):  # type: ignore[no-untyped-def]
+@callable_in_loops
+def _meeting(
+    one: Singles, scale_one: float, other: Singles, scale_other: float, radius: Floats
+) -> tuple[int, int]:
     """Links of two bodies that intersect, nearest to a head first; -1, -1 without such links."""
     links = len(radius)
     for k in range(2 * links - 3):  # the sum of both link numbers
@@ -133,8 +139,8 @@ def _meeting(one, scale_one, other, scale_other, radius):  # type: ignore[no-unt
     return NONE, NONE
 
 
-@njit(cache=True, error_model="numpy")
-def _boxes(points, scale, radius):  # type: ignore[no-untyped-def]
+@callable_in_loops
+def _boxes(points: Singles, scale: Floats, radius: Floats) -> Floats:
     """(N, 4) least and largest x and y of each body with its width."""
     links = len(radius)
     box = np.empty((len(points), 4))
@@ -146,16 +152,25 @@ def _boxes(points, scale, radius):  # type: ignore[no-untyped-def]
     return box
 
 
-@njit(cache=True, error_model="numpy")
-def _apart(box, i, j):  # type: ignore[no-untyped-def]
+@callable_in_loops
+def _apart(box: Floats, i: int, j: int) -> bool:
     across = box[i, 0] > box[j, 1] or box[j, 0] > box[i, 1]
-    return across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3]
+    return bool(across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3])
 
 
-@njit(cache=True, error_model="numpy")
-def _stop(  # type: ignore[no-untyped-def]
-    points, old, scale, radius, known, blocker, met
-):
+@compiled(
+    f"void({_LINKS}, {_LINKS}, {_ROW}, {_ROW}, int64[::1], int64[::1], {_ROW})",
+    divides_by_zero=True,
+)
+def _stop(
+    points: Singles,
+    old: Singles,
+    scale: Floats,
+    radius: Floats,
+    known: Ints,
+    blocker: Ints,
+    met: Floats,
+) -> None:
     """Write into ``blocker`` the bodies that have to return; those of ``known`` have returned."""
     box = _boxes(points, scale, radius)
     last = len(radius) - 1.0
@@ -178,8 +193,8 @@ def _stop(  # type: ignore[no-untyped-def]
                 blocker[j], met[j] = i, at_j / last
 
 
-@njit(cache=True, error_model="numpy")
-def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
+@compiled(f"boolean({_LINKS}, {_ROW}, {_ROW}, int64)", divides_by_zero=True)
+def _is_clear(points: Singles, scale: Floats, radius: Floats, i: int) -> bool:
     box = _boxes(points, scale, radius)
     for j in range(len(points)):
         if j == i or _apart(box, i, j):
@@ -189,8 +204,8 @@ def _is_clear(points, scale, radius, i):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy")
-def _find_pairs(points, scale, radius, pairs):  # type: ignore[no-untyped-def]
+@compiled(f"int64({_LINKS}, {_ROW}, {_ROW}, int64[:, ::1])", divides_by_zero=True)
+def _find_pairs(points: Singles, scale: Floats, radius: Floats, pairs: Ints) -> int:
     """Write the pairs that intersect into ``pairs``, as many as it holds; return their number."""
     box = _boxes(points, scale, radius)
     count = 0

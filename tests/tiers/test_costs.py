@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.tiers.costs import LIMIT_S, MARGIN, Meter, Table, cpu_s, reason_of
+from tests.tiers.costs import LIMIT_S, MARGIN, Meter, Table, cpu_s, measure_again, reason_of
 
 BURN = "import time\nwhile time.process_time() < 0.1: pass"
 
@@ -19,9 +19,10 @@ def item(*marks: pytest.Mark) -> Any:
     return SimpleNamespace(nodeid="tests/test_x.py::test_y", get_closest_marker=named.get)
 
 
-def table(file: Path | None = None) -> Table:
+def table(file: Path | None = None, again_s: float = 2.0 * MARGIN * LIMIT_S) -> Table:
     options = {"most_expensive": 3, "limit_costs": True, "write_costs": file and str(file)}
-    return Table(SimpleNamespace(getoption=options.__getitem__))  # type: ignore[arg-type]
+    config: Any = SimpleNamespace(getoption=options.__getitem__)
+    return Table(config, again=lambda name: again_s)
 
 
 def report(cost_s: float, **more: object) -> Any:
@@ -73,6 +74,18 @@ def test_only_a_test_clearly_above_the_limit_fails_and_only_without_a_reason() -
         costs = table()
         costs.pytest_runtest_logreport(report(cost_s, reason=reason, slowdown=slowdown))
         assert exit_status(costs) == expected
+
+
+def test_a_test_that_compiled_a_loop_at_first_does_not_fail() -> None:
+    costs = table(again_s=0.1)
+    costs.pytest_runtest_logreport(report(2.0 * MARGIN * LIMIT_S, reason=None, slowdown=1.0))
+    assert exit_status(costs) == 0
+
+
+def test_a_test_is_measured_again_alone() -> None:
+    burning = "tests/tiers/test_costs.py::test_a_child_counts_while_it_lives_and_after_its_end"
+    assert 0.05 < measure_again(burning) < 3.0
+    assert measure_again("tests/tiers/test_costs.py::test_of_no_name") == float("inf")
 
 
 @pytest.mark.parametrize(("costs_s", "expected_s"), [((0.6, 1.7), 2), ((0.2, 0.1), None)])

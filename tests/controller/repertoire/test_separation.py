@@ -79,7 +79,7 @@ def test_compiled_loops_find_what_python_finds(repertoire: Repertoire) -> None:
             one, other = crowd.link_m(i), crowd.link_m(j)
             near = gap_m(one, other) < 0.025 * (crowd.scale[i] + crowd.scale[j])
             expected += [[i, j]] if near else []
-            plain = separation._meeting.py_func(
+            plain = separation._meeting(
                 crowd.points_m[i], crowd.scale[i], crowd.points_m[j], crowd.scale[j], RADIUS_M
             )
             assert (plain[0] != NONE) == ([i, j] in found)
