@@ -186,8 +186,7 @@ def _prepare(task: ControllerTask, controller: str, seed: int) -> PreparedRun:
             **place,
             seconds=task.seconds,
             seed=seed,
-            by="cpg" if controller == "cpg" else "blend",
-            keys=keys,
+            keys=keys | {"run.gait.by": "cpg" if controller == "cpg" else "blend"},
         )
     if _is_policy(controller):
         return prepare_policy(controller, **place, seconds=task.seconds, seed=seed, keys=keys)

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack
 
 import typer
 
@@ -27,10 +27,8 @@ def run_for_user(
     name: str,
     options: RunOptions,
     *,
-    seconds: float | None = None,
-    motion_at: Callable[[float], str] | None = None,
-    observers: Observers | None = None,
-    observe: Sequence[str] | None = None,
+    bar: PathBar | TimeBar | None = None,
+    observers: AbstractContextManager[Observers] | None = None,
     live: bool = False,
     shadow: bool = False,
     stop_requested: Callable[[], str | None] | None = None,
@@ -41,10 +39,8 @@ def run_for_user(
         prepared: the motion.
         name: of the folder below ``runs``, without ``--out``.
         options: of the command.
-        seconds: duration that the bar shows; default: the path, or the time limit.
-        motion_at: name of the motion at an elapsed time in s, for the bar.
-        observers: opened ones; default: those that the options and ``observe`` name.
-        observe: ``NAME[:ARGUMENT]`` of plug-ins.
+        bar: shows the progress; default: along the path, or up to the time limit.
+        observers: opens the observers of the run; default: those that the options name.
         live: whether page and ROS node command the waypoints.
         shadow: whether a simulated chain follows the same goals.
         stop_requested: asks an operator, whom the terminal is left to.
@@ -53,14 +49,14 @@ def run_for_user(
         InputError: as ``run_robot``; or the folder cannot be made.
 
     """
-    bar: PathBar | TimeBar
-    if isinstance(prepared, HasWaypoints) and seconds is None:
-        bar = PathBar(prepared.path_length_m())
-    else:
-        bar = TimeBar(prepared.run.name, seconds or prepared.run.time_limit_s, motion_at)
-    opened = nullcontext(observers) if observers else observers_of(options, observe, live=live)
+    if bar is None:
+        bar = (
+            PathBar(prepared.path_length_m())
+            if isinstance(prepared, HasWaypoints)
+            else TimeBar(prepared.run.name, prepared.run.time_limit_s)
+        )
     with ExitStack() as opened_parts:
-        watching = opened_parts.enter_context(opened)
+        watching = opened_parts.enter_context(observers or observers_of(options))
         folder = opened_parts.enter_context(run_folder(name, options.out))
         opened_parts.enter_context(bar)
         if live and watching.page is not None:

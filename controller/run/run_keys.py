@@ -24,7 +24,10 @@ _FIELDS = {
 _OWN_MOTION: Final = {"run.robot": "--robot", "run.motion": "the command"}
 OF_A_SOURCE: Final = _OWN_MOTION | {"run.time_limit_s": "--seconds"}
 OF_A_GAIT: Final = _OWN_MOTION | {
-    "run.gait": "--param, --seconds, --then, --by, --look-heading-rad"
+    "run.gait.name": "the command",
+    "run.gait.parameters": "--param",
+    "run.gait.duration_s": "--seconds",
+    "run.gait.then": "--then",
 }
 OF_A_SCHEDULE: Final = _OWN_MOTION | {
     "run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"
@@ -51,7 +54,7 @@ def checked_keys(
         if file not in _FIELDS or not (dot and all(rest.split("."))):
             faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
         for own, option in (refused or {}).items():
-            if key == own or key.startswith(f"{own}."):
+            if f"{key}.".startswith(f"{own}.") or own.startswith(f"{key}."):
                 faults.append(f"{key}: is given by {option}")
     if faults:
         raise InputError(faults)

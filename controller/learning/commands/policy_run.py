@@ -8,6 +8,7 @@ from snakewalk.config.key_types import MOTION_S, SEED, MotionSeconds, Seed
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Robot, Set, Shadow, World, key_values
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import prepare_policy
 from snakewalk.controller.run.results import show_result, summarized
@@ -42,7 +43,8 @@ def run_policy(
     keys = key_values("--set", set_)
     prepared = prepare_policy(name, robot=robot, world=world, seconds=seconds, seed=seed, keys=keys)
     results = f"policy-{prepared.run.name}-{prepared.robot.name}"
-    result = run_for_user(prepared, results, options, seconds=seconds, shadow=shadow)
+    bar = TimeBar(prepared.run.name, seconds)
+    result = run_for_user(prepared, results, options, bar=bar, shadow=shadow)
     facts: dict[str, object] = {
         "policy": name,
         "robot": prepared.robot.name,

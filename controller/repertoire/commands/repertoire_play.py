@@ -12,6 +12,7 @@ from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.schedule import ScheduleConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Robot, Set, World, key_values
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
@@ -87,7 +88,9 @@ def play_actions(
         keys=key_values("--set", set_),
     )
     name = f"actions-{prepared.run.name}"
-    result = run_for_user(prepared, name, options, seconds=prepared.config.duration_s)
+    result = run_for_user(
+        prepared, name, options, bar=TimeBar(prepared.run.name, prepared.config.duration_s)
+    )
     assert isinstance(result.source, ScheduleMotion), "a schedule's run has no other motion"
     played = result.source.played
     names = [segment.name for segment in prepared.repertoire.segments]

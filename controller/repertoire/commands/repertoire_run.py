@@ -7,6 +7,7 @@ import typer
 
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import show
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
@@ -47,7 +48,9 @@ def run_route(
 ) -> tuple[dict[str, object], bool]:
     """Execute a job with a bar; return its facts, and whether it reached every waypoint."""
     check_picture(picture)
-    result = run_for_user(job, run_name(job), options, seconds=job.route.duration_s)
+    result = run_for_user(
+        job, run_name(job), options, bar=TimeBar(job.run.name, job.route.duration_s)
+    )
     with result.ending.noted():
         artifacts = write_artifacts(result.record, result.folder, result.summary, film=options.film)
     if picture is not None:

@@ -22,6 +22,7 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.motion.commanded import Commanded
 from snakewalk.controller.ros.ros_link import open_ros
@@ -130,8 +131,8 @@ def ros(
             prepared,
             f"ros-{prepared.robot.name}",
             run_options,
-            seconds=seconds,
-            observers=Observers(link, page=page),
+            bar=TimeBar(prepared.run.name, seconds),
+            observers=nullcontext(Observers(link, page=page)),
         )
     facts = {
         "robot": prepared.robot.name,

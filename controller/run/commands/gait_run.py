@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import BLEND, MOTION_S, SEED, GaitChangeMethod, MotionSeconds, Seed
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Compliant, Robot, Set, Shadow, World, key_values
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.run.commands.gait_options import Name, Param, parameters
@@ -69,6 +70,14 @@ def run_gait(
     options: RunOptions,
 ) -> None:
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
+    if (live or gamepad is not None) and (then or by == "cpg"):
+        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
+    own = key_values("--set", set_) or {}
+    given = {
+        "run.gait.look_heading_rad": look_heading_rad,
+        "run.gait.look_at_m": _point(look_at),
+        "run.gait.by": by,
+    }
     with ExitStack() as stack:
         observers = stack.enter_context(observers_of(options))
         hands = open_hands(stack, live, gamepad, observers.page)
@@ -79,23 +88,22 @@ def run_gait(
             parameters=parameters(param),
             seconds=seconds,
             seed=seed,
-            look_heading_rad=look_heading_rad,
-            look_at_m=_point(look_at),
-            make_operator=None if hands is None else hands.operator,
             then=[_change(text) for text in then or []],
-            by=by,
-            keys=key_values("--set", set_),
+            keys=own | {key: value for key, value in given.items() if value is not None},
         )
-        prepared = replace(gait, run=with_compliance(gait.run, compliance))
+        prepared = replace(
+            gait,
+            run=with_compliance(gait.run, compliance),
+            make_operator=None if hands is None else hands.operator,
+        )
         if hands is not None:
             hands.policy = prepared.run.safety.lost_observer
         result = run_for_user(
             prepared,
             f"gait-{prepared.run.name}-{prepared.robot.name}",
             options,
-            seconds=seconds,
-            motion_at=_names(prepared, hands),
-            observers=observers,
+            bar=TimeBar(prepared.run.name, seconds, _names(prepared, hands)),
+            observers=nullcontext(observers),
             shadow=shadow,
             stop_requested=None if hands is None else hands.torque_off,
         )

@@ -15,6 +15,7 @@ from snakewalk.controller.console.options import (
     World,
     key_values,
 )
+from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.run.results import show_result
@@ -66,7 +67,9 @@ def play(
         **playback.model_dump(),
     )
     name = f"play-{prepared.run.name}"
-    result = run_for_user(prepared, name, options, seconds=prepared.duration_s)
+    result = run_for_user(
+        prepared, name, options, bar=TimeBar(prepared.run.name, prepared.duration_s)
+    )
     facts: dict[str, object] = {
         "recording": track,
         "robot": prepared.robot.name,

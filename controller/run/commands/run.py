@@ -29,7 +29,7 @@ from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import changed, prepare_job, with_map
 from snakewalk.controller.run.request import RunResult
 from snakewalk.controller.run.results import by_evidence, check_look, show_result
-from snakewalk.controller.run.run_for_user import run_for_user
+from snakewalk.controller.run.run_for_user import observers_of, run_for_user
 from snakewalk.controller.run.run_keys import with_compliance
 
 
@@ -106,7 +106,12 @@ def run(
     job = with_map(with_compliance(prepared.run, compliance), map_)
     name = _name(job, robot, world, track)
     result = run_for_user(
-        changed(prepared, run=job), name, options, observe=observe, live=live, shadow=shadow
+        changed(prepared, run=job),
+        name,
+        options,
+        observers=observers_of(options, observe, live=live),
+        live=live,
+        shadow=shadow,
     )
     show_result(
         result,

@@ -5,13 +5,13 @@ from typing import Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitSetConfig
-from snakewalk.config.key_types import BLEND, MOTION_S, GaitChangeMethod
+from snakewalk.config.key_types import MOTION_S
 from snakewalk.config.loader import load_gait, load_run, shipped
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.gaits.gait import Gait, fitting_robot
 from snakewalk.controller.gaits.registry import BROKEN, GAITS, make_gait
 from snakewalk.controller.run.assembly import assemble, load_body
-from snakewalk.controller.run.kinds.gait_run import GaitRun, MakeOperator
+from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.run_keys import OF_A_GAIT, checked_keys
 from snakewalk.controller.run.servo_setup import with_gains
 
@@ -34,25 +34,20 @@ def prepare_gait(
     parameters: dict[str, Any] | None = None,
     seconds: float = MOTION_S,
     seed: int = 0,
-    look_heading_rad: float | None = None,
-    look_at_m: tuple[float, float] | None = None,
-    make_operator: MakeOperator | None = None,
     then: Sequence[tuple[float, str, dict[str, Any]]] = (),
-    by: GaitChangeMethod = BLEND,
     keys: Mapping[str, object] | None = None,
 ) -> GaitRun:
     """Prepare a gait, or a shipped or own set of parameters (``config/gaits``), by name.
 
-    ``then`` holds (time, name, parameters) of the gaits that follow, ``by`` how the gait changes,
-    ``keys`` values of run, robot and world that are replaced, as of ``prepare_walk``.
+    ``then`` contains time, name and parameters of the gaits that follow. ``keys`` replace values of
+    run, robot and world as in ``prepare_walk``; ``run.gait.by`` is how the gait changes,
+    ``run.gait.look_at_m`` the point that the head looks at.
 
     Raises:
         InputError: no such gait, parameters out of range, a robot that lacks joints, changes out of
-            order or together with an operator.
+            order.
 
     """
-    if make_operator is not None and (then or by == "cpg"):
-        raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
     keys = gait_keys(keys)
     gait, known = gait_by_name(name, parameters)
     if known is not None:
@@ -72,18 +67,15 @@ def prepare_gait(
             "world": world or gait.world,
             "motion": "gait",
             "seed": seed,
-            "time_limit_s": seconds + (60.0 if by == "cpg" else 30.0),
+            "time_limit_s": seconds + (60.0 if keys.get("run.gait.by") == "cpg" else 30.0),
             "gait": {
                 "name": gait.name,
                 "parameters": gait.params.model_dump(),
                 "duration_s": seconds,
-                "look_heading_rad": look_heading_rad,
-                "look_at_m": look_at_m,
                 "then": [
                     {"at_s": at_s, "name": g.name, "parameters": g.params.model_dump()}
                     for at_s, g in changes
                 ],
-                "by": by,
             },
             "compliance": known.compliance if known is not None else None,
         },
@@ -92,7 +84,7 @@ def prepare_gait(
     )
     soft = [gait.p_gain for gait in gaits if gait.p_gain is not None]
     body = with_gains(body, pitch=pitch, soft=soft)
-    prepared = GaitRun(run, body, ground, make_operator)
+    prepared = GaitRun(run, body, ground)
     remark = prepared.remark()
     if remark is not None:
         LOGGER.warning("%s", remark)

@@ -16,7 +16,7 @@ THEN = [(3.0, "turn-in-place", {}), (8.0, "rolling", {"frequency_hz": 0.3})]
 
 @pytest.mark.parametrize("by", ["blend", "cpg"])
 def test_a_job_made_again_moves_alike_within_the_limits(by: str) -> None:
-    first = prepare_gait("lateral-undulation", then=THEN, by=by, seconds=12.0)  # type: ignore[arg-type]
+    first = prepare_gait("lateral-undulation", then=THEN, seconds=12.0, keys={"run.gait.by": by})
     again = prepare_run(first.run, first.robot, first.world)
     runs = []
     for job in (first, again):

@@ -7,6 +7,7 @@ import re
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -159,7 +160,9 @@ def test_a_warm_robot_slows_down_says_so_and_does_not_trip(tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_the_head_keeps_a_heading_over_the_bus(tmp_path: Path) -> None:
-    prepared = prepare_gait("lateral-undulation", seconds=6.0, look_heading_rad=0.3)
+    prepared = prepare_gait(
+        "lateral-undulation", seconds=6.0, keys={"run.gait.look_heading_rad": 0.3}
+    )
     record = read_log(run_robot(RunRequest(prepared, tmp_path)).log)
     r = record.pose.rotation
     late = record.pose.time_s > record.pose.time_s[0] + 3.0
@@ -176,9 +179,8 @@ def test_an_operators_keys_change_a_run_over_the_bus(tmp_path: Path) -> None:
         return [next(presses, "?")] if next(beat) % 60 == 59 else []
 
     said: list[str] = []
-    job = prepare_gait(
-        "sidewinding",
-        seconds=6.0,
+    job = replace(
+        prepare_gait("sidewinding", seconds=6.0),
         make_operator=lambda m, r, on_event: Operator(m, r, keys, on_event),
     )
     finished = run_robot(RunRequest(job, tmp_path, on_event=lambda kind, text: said.append(text)))

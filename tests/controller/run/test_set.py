@@ -111,12 +111,17 @@ def test_a_gait_and_a_recording_run_with_what_is_set() -> None:
 def test_every_wrong_key_is_told_at_once() -> None:
     with pytest.raises(InputError) as caught:
         prepare_gait(
-            "rolling", keys={"seed": 1, "rbot.servo.baud": 1, "run.gait.name": "x", "run": 1}
+            "rolling",
+            keys={"seed": 1, "rbot.servo.baud": 1, "run.gait.name": "x", "run": 1, "run.gait": {}},
         )
     begins = "a key begins with run., robot. or world."
     assert caught.value.faults == (
         f"seed: {begins}; did you mean run.seed?",
         f"rbot.servo.baud: {begins}; did you mean robot.servo.baud?",
-        "run.gait.name: is given by --param, --seconds, --then, --by, --look-heading-rad",
+        "run.gait.name: is given by the command",
         f"run: {begins}",
+        "run.gait: is given by the command",
+        "run.gait: is given by --param",
+        "run.gait: is given by --seconds",
+        "run.gait: is given by --then",
     )

@@ -198,7 +198,9 @@ def test_what_is_set_in_the_page_changes_the_gait(
 
     finished = run_robot(
         RunRequest(
-            prepare_gait("lateral-undulation", seconds=1.0, make_operator=hands.operator),
+            dataclasses.replace(
+                prepare_gait("lateral-undulation", seconds=1.0), make_operator=hands.operator
+            ),
             tmp_path / "run",
             observers=Observers(view),
             stop_requested=hands.torque_off,
@@ -237,7 +239,9 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
 
     finished = run_robot(
         RunRequest(
-            prepare_gait("lateral-undulation", seconds=10.0, make_operator=hands.operator),
+            dataclasses.replace(
+                prepare_gait("lateral-undulation", seconds=10.0), make_operator=hands.operator
+            ),
             tmp_path / "run",
             observers=Observers(view),
             stop_requested=hands.torque_off,
