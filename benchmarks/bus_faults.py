@@ -107,7 +107,7 @@ class Bench:
         self.robot = RobotConfig(name="bench", joint_axes="yp" * (joints // 2))
         self.plant = BenchPlant(joints)
         bank = ServoBank(self.robot.servo_ids, baud=baud)
-        self.line = SimLine(bank, self.plant, baud=baud, usb_latency_s=usb_latency_s)
+        self.line = SimLine(bank, self.plant, usb_latency_s=usb_latency_s)
         self.period_s, self.reports = period_s, list[tuple[float, str]]()
         self.policy: Policy = scenario.policy if scenario else "stop"
         slow = max(1.0, period_s / 0.02)

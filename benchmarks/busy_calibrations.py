@@ -13,7 +13,7 @@ from benchmarks.rows import Row
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.controller.bench.calibration.chain_calibration import calibrate
+from snakewalk.controller.bench.calibration.chain_calibration import CalibrationSettings, calibrate
 from snakewalk.controller.bench.calibration.progress import SeenBend
 from snakewalk.drivers.errors import DriverError
 from snakewalk.sim.faults.fault_player import FaultPlayer
@@ -91,10 +91,11 @@ def calibrated(seed: int, *, sweep: bool = True) -> BusyCalibration:
     script, lines = Script(), list[str]()
     try:
         found = calibrate(
-            *(line, LIKE, script),
+            line,
+            LIKE,
+            script,
             name="trio",
-            latency_s=0.02,
-            sweep=sweep,
+            settings=CalibrationSettings(latency_s=0.02, sweep=sweep),
             on_progress=lines.append,
         ).robot
     except (DriverError, InputError):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress, Sensors
+from snakewalk.controller.runtime.drive import Drive, OnProgress, Progress, Sensors, Watchers
 from snakewalk.controller.runtime.friction_monitor import FrictionMonitor, OnPaper
 from snakewalk.controller.runtime.loop import ticks
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
@@ -89,7 +89,7 @@ class SimulatedRobot:
         self.plant.reset(run.start_m, prepared.start_heading_rad, straight)
         servo = robot.servo
         bank = ServoBank(robot.servo_ids, servo.model, servo.baud)
-        self.line = SimLine(bank, self.plant, baud=servo.baud)
+        self.line = SimLine(bank, self.plant)
         chain = ServoChain(DynamixelBus(self.line, servo.model), robot)
         limits = SafetyLimits.from_config(robot, run.safety)
         self.link = SafeLink(chain, limits, self.line.clock)
@@ -105,11 +105,9 @@ class SimulatedRobot:
             sensors=Sensors(lambda _: self.plant.head_pose(), lambda: self.line.busy_s),
             motion=pilot,
             log=log,
-            robot=self._prepared.robot,
-            run=run,
-            gain=self._prepared.gain,
+            plan=self._prepared,
+            watchers=Watchers(on_progress=on_progress),
             friction=friction if run.walk.finds_friction else None,
-            on_progress=on_progress,
         )
         tripped = drive.run().tripped
         if tripped:

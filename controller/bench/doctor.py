@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from snakewalk.config.robot import ImuConfig, RobotConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig, SafetyConfig
 from snakewalk.config.servo_model import ServoModel, wire_format
 from snakewalk.controller.bench import adapter, line_checks
 from snakewalk.controller.bench import servo_checks as servos
@@ -37,6 +38,8 @@ from snakewalk.drivers.port.network_port import NetworkPort
 from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 
+OnStep = Callable[[str], None]
+"""Called with the name of a step."""
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
 _FEETECH_MEASURED = ("Present Position", "Present Temperature")
@@ -61,19 +64,19 @@ _NOISE_TRIES = 10
 def examine(
     port: BytePort,
     robot: RobotConfig,
-    safety: SafetyConfig,
-    rate_hz: float,
+    run: RunConfig,
     *,
     latency_s: float,
     latency_timer_ms: int | None,
     wiggle: bool = False,
     on_it: Sequence[int] | None = None,
-    on_progress: Callable[[str], None] = lambda step: None,
+    on_progress: OnStep = lambda _: None,
 ) -> list[Finding]:
     """Findings about the bus, worst causes first.
 
     With ``wiggle``, where nothing has failed: the chain is set up as in a run, and all joints move
-    by 0.15 rad for 2 s, to measure the supply under load. ``on_it`` are the servos, and the IMU,
+    by 0.15 rad for 2 s, to measure the supply under load. ``run`` has the safety limits and the
+    rate of the control cycle. ``on_it`` are the servos, and the IMU,
     that this port is to have; default: all of the robot's.
 
     Raises:
@@ -82,7 +85,6 @@ def examine(
     """
     findings = [adapter.latency_timer(latency_timer_ms, port.name)]
     expected = robot.servo_ids
-    baud = port.getBaudRate()
     models = robot.models_on(on_it)
     imu = robot.imu
     if on_it is not None:
@@ -120,16 +122,16 @@ def examine(
     readable = _readable(bus, pings, reads, noise, findings)
     reports = _reports(bus, robot, readable, findings, noise) if readable else ()
     if reports:
-        findings += _servo_findings(bus, robot, safety, reports, noise)
+        findings += _servo_findings(bus, robot, run.safety, reports, noise)
         on_progress("group reads")
         findings.append(_line_quality(bus, models, reports, latency_s))
     last = servos.read_clocks(bus, [*clocks], servos.PATIENCE_S)
     findings += servos.restarts(clocks, last, robot)
-    budget = robot_budget(robot, baud, fast=all(s.fast_reads for s in reports))
-    findings.append(adapter.wire(budget, rate_hz))
+    budget = robot_budget(robot, port.getBaudRate(), fast=all(s.fast_reads for s in reports))
+    findings.append(adapter.wire(budget, run.cycle_hz))
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
-        findings += supply_under_load(bus, robot, safety)
+        findings += supply_under_load(bus, robot, run.safety)
     return findings
 
 
@@ -160,7 +162,7 @@ def _presence(
     imu: ImuConfig | None,
     noise: Finding | None,
     overheard: Overheard,
-    on_progress: Callable[[str], None],
+    on_progress: OnStep,
 ) -> list[Finding]:
     """Findings about the devices on the line: the robot's, others, and those that are missing."""
     port = bus.port
@@ -228,22 +230,24 @@ def _servo_findings(
     ]
 
 
+def _show_step(on_progress: OnStep, port: str, step: str) -> None:
+    on_progress(f"{port}: {step}")
+
+
 def examine_segments(
     segments: Sequence[tuple[SerialPort | NetworkPort, Sequence[int]]],
     robot: RobotConfig,
-    safety: SafetyConfig,
-    rate_hz: float,
+    run: RunConfig,
     *,
     wiggle: bool = False,
-    on_progress: Callable[[str], None] = lambda step: None,
+    on_progress: OnStep = lambda _: None,
 ) -> list[Finding]:
     """Findings about the ports of a chain's segments, each with its port's name; as ``examine``.
 
     Args:
         segments: port and IDs of each; the ports share a clock.
         robot: with a table ``[[ports]]`` of them.
-        safety: as of a run.
-        rate_hz: of its control cycle.
+        run: has the safety limits and the rate of the control cycle.
         wiggle: all joints at once.
         on_progress: called with the port and the step.
 
@@ -251,19 +255,14 @@ def examine_segments(
     findings: list[Finding] = []
     for line, ids in segments:
         name = line.name
-
-        def show_step(step: str, name: str = name) -> None:
-            on_progress(f"{name}: {step}")
-
         on_this = examine(
             line,
             robot,
-            safety,
-            rate_hz,
+            run,
             latency_s=line.latency_s,
             latency_timer_ms=line.latency_timer_ms,
             on_it=ids,
-            on_progress=show_step,
+            on_progress=partial(_show_step, on_progress, name),
         )
         findings = [
             each for each in findings if each.check != adapter.WIRE_CHECK
@@ -280,7 +279,7 @@ def examine_segments(
             (servo_bus(line, robot.models_on(ids), latency_s=line.latency_s), ids)
             for line, ids in segments
         ]
-        findings += supply_under_load(SegmentedBus(parts), robot, safety)
+        findings += supply_under_load(SegmentedBus(parts), robot, run.safety)
     return findings
 
 
@@ -382,7 +381,7 @@ def _unreadable(error: BusError, noise: Finding | None) -> Finding:
 
 
 def _at_other_bauds(
-    bus: DynamixelBus, missing: Sequence[int], on_progress: Callable[[str], None]
+    bus: DynamixelBus, missing: Sequence[int], on_progress: OnStep
 ) -> dict[int, int]:
     if not missing:
         return {}

@@ -9,6 +9,8 @@ The other laws (``config.friction_law``), and an ellipse with a coefficient back
 where the forces vanish, and falls back to a fixed point iteration.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from snakewalk.config.arrays import Floats
@@ -47,6 +49,14 @@ class NoBalanceError(ArithmeticError):
     """The slope's load exceeds friction: without inertia, the velocity is infinite."""
 
 
+class Inertia(NamedTuple):
+    """Motion of a body with inertia before a step."""
+
+    before_m_s: Floats
+    """(L, 2) velocities of the links at the start of the step, in the body frame."""
+    step_s: float
+
+
 def rigid_velocity(
     points_m: Floats,
     headings_rad: Floats,
@@ -56,8 +66,13 @@ def rigid_velocity(
     *,
     tangential: Floats | None = None,
     normal: Floats | None = None,
+    inertia: Inertia | None = None,
 ) -> Floats:
     """Velocity (vx, vy, omega) of a body frame at its origin that balances friction.
+
+    With inertia it is the velocity at the end of a step (implicit Euler). The power gains half the
+    squared change of the links' velocity, times ``1 / (g step)`` per weight. A body beyond the
+    friction limit then accelerates at a finite rate.
 
     Args:
         points_m: (L, 2) link centres in the body frame.
@@ -68,58 +83,21 @@ def rigid_velocity(
         tangential: (L, 2) gravity along the ground on each link, in the body frame, in weights of a
             link: ``sin(slope)`` down the slope. None is level ground.
         normal: (L,) load of each link on the ground, in weights of a link: ``cos(slope)``.
+        inertia: motion before the step; None of a body without inertia.
 
     Returns:
         (3,) m/s, m/s, rad/s.
 
     Raises:
-        NoBalanceError: the slope's load exceeds friction; the body slides.
+        NoBalanceError: the slope's load exceeds friction, and the body has no inertia.
 
     """
     velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
     linear = np.zeros(3) if tangential is None else _wrench(points_m, tangential)
-    table = _table(points_m, headings_rad, shape_m_s, normal)
-    if not _minimise(table, len(points_m), friction, linear, velocity):
-        raise NoBalanceError
-    return velocity
-
-
-def inertial_velocity(
-    points_m: Floats,
-    headings_rad: Floats,
-    shape_m_s: Floats,
-    friction: FrictionConfig,
-    before_m_s: Floats,
-    step_s: float,
-    guess: Floats | None = None,
-    *,
-    tangential: Floats | None = None,
-    normal: Floats | None = None,
-) -> Floats:
-    """``rigid_velocity`` of a body with inertia, at the end of a step (implicit Euler).
-
-    The power gains half the squared change of the links' velocity, times ``1 / (g step)`` per
-    weight. A body beyond the friction limit then accelerates at a finite rate.
-
-    Args:
-        points_m: as in ``rigid_velocity``.
-        headings_rad: as in ``rigid_velocity``.
-        shape_m_s: as in ``rigid_velocity``.
-        friction: as in ``rigid_velocity``.
-        before_m_s: (L, 2) velocities of the links at the start of the step, in the body frame.
-        step_s: duration.
-        guess: as in ``rigid_velocity``.
-        tangential: as in ``rigid_velocity``.
-        normal: as in ``rigid_velocity``.
-
-    Returns:
-        (3,) m/s, m/s, rad/s.
-
-    """
-    velocity = np.zeros(3) if guess is None else np.array(guess, dtype=float)
-    linear = np.zeros(3) if tangential is None else _wrench(points_m, tangential)
+    before_m_s, step_s = inertia or (None, None)
     table = _table(points_m, headings_rad, shape_m_s, normal, before_m_s)
-    _minimise(table, len(points_m), friction, linear, velocity, step_s)
+    if not _minimise(table, len(points_m), friction, linear, velocity, step_s) and not inertia:
+        raise NoBalanceError
     return velocity
 
 
@@ -182,7 +160,7 @@ def _minimise(
 def add_inertia(
     table: Floats, rows: int, links: int, step_s: float, linear: Floats, quadratic: Floats
 ) -> None:
-    """Add the inertia of a step to the power per weight of a link; see ``inertial_velocity``.
+    """Add the inertia of a step to the power per weight of a link; see ``Inertia``.
 
     Args:
         table: from ``link_table``; centres, change of shape and previous movement are read.

@@ -253,7 +253,7 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         backend=header.backend,
         software=header.software,
         config_hash=header.config_hash,
-        seed=header.seed,
+        seed=header.run.seed,
         log_complete=record.complete,
         log_note=record.note,
         outcome=_outcome(record, waypoints, len(times), tripped),

@@ -11,7 +11,6 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WorldConfig
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
@@ -212,23 +211,14 @@ class CrowdScene:
 
 def film_crowd(
     scene: CrowdScene,
-    robot: RobotConfig,
-    world: WorldConfig,
-    ground: HeightField,
-    bodies: int,
-    seconds: float,
+    view: CrowdView,
     path: Path,
     *,
+    seconds: float,
     frame_s: float,
     on_frame: Callable[[int], None] = lambda done: None,
 ) -> int:
-    """Draw the film into ``path`` (.mp4); the number of its frames.
-
-    Raises:
-        InputError: nothing draws here without a screen.
-
-    """
-    view = CrowdView(robot, world, ground, bodies, SIZE_PX)
+    """Draw the film into ``path`` (.mp4) and close the view; returns the number of frames."""
     try:
         shots = scene.shots(round(seconds * FPS), round(1.0 / (FPS * frame_s)))
         return render_crowd(view, shots, path, fps=FPS, size_px=SIZE_PX, on_frame=on_frame)

@@ -1,6 +1,5 @@
 """Files made from a run's record: ``summary.json``, ``film.mp4`` and ``report.html``."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -10,10 +9,8 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
 from snakewalk.controller.metrics.summary import RunSummary, summary
-from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report.film import film_run, film_times
-from snakewalk.controller.report.page import Section, film_on_page, page
-from snakewalk.controller.report.trip import trip_of
+from snakewalk.controller.report.page import Drawings, film_on_page, page
 from snakewalk.controller.run.results import SERVOS, Artifacts, film_look
 from snakewalk.controller.run.run_robot import write_summary
 from snakewalk.controller.runlog.record import RunRecord
@@ -52,7 +49,7 @@ def make_artifacts(
     notes: list[str] = []
     numbers = write_summary(summary(record) if numbers is None else numbers, folder)
     path = folder / FILM
-    drawn: _Drawn | None = None
+    drawn: Drawings | None = None
     try:
         drawn = _draw(record, made)
         _write_page(record, folder, path if path.exists() else None, numbers, drawn, folders)
@@ -83,22 +80,12 @@ def build_report(
     return _write_page(record, out_dir, film, numbers, _draw(record))
 
 
-@dataclass(frozen=True, slots=True)
-class _Drawn:
-    """Parts that a page shows next to its film."""
-
-    sections: list[Section]
-    curves: str
-    """HTML."""
-    made: str
-
-
-def _draw(record: RunRecord, made: str = "") -> _Drawn:
+def _draw(record: RunRecord, made: str = "") -> Drawings:
     require_extra("the report needs", "matplotlib", "plotly")
     require_extra("the report needs", "jinja2")
     from snakewalk.controller.report.figures.sections import drawn  # noqa: PLC0415  an extra
 
-    return _Drawn(*drawn(record), made)
+    return Drawings(*drawn(record), made)
 
 
 def _write_page(
@@ -106,27 +93,16 @@ def _write_page(
     out_dir: Path,
     film: Path | None,
     numbers: RunSummary,
-    drawn: _Drawn,
+    drawn: Drawings,
     folders: bool = False,
 ) -> Path:
-    header = record.header
     shown = None if film is None else film_on_page(film, out_dir, *film_times(record))
-    config = {
-        "run": header.run.model_dump(mode="json"),
-        "robot": header.robot.model_dump(mode="json"),
-        "world": header.world.model_dump(mode="json"),
-    }
     html = page(
+        record,
         numbers,
-        verdict(record, numbers, LOG),
-        drawn.sections,
+        drawn,
         film=shown,
-        events=record.events,
-        trip=trip_of(record),
-        config=config,
-        curves=drawn.curves,
         links=[name for name in (LOG, SUMMARY, FILM) if (out_dir / name).exists()],
-        made=drawn.made,
         folders=folders,
     )
     path = out_dir / REPORT

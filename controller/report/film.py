@@ -1,6 +1,6 @@
 """Film of a run, from the head pose and the joint angles in its log; on metal too."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Final
@@ -13,11 +13,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.ground import build_ground
 from snakewalk.config.heightfield import HeightField
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WorldConfig
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.track.bone_motion import BoneMotion
 
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook
@@ -53,7 +50,7 @@ def film_run(
             the log holds no two poses.
 
     """
-    film = _renderer()
+    film = renderer()
     header = record.header
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
@@ -62,9 +59,7 @@ def film_run(
     plan = header.plan
     measured = header.pose_evidence.is_measured
     drawn: int = film.render_film(
-        header.robot,
-        header.world,
-        _ground(header),
+        film.Scene(header.robot, header.world, _ground(header)),
         time_s,
         qpos,
         path,
@@ -90,60 +85,8 @@ def film_run(
     return drawn
 
 
-def film_motion(
-    motion: BoneMotion,
-    path: Path,
-    *,
-    look: "SkinLook",
-    robot: RobotConfig,
-    world: WorldConfig,
-    ground: HeightField | None,
-    waypoints_m: Sequence[tuple[float, float]] = (),
-    waypoint_radius_m: float = 0.3,
-    reached_s: Sequence[float] = (),
-    paths: Sequence[tuple[float, Floats]] = (),
-    title: str = "",
-    on_progress: Callable[[int, int], None] | None = None,
-) -> int:
-    """Draw the film of a skin that no robot moves into ``path`` (.mp4); the number of its frames.
-
-    Args:
-        motion: its bones.
-        path: of the film; its folder exists.
-        look: free, of as many bones.
-        robot: for the size of the body.
-        world: where.
-        ground: its height field, None if flat.
-        waypoints_m: drawn as rings.
-        waypoint_radius_m: of these rings.
-        reached_s: when they turn green.
-        paths: each the time from when on it is in force and (P, 2) points.
-        title: shown in the caption.
-        on_progress: called with (frames done, of).
-
-    Raises:
-        InputError: the simulator or PyAV is not installed, or nothing draws here without a screen.
-
-    """
-    film = _renderer()
-    frames, bones = motion.front_m.shape[:2]
-    turns = Rotation.from_matrix(motion.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    poses = np.concatenate([motion.front_m, turns.reshape(frames, bones, 4)], axis=2)
-    drawn: int = film.render_film(
-        robot,
-        world,
-        ground,
-        motion.time_s,
-        poses.reshape(frames, -1),
-        path,
-        style=film.Style(FPS, speed_up(float(motion.time_s[-1])), SIZE, title, look),
-        marks=film.Marks(waypoints_m, waypoint_radius_m, reached_s, paths),
-        on_frame=on_progress,
-    )
-    return drawn
-
-
-def _renderer() -> ModuleType:
+def renderer() -> ModuleType:
+    """Return the module that draws films."""
     require_extra("films need", "mujoco", "av")
     from snakewalk.sim.rendering import film  # noqa: PLC0415  an extra
 

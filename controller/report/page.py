@@ -10,15 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from urllib.parse import quote
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
-from snakewalk.controller.metrics.verdict import RunVerdict
-from snakewalk.controller.report.trip import Trip
-from snakewalk.controller.runlog.record import Event
+from snakewalk.controller.metrics.verdict import RunVerdict, verdict
+from snakewalk.controller.report.trip import trip_of
+from snakewalk.controller.runlog.record import Event, RunRecord
 
 _EVENTS_SHOWN = 300
 INLINE_BYTES: Final = 8_000_000
@@ -37,6 +38,16 @@ class Section:
     """Whether it is shown at a click only: the curves have it as well."""
 
 
+class Drawings(NamedTuple):
+    """Figures of a page, its curves, and the command that drew them."""
+
+    sections: Sequence[Section]
+    curves: str = ""
+    """HTML made by ``curves_html``, or empty."""
+    made: str = ""
+    """Command, place and time; may be empty."""
+
+
 @dataclass(frozen=True, slots=True)
 class Film:
     """A film on the page."""
@@ -51,35 +62,35 @@ class Film:
 
 
 def page(
+    record: RunRecord,
     numbers: RunSummary,
-    found: RunVerdict,
-    sections: Sequence[Section],
+    drawings: Drawings,
     *,
-    film: Film | None,
-    events: Sequence[Event],
-    trip: Trip | None = None,
-    config: Mapping[str, Any],
-    curves: str = "",
+    film: Film | None = None,
     links: Sequence[str] = (),
-    made: str = "",
     folders: bool = False,
 ) -> str:
     """Return the page as HTML; ``templates/page.html`` has its layout.
 
     Args:
+        record: the log of the run.
         numbers: of the run.
-        found: verdict on the run.
-        sections: its figures.
+        drawings: its figures and curves.
         film: shown first, if there is one.
-        events: of the log.
-        trip: shown above the headline numbers, if there is one.
-        config: run, robot and world.
-        curves: HTML made by ``curves_html``, or empty.
         links: names of files in the same folder as the page.
-        made: command, place and time that made the page; may be empty.
         folders: whether the texts keep the folders of the user's files.
 
     """
+    header = record.header
+    found = verdict(record, numbers, LOG)
+    events: Sequence[Event] = record.events
+    trip = trip_of(record)
+    made = drawings.made
+    config: Mapping[str, Any] = {
+        "run": header.run.model_dump(mode="json"),
+        "robot": header.robot.model_dump(mode="json"),
+        "world": header.world.model_dump(mode="json"),
+    }
     if not folders:
         known = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
         texts: dict[str, Any] = {
@@ -104,8 +115,8 @@ def page(
             tiles=_tiles(numbers),
             film=film,
             trip=trip,
-            curves=curves,
-            sections=sections,
+            curves=drawings.curves,
+            sections=drawings.sections,
             events=events[:_EVENTS_SHOWN],
             more_events=max(0, len(events) - _EVENTS_SHOWN),
             details=[

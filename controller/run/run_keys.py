@@ -54,7 +54,7 @@ def checked_keys(
         if file not in _FIELDS or not (dot and all(rest.split("."))):
             faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
         for own, option in (refused or {}).items():
-            if f"{key}.".startswith(f"{own}.") or own.startswith(f"{key}."):
+            if f"{key}.".startswith(f"{own}.") or (dot and own.startswith(f"{key}.")):
                 faults.append(f"{key}: is given by {option}")
     if faults:
         raise InputError(faults)

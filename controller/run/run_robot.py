@@ -54,9 +54,16 @@ from snakewalk.controller.run.run_ending import RunEnding
 from snakewalk.controller.run.servo_setup import check_compliance, motor_constants
 from snakewalk.controller.runlog.evidence import PoseEvidence
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import InitialPose, PlanSummary
+from snakewalk.controller.runlog.record import Header, InitialPose, PlanSummary
 from snakewalk.controller.runlog.writer import RunLog
-from snakewalk.controller.runtime.drive import CycleObserver, Drive, OnEvent, Outcome, Sensors
+from snakewalk.controller.runtime.drive import (
+    CycleObserver,
+    Drive,
+    OnEvent,
+    Outcome,
+    Sensors,
+    Watchers,
+)
 from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
@@ -274,13 +281,13 @@ def drive(request: RunRequest, opened: OpenedRun) -> Outcome:
         ),
         motion=opened.source,
         log=opened.log,
-        robot=prepared.robot,
-        run=prepared.run,
-        gain=prepared.gain,
-        observer=opened.shadow,
+        plan=prepared,
+        watchers=Watchers(
+            opened.shadow,
+            opened.observers.reporting(request.on_progress),
+            request.on_event,
+        ),
         friction=opened.friction,
-        on_progress=opened.observers.reporting(request.on_progress),
-        on_event=request.on_event,
     )
     with raised_priority() if opened.is_on_wire else nullcontext():
         outcome = loop.run()
@@ -361,19 +368,21 @@ def _log_header(
 ) -> None:
     torque_constant_n_m_a, winding = motor_constants(prepared.robot)
     log.config(
-        prepared.run,
-        checked.robot,
-        prepared.world,
-        backend=backend.name,
-        plan=checked.plan,
-        ground=prepared.ground,
-        initial_pose=checked.initial_pose,
-        torque_constant_n_m_a=torque_constant_n_m_a,
-        winding=winding,
-        pose_evidence=evidence,
-        port_is_pseudo_terminal=(
-            is_pseudo_terminal(checked.ports) if checked.rehearsed is None else True
-        ),
+        Header(
+            prepared.run,
+            checked.robot,
+            prepared.world,
+            backend=backend.name,
+            plan=checked.plan,
+            ground=prepared.ground,
+            initial_pose=checked.initial_pose,
+            torque_constant_n_m_a=torque_constant_n_m_a,
+            winding=winding,
+            pose_evidence=evidence,
+            port_is_pseudo_terminal=(
+                is_pseudo_terminal(checked.ports) if checked.rehearsed is None else True
+            ),
+        )
     )
 
 

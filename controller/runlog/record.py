@@ -1,13 +1,16 @@
 """A run as its log describes it: one table for each topic, rows in order of time."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
+from importlib.metadata import version
 from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.loader import digest
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
@@ -85,23 +88,23 @@ class InitialPose:
 class Header:
     """Software and configuration of a run."""
 
-    software: str
-    backend: str
-    config_hash: str
-    seed: int
     run: RunConfig
     robot: RobotConfig
     world: WorldConfig
+    backend: str
     plan: PlanSummary
-    ground: HeightField | None
-    """Thinned; None on a flat floor."""
-    torque_constant_n_m_a: float
-    winding: Winding | None
-    """Winding of the robot's servos; None if the log does not state it."""
-    initial_pose: InitialPose | None
-    """None on servos."""
     pose_evidence: PoseEvidence
     """How the poses of the log are known."""
+    ground: HeightField | None = None
+    """Thinned; None on a flat floor."""
+    torque_constant_n_m_a: float = float("nan")
+    winding: Winding | None = None
+    """Winding of the robot's servos; None if the log does not state it."""
+    initial_pose: InitialPose | None = None
+    """None on servos."""
+    software: str = field(default_factory=partial(version, "snakewalk"))
+    config_hash: str = ""
+    """Digest of run, robot and world; set when the log is read."""
     port_is_pseudo_terminal: bool | None = None
     """Whether the servos answered on a pseudo-terminal, as a served simulation does; None where
     the log does not say it."""
@@ -115,8 +118,8 @@ class Header:
             "format": FORMAT,
             "software": self.software,
             "backend": self.backend,
-            "config_hash": self.config_hash,
-            "seed": self.seed,
+            "config_hash": digest(self.run, self.robot, self.world),
+            "seed": self.run.seed,
             "run": self.run.model_dump(mode="json"),
             "robot": self.robot.model_dump(mode="json"),
             "world": self.world.model_dump(mode="json"),
@@ -159,7 +162,6 @@ class Header:
             software=row["software"],
             backend=row["backend"],
             config_hash=row["config_hash"],
-            seed=row["seed"],
             run=run,
             robot=robot,
             world=WorldConfig.model_validate(row["world"]),
@@ -281,10 +283,10 @@ class RunRecord:
         if start_s == 0.0:
             return self
         moved: dict[str, Any] = {}
-        for field in fields(self):
-            table = getattr(self, field.name)
+        for entry in fields(self):
+            table = getattr(self, entry.name)
             if isinstance(table, Table):
-                moved[field.name] = _earlier(table, start_s)
+                moved[entry.name] = _earlier(table, start_s)
         plan = self.header.plan
         if plan.set_s is not None:
             plan = replace(plan, set_s=plan.set_s - start_s)

@@ -14,15 +14,9 @@ from mcap.writer import Writer
 from numpy.typing import ArrayLike
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.heightfield import HeightField
-from snakewalk.config.loader import digest
 from snakewalk.config.plain_text import plain
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import RunConfig
-from snakewalk.config.world import WorldConfig
 from snakewalk.controller.runlog.column import Table
-from snakewalk.controller.runlog.evidence import PoseEvidence, evidence_of_old_log
-from snakewalk.controller.runlog.record import Header, InitialPose, PlanSummary, Winding
+from snakewalk.controller.runlog.record import Header
 from snakewalk.controller.runlog.row_printer import RowPrinter
 from snakewalk.controller.runlog.topics import (
     TABLES,
@@ -125,38 +119,8 @@ class RunLog:
         else:
             self._part.replace(self.path)
 
-    def config(
-        self,
-        run: RunConfig,
-        robot: RobotConfig,
-        world: WorldConfig,
-        *,
-        backend: str,
-        plan: PlanSummary,
-        ground: HeightField | None = None,
-        torque_constant_n_m_a: float = float("nan"),
-        winding: Winding | None = None,
-        initial_pose: InitialPose | None = None,
-        pose_evidence: PoseEvidence | None = None,
-        port_is_pseudo_terminal: bool | None = None,
-    ) -> None:
+    def config(self, header: Header) -> None:
         """Log the configuration, once and first; the ground is thinned for reports."""
-        header = Header(
-            software=version("snakewalk"),
-            backend=backend,
-            config_hash=digest(run, robot, world),
-            seed=run.seed,
-            run=run,
-            robot=robot,
-            world=world,
-            plan=plan,
-            ground=ground,
-            torque_constant_n_m_a=torque_constant_n_m_a,
-            winding=winding,
-            initial_pose=initial_pose,
-            pose_evidence=pose_evidence or evidence_of_old_log(run, backend, robot.imu is not None),
-            port_is_pseudo_terminal=port_is_pseudo_terminal,
-        )
         self._write(ConfigTable, 0.0, header.row())
         self._has_config = True
         self._flush()

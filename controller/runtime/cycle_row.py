@@ -3,6 +3,7 @@
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runtime.loop import Tick
 from snakewalk.drivers.link import VettedLink
 from snakewalk.drivers.types import JointState
 
@@ -13,8 +14,7 @@ def log_cycle(
     state: JointState,
     goal_rad: Floats,
     *,
-    deadline_s: float,
-    lateness_s: float,
+    tick: Tick,
     wire_busy_s: float,
     energy: MotorEnergy,
     yield_rad: Floats | None = None,
@@ -27,12 +27,12 @@ def log_cycle(
     clamped = () if verdict is None else verdict.clamped.nonzero()[0].tolist()
     sent_rad = state.position_rad if verdict is None else verdict.goal_rad
     log.cycle(
-        deadline_s,
+        tick.deadline_s,
         goal_rad,
         sent_rad,
         state,
-        deadline_s=deadline_s,
-        lateness_s=lateness_s,
+        deadline_s=tick.deadline_s,
+        lateness_s=tick.lateness_s,
         wire_busy_s=wire_busy_s,
         **energy._asdict(),
         yield_rad=yield_rad,

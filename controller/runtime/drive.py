@@ -153,6 +153,36 @@ class Sensors:
     """Whether something measures the pose; otherwise the run only believes where the body is."""
 
 
+class DrivePlan(Protocol):
+    """A checked run, as ``PreparedRun``."""
+
+    @property
+    def run(self) -> RunConfig:
+        """Configuration of the run."""
+        ...
+
+    @property
+    def robot(self) -> RobotConfig:
+        """The body."""
+        ...
+
+    @property
+    def gain(self) -> float:
+        """Predicted advance per distance of the shape along the body."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Watchers:
+    """Objects that follow a run and steer nothing."""
+
+    observer: CycleObserver | None = None
+    on_progress: OnProgress = lambda progress: None
+    """Called after each cycle."""
+    on_event: OnEvent = lambda kind, text: None
+    """Called with decisions of the motion."""
+
+
 class Drive:
     """Runs a motion on a link; construct, then ``run()`` once."""
 
@@ -164,15 +194,14 @@ class Drive:
         sensors: Sensors,
         motion: MotionSource,
         log: RunLog,
-        robot: RobotConfig,
-        run: RunConfig,
-        gain: float,
-        observer: CycleObserver | None = None,
+        plan: DrivePlan,
+        watchers: Watchers = Watchers(),
         friction: FrictionEstimator | None = None,
-        on_progress: OnProgress = lambda progress: None,
-        on_event: OnEvent = lambda kind, text: None,
     ) -> None:
-        self._observer = observer
+        self._observer = watchers.observer
+        robot = plan.robot
+        run = plan.run
+        gain = plan.gain
         self._link = link
         self._clock = clock
         self._pose = sensors.pose
@@ -195,7 +224,7 @@ class Drive:
         self._battery_s = -math.inf
         self._derating = Derating(run.safety, robot, self._on_derating, self._load)
         self._compliance = None if run.compliance is None else Compliance(run.compliance, robot)
-        self._on_progress, self._on_event = on_progress, on_event
+        self._on_progress, self._on_event = watchers.on_progress, watchers.on_event
         self._wire_busy_s = sensors.wire_busy_s
         self._wire_s = sensors.wire_busy_s()
         self._energy = sensors.energy
@@ -437,8 +466,7 @@ class Drive:
             self._link,
             state,
             goal,
-            deadline_s=tick.deadline_s,
-            lateness_s=tick.lateness_s,
+            tick=tick,
             wire_busy_s=self._wire_s - before_s,
             energy=self._energy(),
             yield_rad=None if self._compliance is None else self._compliance.yield_rad,

@@ -23,8 +23,8 @@ from snakewalk.controller.kinematics.links import (
 )
 from snakewalk.controller.mechanics.load import friction_n, yaw_load_n_m
 from snakewalk.controller.mechanics.rigid_motion import (
+    Inertia,
     NoBalanceError,
-    inertial_velocity,
     rigid_velocity,
 )
 from snakewalk.controller.mechanics.slope_load import holding_factor, slope_load
@@ -230,16 +230,15 @@ class _PaperBody:
                 normal=normal,
             )
         except NoBalanceError:
-            self._velocity = inertial_velocity(
+            self._velocity = rigid_velocity(
                 points,
                 headings,
                 shape_m_s,
                 friction,
-                was_m_s,
-                self._step_s,
                 self._velocity,
                 tangential=tangential,
                 normal=normal,
+                inertia=Inertia(was_m_s, self._step_s),
             )
             return False
         return True

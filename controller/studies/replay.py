@@ -20,6 +20,7 @@ from snakewalk.controller.repertoire import repertoire_run
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.runlog.evidence import evidence_of_old_log
 from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
@@ -57,15 +58,18 @@ def replay(
     total = len(cycle.time_s)
     with RunLog(log) as out:
         out.config(
-            header.run,
-            robot,
-            header.world,
-            backend="sim",
-            plan=header.plan,
-            ground=header.ground,
-            torque_constant_n_m_a=header.torque_constant_n_m_a,
-            winding=header.winding,
-            initial_pose=header.initial_pose,
+            Header(
+                header.run,
+                robot,
+                header.world,
+                backend="sim",
+                plan=header.plan,
+                ground=header.ground,
+                torque_constant_n_m_a=header.torque_constant_n_m_a,
+                winding=header.winding,
+                initial_pose=header.initial_pose,
+                pose_evidence=evidence_of_old_log(header.run, "sim", robot.imu is not None),
+            )
         )
         chain.enable()
         wire_s, start_s = backend.wire_busy_s(), clock.now_s()

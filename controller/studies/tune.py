@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
@@ -117,20 +117,29 @@ class Tuned:
         return int((better if self.aim == "speed" else ~better).sum())
 
 
+class Search(NamedTuple):
+    """Size of a search."""
+
+    budget: int
+    """Approximate number of runs."""
+    seeds: int
+    """Number of grounds for the comparison with the defaults."""
+    seconds: float
+    """Duration of a run."""
+    seed: int
+
+
 def tune(
     gait: str,
     robot: str,
     aim: Aim,
     *,
-    budget: int,
-    seeds: int,
-    seconds: float,
-    seed: int,
+    search: Search,
     workers: int,
     keys: Mapping[str, Any] | None = None,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> Tuned:
-    """Search with about ``budget`` runs, then compare with the defaults on ``seeds`` grounds.
+    """Search parameters, then compare them with the defaults on other grounds.
 
     ``keys`` as in ``prepare_gait``.
 
@@ -138,6 +147,7 @@ def tune(
         InputError: no such gait or robot, or they do not fit.
 
     """
+    budget, seeds, seconds, seed = search
     keys = gait_keys(keys)
     body = with_keys_of("robot", load_robot(robot), keys)
     kind = type(make_gait(gait))

@@ -98,9 +98,6 @@ def track_from_points(
     time_s: Floats | None = None,
     rate_assumed: bool = False,
     status: Sequence[FrameStatus] = (),
-    source: str = "not stated",
-    licence: str = "not stated",
-    notes: Sequence[str] = (),
 ) -> Track:
     """Build a ``Track`` from points (T, P, 2), head first, in any unit.
 
@@ -114,9 +111,6 @@ def track_from_points(
             cubic spline per point) at the rate of the median step.
         rate_assumed: whether ``rate_hz`` is a guess.
         status: of every frame (T,), or empty.
-        source: origin of the recording.
-        licence: its terms of use.
-        notes: lines about parts that the reader left out or changed.
 
     Raises:
         InputError: wrong shape, bad rate, or fewer than 2 whole frames.
@@ -162,12 +156,9 @@ def track_from_points(
         dropped=dropped,
         absent=absent,
         every=every,
-        notes=tuple(notes),
         rate_assumed=rate_assumed,
         uneven=uneven,
         status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
-        source=source,
-        licence=licence,
     )
 
 

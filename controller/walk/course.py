@@ -121,9 +121,10 @@ class Course:
         self.waypoints_m = np.asarray(waypoints_m, float)
         """(k, 2) in order."""
         self._goals_m: list[list[float]] = self.waypoints_m.tolist()  # plain numbers, for speed
-        self._radius_m, self._length_m = radius_m, length_m
+        self._radius_m = radius_m
+        self.length_m = length_m
         self._per_body = travel_per_body
-        self._feedback = feedback
+        self.feedback = feedback
         self._followers_m, self._gap_m = np.empty((2, 2)), np.empty(2)
         self._along_m = np.zeros(2)
         """Place of the body's centre on the path, and of its head."""
@@ -228,7 +229,7 @@ class Course:
         self._travel = travel
         if self.observe(centre_m, head_m, fall_back) or self.complete or self.is_planning:
             return
-        if self._feedback and travel >= self._replan_after:
+        if self.feedback and travel >= self._replan_after:
             self._note_gain()
             why = self._failing(centre_m)
             if why is None:
@@ -376,13 +377,13 @@ class Course:
             return "no advance on the path"
         if self._has_passed(centre_m):
             return f"waypoint {self.reached + 1} passed by"
-        if self._gap_m[0] > _OFF_PATH_BODIES * self._length_m:
+        if self._gap_m[0] > _OFF_PATH_BODIES * self.length_m:
             return f"{self._gap_m[0]:.2f} m off the path"
         return None
 
     def _note_gain(self) -> None:
         along_m = float(self._along_m[0])
-        if along_m > self._gained_m + _STALL_BODIES * self._length_m:
+        if along_m > self._gained_m + _STALL_BODIES * self.length_m:
             self._gained_m, self._gained_at = along_m, self._travel
 
     @property

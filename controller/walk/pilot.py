@@ -7,6 +7,7 @@ its effect on a body with friction.
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -108,6 +109,17 @@ class AsksAboutPieces(Protocol):
     answers: Callable[[], Mapping[int, Rolled | None]]
 
 
+@dataclass(frozen=True, slots=True)
+class PitchControl:
+    """Control of the pitch joints; none on a level floor."""
+
+    fitter: PitchFitter | None = None
+    """Fits the body to the ground."""
+    lead_s: float = 0.0
+    """Time by which the goals are ahead, because the servos lag."""
+    roll: RollCompensation | None = None
+
+
 class Pilot(OnCourse):
     """Steers a chooser of shapes along a path, within the limits of the joints."""
 
@@ -120,13 +132,9 @@ class Pilot(OnCourse):
         *,
         pace: Pace,
         course: Course,
-        pitch_fitter: PitchFitter | None = None,
-        pitch_lead_s: float = 0.0,
-        roll: RollCompensation | None = None,
+        pitch: PitchControl = PitchControl(),
         fall_back: Callable[[bool], None] | None = None,
-        length_m: float,
         carrot_m: float,
-        feedback: bool = True,
         aim_at_waypoint: bool = False,
     ) -> None:
         self._chooser = chooser
@@ -136,20 +144,19 @@ class Pilot(OnCourse):
         self._last_rad = self._earlier_rad = self._goal_rad
         self._last_s = self._earlier_s = self._saved_s = 0.0
         super().__init__(course)
-        self._pitch_fitter = pitch_fitter
+        self._pitch_fitter = pitch.fitter
         self._fall_back = fall_back or (lambda lost: None)
         self._pitch_rad: Floats | None = None
-        self._roll = roll
+        self._roll = pitch.roll
         self._table: TabulatedPath | None = None
         self._table_of: tuple[SplinePath, int] | None = None
         points = chooser.track.points
         self._links = len(self._goal_rad) + 1
         self._segments = np.arange(points)
         self._middles = (np.arange(self._links) + 0.5) * points / self._links - 0.5
-        self._pitch_lead_s = pitch_lead_s
-        self._segment_m = length_m / points
+        self._pitch_lead_s = pitch.lead_s
+        self._segment_m = course.length_m / points
         self._carrot_m = carrot_m
-        self._feedback = feedback
         self._aim_at_waypoint = aim_at_waypoint
         self._twin: TwinRollout | None = None
         self._asker: TwinAsker | None = None
@@ -424,7 +431,7 @@ class Pilot(OnCourse):
         if self._aim_at_waypoint and len(waypoints_m):
             target = waypoints_m[min(self.reached, len(waypoints_m) - 1)]
             return offset, float(np.arctan2(*(target - centre_m)[::-1]))
-        if not self._feedback:
+        if not self.course.feedback:
             offset = self._start[1]
             head_m = self._dead_reckoned(self._start[0], offset)
             along_m = self.path.nearest(head_m, self.along_m)

@@ -61,17 +61,24 @@ class CycleCounters:
     """Bytes that arrived after the time-out of their read."""
 
 
+@dataclass(frozen=True, slots=True)
+class CycleRegisters:
+    """Registers of a control cycle: the goal, 4 bytes, and the block that is read."""
+
+    goal_address: int = 116
+    read_address: int = 126
+    read_bytes: int = 10
+
+
 class ControlCycle:
-    """Goals at ``goal_address`` (4 bytes) and a block of ``read_bytes`` at ``read_address``."""
+    """Writes the goals of servos, and reads one block of registers from each."""
 
     def __init__(
         self,
         port: BytePort,
         ids: Sequence[int],
         *,
-        goal_address: int = 116,
-        read_address: int = 126,
-        read_bytes: int = 10,
+        registers: CycleRegisters = CycleRegisters(),
         fast: bool = True,
         latency_s: float = 0.004,
         pending: PendingReplies | None = None,
@@ -83,9 +90,7 @@ class ControlCycle:
         Args:
             port: the line; its servos have a return delay of 0.
             ids: servos, in the order of all arrays.
-            goal_address: of the goal register, 4 bytes.
-            read_address: of the block.
-            read_bytes: its length.
+            registers: addresses of goal and block.
             fast: begin with fast sync read.
             latency_s: largest delay of adapter and driver.
             pending: pending replies of this port, shared by all senders; None: this cycle is alone.
@@ -96,12 +101,13 @@ class ControlCycle:
 
         """
         self._port = port
-        self._goals = self._goal_write(ids, goal_address)
+        self._goals = self._goal_write(ids, registers.goal_address)
         self._ids = tuple(ids)
         self._default_order = tuple(range(len(ids)))
         self._order = self._default_order
         self._requests: dict[tuple[bool, int, tuple[int, ...]], GroupReadRequest] = {}
-        self.read_address, self.read_bytes = read_address, read_bytes
+        self.read_address = registers.read_address
+        self.read_bytes = registers.read_bytes
         """First address and length of the block."""
         self._latency_s = latency_s
         self._failed_in_a_row = 0
@@ -109,7 +115,7 @@ class ControlCycle:
         self._pending = pending if pending is not None else PendingReplies(port.clock)
         self._missed = np.zeros(len(ids), np.intp)
         self._line = line or LineReservation(port.clock, paced=port.paced)
-        self._default_request = self._read_request(ids, read_bytes, fast=fast)
+        self._default_request = self._read_request(ids, self.read_bytes, fast=fast)
         self._fast_path = self._native_path(spin_s)
         self._awaited: tuple[GroupReadRequest, tuple[int, ...], FastPath | float] = (
             self._default_request,

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import dynamixel_sdk as sdk
 
-from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
 from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.bus.probe import Probe, broadcast_ping, probe
@@ -315,9 +315,9 @@ class DynamixelBus:
         return ControlCycle(
             self.port,
             servo_ids,
-            goal_address=self._shared(servo_ids, "Goal Position").address,
-            read_address=start,
-            read_bytes=end_address - start,
+            registers=CycleRegisters(
+                self._shared(servo_ids, "Goal Position").address, start, end_address - start
+            ),
             fast=fast,
             latency_s=self.latency_s,
             pending=self._pending,
@@ -329,8 +329,7 @@ class DynamixelBus:
         return ControlCycle(
             self.port,
             (device_id,),
-            read_address=address,
-            read_bytes=length,
+            registers=CycleRegisters(read_address=address, read_bytes=length),
             fast=False,
             latency_s=self.latency_s,
             pending=self._pending,

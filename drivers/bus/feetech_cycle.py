@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
 from snakewalk.config.servo_model import RegisterRow, ServoModel
-from snakewalk.drivers.bus.control_cycle import ControlCycle
+from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
 from snakewalk.drivers.bus.fast_path import FastPath
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
@@ -119,8 +119,7 @@ class FeetechCycle(ControlCycle):
         super().__init__(
             port,
             ids,
-            read_address=span[0],
-            read_bytes=span[1],
+            registers=CycleRegisters(read_address=span[0], read_bytes=span[1]),
             fast=False,
             latency_s=latency_s,
             pending=pending,

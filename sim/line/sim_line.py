@@ -34,7 +34,7 @@ _CALLS = [Wire.write, Wire.read_until, Wire.clearPort]
 
 
 class SimLine(Wire):
-    """Servos of ``bank`` on the shafts of ``plant`` behind a serial line of ``baud``.
+    """Servos of ``bank`` on the shafts of ``plant`` behind a serial line at the bank's baud rate.
 
     Reading and writing a closed port raise ``PortError``.
     """
@@ -44,24 +44,22 @@ class SimLine(Wire):
         bank: ServoBank,
         plant: Plant,
         clock: SimClock | None = None,
-        baud: int = 1_000_000,
         *,
         supply_and_ambient: SupplyAndAmbient | None = None,
         mounting: Mounting | None = None,
         motors: Sequence[MotorModel] | None = None,
-        tamper: Tamper | None = None,
         usb_latency_s: float = 0.0,
         imu: Imu | None = None,
     ) -> None:
         super().__init__(clock if clock is not None else SimClock(plant.time_s), usb_latency_s)
         self.firmware = Firmware(bank, plant, supply_and_ambient, mounting, motors)
         self.bank = bank
-        self.tamper = tamper
-        self._handler = InstructionHandler(self.firmware, baud, imu)
+        self.tamper: Tamper | None = None
+        self._handler = InstructionHandler(self.firmware, bank.baud, imu)
         self._group = GroupFastPath(self._handler)
         self._reader = PacketParser()
         self._asked = b""
-        self.setBaudRate(baud)
+        self.setBaudRate(bank.baud)
 
     @property
     def directory(self) -> IdDirectory:

@@ -13,7 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 
 DISTANCE_LENGTHS = 1.6
@@ -26,7 +26,7 @@ class _Pose:
     """The drawn model and its pose."""
 
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
-        self.model = dressed_model(robot, world, ground)
+        self.model = dressed_model(Scene(robot, world, ground))
         self.data = mujoco.MjData(self.model)
         self.distance_m = DISTANCE_LENGTHS * robot.length_m
 

@@ -13,7 +13,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.crowd_mesh import CrowdMeshes
 from snakewalk.sim.rendering.ground_tiles import GroundTiles
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
@@ -76,7 +76,7 @@ class CrowdView:
         self._tiles = GroundTiles(ground) if tiled else None
         more = () if self._tiles is None else (self._tiles.add_to,)
         self._model = model = dressed_model(
-            robot, world, ground, additions=(self._meshes.add_to, *more)
+            Scene(robot, world, ground), additions=(self._meshes.add_to, *more)
         )
         model.vis.global_.fovy = FOVY_DEG
         self._data = mujoco.MjData(model)

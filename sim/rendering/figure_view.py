@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import SkinLook, dressed_model
+from snakewalk.sim.rendering.looks import Scene, SkinLook, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, surface_points_m
 
@@ -40,7 +40,7 @@ class FigureView:
         ``world`` is level ground.
         """
         self._model = dressed_model(
-            robot, world, None, look=look, fine=True, additions=(add_sheet,)
+            Scene(robot, world, None), look=look, fine=True, additions=(add_sheet,)
         )
         self._shade = SoftShade(self._model, None)
         self._data = mujoco.MjData(self._model)

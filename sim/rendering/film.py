@@ -1,6 +1,6 @@
 """Recorded poses as a film: a chase camera, ground, waypoints, paths, trails and a scale."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.heightfield import HeightField
-from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.follow_camera import BodyTrack, follow
-from snakewalk.sim.rendering.looks import SkinLook, dressed_model, mark_reached
+from snakewalk.sim.rendering.looks import Marks, Scene, SkinLook, dressed_model, mark_reached
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m, surface_points_m
@@ -39,25 +36,8 @@ class Style:
     """Smooth edges, at three times the cost."""
 
 
-@dataclass(frozen=True, slots=True)
-class Marks:
-    """Marks drawn on the ground."""
-
-    waypoints_m: Sequence[tuple[float, float]] = ()
-    """Drawn as rings."""
-    waypoint_radius_m: float = 0.3
-    reached_s: Sequence[float] = ()
-    """When the first, second, ... of them turn green."""
-    paths: Sequence[tuple[float, Floats]] = ()
-    """Each the time from when it is in force and (P, 2) points; drawn as dots."""
-    hollow: bool = False
-    """Whether the arrivals are not measured: rings are dashed then, without poles."""
-
-
 def render_film(
-    robot: RobotConfig,
-    world: WorldConfig,
-    ground: HeightField | None,
+    scene: Scene,
     time_s: ArrayLike,
     qpos: ArrayLike,
     path: Path,
@@ -82,27 +62,27 @@ def render_film(
     times = np.asarray(time_s, float)
     poses = np.asarray(qpos, float)
     _check(times, poses, style.size)
-    stage = _Stage(robot, world, ground, style, marks)
+    stage = _Stage(scene, style, marks)
     shots = poses_at(
         times, poses, np.arange(times[0], times[-1], style.speed_up / style.fps), stage.bodies
     )
     shot_s = times[0] + np.arange(len(shots)) * style.speed_up / style.fps
     camera, centre = stage.camera(shots, style)
     centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
-    trail = make_trail(marks.paths, times, poses, centre_m, ground)
-    scene = stage.scene(trail.most)
+    trail = make_trail(marks.paths, times, poses, centre_m, scene.ground)
+    shown = stage.scene(trail.most)
     with (
         Offscreen(stage.model, *style.size) as screen,
         MovieFile(path, style.fps, style.size) as film,
     ):
         for k, shot in enumerate(shots):
             now = float(shot_s[k])
-            stage.pose(scene, shot, camera[k], now)
+            stage.pose(shown, shot, camera[k], now)
             screen.reload(stage.model, stage.shade.texture)
-            trail.add(scene, now)
-            add_axes(scene, _corner(camera[k]), _scale_m(robot.length_m), ground)
+            trail.add(shown, now)
+            add_axes(shown, _corner(camera[k]), _scale_m(scene.robot.length_m), scene.ground)
             caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
-            film.add(screen.draw(scene, caption))
+            film.add(screen.draw(shown, caption))
             if on_frame is not None:
                 on_frame(k + 1, len(shots))
     return len(shots)
@@ -123,13 +103,12 @@ class _Stage:
 
     def __init__(
         self,
-        robot: RobotConfig,
-        world: WorldConfig,
-        ground: HeightField | None,
+        scene: Scene,
         style: Style,
         marks: Marks,
     ) -> None:
         look = style.look
+        robot = scene.robot
         self._robot = robot
         self._reached_s = marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
@@ -140,21 +119,17 @@ class _Stage:
         self.length_m = robot.length_m + legs_m
         """Length to show: the spine, and a leg to its side."""
         self.model = dressed_model(
-            robot,
-            world,
-            ground,
-            marks.waypoints_m,
-            marks.waypoint_radius_m,
+            scene,
+            marks,
             look=look,
             fine=style.fine,
-            hollow=marks.hollow,
             additions=(add_sheet,),
         )
         parts = np.array([self.model.body(f"link{k}").id for k in range(bones)])
         self._parts = parts
         self._spine = parts[:spine]
-        self._ground = ground
-        self.shade = SoftShade(self.model, ground)
+        self._ground = scene.ground
+        self.shade = SoftShade(self.model, scene.ground)
         self._faces = None if look is None else look.faces
         self.data = mujoco.MjData(self.model)
         self._view, self._option = mujoco.MjvCamera(), mujoco.MjvOption()

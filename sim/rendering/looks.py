@@ -77,24 +77,44 @@ class FloorPrint:
     """(N, N) grey."""
 
 
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """Marks drawn on the ground."""
+
+    waypoints_m: Sequence[tuple[float, float]] = ()
+    """Drawn as rings."""
+    waypoint_radius_m: float = 0.3
+    reached_s: Sequence[float] = ()
+    """When the first, second, ... of them turn green."""
+    paths: Sequence[tuple[float, Floats]] = ()
+    """Each the time from when it is in force and (P, 2) points; drawn as dots."""
+    hollow: bool = False
+    """Whether the arrivals are not measured: rings are dashed then, without poles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A body and its ground."""
+
+    robot: RobotConfig
+    world: WorldConfig
+    ground: HeightField | None
+    """Height field of the world; None on a flat floor."""
+
+
 def dressed_model(
-    robot: RobotConfig,
-    world: WorldConfig,
-    ground: HeightField | None,
-    waypoints_m: Sequence[tuple[float, float]] = (),
-    waypoint_radius_m: float = 0.3,
+    scene: Scene,
+    marks: Marks = Marks(),
     *,
     look: SkinLook | None = None,
     fine: bool = False,
     prints: Sequence[FloorPrint] = (),
-    hollow: bool = False,
     additions: Sequence[Callable[[mujoco.MjSpec], None]] = (),
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
     ``look`` None is a capsule per link. ``fine`` smooths edges, at three times the cost of a
-    software renderer. ``hollow`` waypoints, for unmeasured arrivals, have a dashed ring and no
-    pole. ``additions`` change the model before it is compiled.
+    software renderer. ``additions`` change the model before it is compiled.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -105,6 +125,7 @@ def dressed_model(
             f"films and drawn views need MuJoCo 3.3 or newer, and {mujoco.__version__} is "
             "installed; install it with pip install 'mujoco>=3.3'"
         )
+    robot, world, ground = scene.robot, scene.world, scene.ground
     spec = mujoco.MjSpec.from_string(mjcf(robot, world, ground, 0.002))
     if look is not None and look.free:
         _replace_robot(spec, len(look.rest_m))
@@ -121,8 +142,8 @@ def dressed_model(
     _water(spec, world, ground)
     for k, sheet in enumerate(prints):
         _print(spec, f"print{k}", sheet)
-    for k, (x, y) in enumerate(waypoints_m):
-        _mark(spec, f"waypoint{k}", ground, x, y, waypoint_radius_m, hollow)
+    for k, (x, y) in enumerate(marks.waypoints_m):
+        _mark(spec, f"waypoint{k}", ground, x, y, marks.waypoint_radius_m, marks.hollow)
     model = finish(spec.compile(), ground)
     if ground is not None:
         _paint(model, ground)

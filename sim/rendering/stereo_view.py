@@ -12,7 +12,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import TEXELS, dressed_model
+from snakewalk.sim.rendering.looks import TEXELS, Scene, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.top_view import NOISE
 
@@ -66,7 +66,7 @@ class StereoView:
         baseline_m: float = 0.1,
         seed: int = 0,
     ) -> None:
-        self._model = model = dressed_model(robot, world, ground)
+        self._model = model = dressed_model(Scene(robot, world, ground))
         self._data = mujoco.MjData(model)
         self._ground = ground
         self._size = size_px

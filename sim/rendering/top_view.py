@@ -11,7 +11,7 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.sim.rendering.looks import FloorPrint, dressed_model
+from snakewalk.sim.rendering.looks import FloorPrint, Scene, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import add_shade
 
@@ -43,7 +43,7 @@ class TopView:
     ) -> None:
         self._robot = robot
         self._ground = ground
-        self._model = model = dressed_model(robot, world, ground, prints=prints)
+        self._model = model = dressed_model(Scene(robot, world, ground), prints=prints)
         self._data = mujoco.MjData(model)
         size = camera.width_px, camera.height_px
         field_m = camera.field_width_m * size[1] / size[0]

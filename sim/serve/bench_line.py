@@ -62,7 +62,7 @@ def bench_line(
     device = None
     if imu is not None:
         device = Imu(imu, lambda: LinkMotion(plant.time_s, np.zeros(3), np.eye(3)), baud)
-    return SimLine(bank, plant, baud=baud, imu=device)
+    return SimLine(bank, plant, imu=device)
 
 
 def _check_one_model(models: Sequence[ServoModel]) -> None:

@@ -101,6 +101,8 @@ class ServoBank:
         clashing: bool = False,
     ) -> None:
         self.ids = tuple(ids)
+        self.baud = baud
+        """Baud rate of the bus with factory-new servos."""
         models: Sequence[Model] = (
             [model] * len(self.ids) if isinstance(model, str | ServoModel) else model
         )

@@ -19,7 +19,7 @@ PACKAGE_SHARE: Final = 0.20
 FILE_LINES: Final = 500
 FUNCTION_LINES: Final = 80
 """Longer files and functions are listed as warnings: code that is packed reads no better."""
-PARAMETERS: Final = 12
+PARAMETERS: Final = 8
 FUNCTION_IMPORTS: Final = 69
 """Imports inside functions that may be left, each with its reason."""
 NOQA: Final = re.compile(r"# noqa: (?:\w+, )*PLC0415  (\S.+)$")
@@ -27,18 +27,43 @@ NOQA: Final = re.compile(r"# noqa: (?:\w+, )*PLC0415  (\S.+)$")
 KERNELS: Final[dict[str, str]] = {
     "controller/gaits/cpg/trajectory.py:_evaluate": "arrays are made once, outside of its loop",
     "controller/gaits/cpg/trajectory.py:peak_share": "a numba signature knows no records",
+    "controller/gaits/cpg/trajectory.py:trajectory": "a numba signature knows no records",
+    "controller/images/thin_body_fit.py:draw_spots": "numbers of a spot and derivatives",
+    "controller/mapping/mosaic/rasteriser.py:_draw": "buffers of a picture, made once",
+    "controller/mapping/mosaic/rasteriser.py:_shade": "runs for each pixel",
+    "controller/mapping/mosaic/scale_flow.py:_data_terms": "runs in each step of a fit",
+    "controller/mechanics/force_balance.py:_forces": "runs in each step of a solver",
+    "controller/mechanics/force_balance.py:_least_missing": "work arrays of a solver are made once",
+    "controller/mechanics/force_balance.py:_least_power": "work arrays of a solver are made once",
     "controller/mechanics/ground_step.py:_place": "a numba signature knows no records",
+    "controller/mechanics/rigid_motion.py:_power": "runs in each step of a solver",
+    "controller/mechanics/rollout_kernel.py:_pull": "runs in each step of a rollout",
     "controller/mechanics/rollout_kernel.py:roll_pieces": "its arrays are the state of all pieces",
+    "controller/mechanics/rollout_kernel.py:write_result": "runs at the end of each rollout",
     "controller/repertoire/crowd.py:_step": "a slice per body costs more than its arithmetic",
+    "controller/runtime/derating.py:_is_unlimited": "runs in each cycle on plain arrays",
     "controller/studies/identification/pendulum_swing.py:_swing": "a signature of numba",
+    "controller/terrain/dijkstra.py:_settle": "arrays of a heap are made once",
+    "controller/terrain/safe_graph.py:_weigh": "a numba signature knows no records",
+    "drivers/safety/following_error.py:_judge": "runs in each cycle on plain arrays",
+    "drivers/safety/measured_step.py:_is_all_believable": "runs in each cycle on plain arrays",
     "drivers/safety/vet.py:_quick_check": "runs in each cycle on plain arrays",
     "sim/batch/kernels.py:move_links": "a kernel of Warp accepts arrays alone",
     "sim/batch/kernels.py:rub": "a kernel of Warp accepts arrays alone",
     "sim/batch/kernels.py:turn_motors": "a kernel of Warp accepts arrays alone",
+    "sim/physics/belly_contacts.py:write_contacts": "runs in each step of the physics",
+    "sim/plant.py:shaft_torque": "runs for each shaft in each step of the physics",
+    "sim/servo/backlash.py:turn_with_backlash": "runs for each gear in each step",
     "sim/servo/bench.py:_step": "a numba signature knows no records",
     "sim/servo/control_loops.py:_run_position": "a numba signature knows no records",
+    "sim/servo/control_loops.py:_run_velocity": "a numba signature knows no records",
+    "sim/servo/servo_loops.py:accept_goals": "runs for each packet on plain arrays",
+    "sim/servo/servo_loops.py:answer": "runs for each packet on plain arrays",
 }
 """Compiled loops (file:function) that exceed the limit, each with its reason."""
+DECLARATIONS: Final = {"controller/learning/environment.py:__init__"}
+"""Functions whose parameters are options of users, as those of ``commands/``: here of
+``gymnasium.make``."""
 
 
 def nodes_of(text: str) -> list[ast.AST]:
@@ -106,17 +131,21 @@ def test_no_function_has_too_many_parameters() -> None:
         if "/commands/" not in module.name
         for function in wide(module.nodes)
     }
-    assert found - set(KERNELS) == set()
-    assert set(KERNELS) <= found, "an exempted loop is within the limit: remove it from the list"
+    exempt = set(KERNELS) | DECLARATIONS
+    assert found - exempt == set()
+    assert exempt <= found, "an exempted function is within the limit: remove it from the list"
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_only_compiled_loops_are_exempt(kernel: str) -> None:
     path, function = kernel.split(":")
-    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+    modules = [each for each in library() if each.name == path]
+    for node in [node for module in modules for node in module.nodes]:
         if isinstance(node, ast.FunctionDef) and node.name == function:
             decorators = {ast.unparse(each).split("(")[0] for each in node.decorator_list}
-            assert decorators & {"compiled", "njit", "inlined", "wp.kernel"}
+            if not decorators & {"compiled", "njit", "inlined", "wp.kernel"}:
+                compiles = re.compile(rf"register_jitable\(.*\)\({function}\)")
+                assert any(compiles.search(each.text) for each in library())
             return
     pytest.fail(f"{kernel}: there is no such function")
 

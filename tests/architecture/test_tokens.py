@@ -62,6 +62,7 @@ LIMITS: Final = {
 }
 """Tokens of each package."""
 RAISED: Final[dict[str, tuple[int, str]]] = {
+    "controller.bench": (21_300, "0234-eight-parameters.md"),
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "config": (19_700, "0225-a-recording-rests-at-its-gaps.md"),
     "controller.console": (7750, "0188-options-are-fields.md"),

@@ -10,8 +10,9 @@ import pytest
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.run import RunConfig
+from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.record import Header, PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable, WalkTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import JointState
@@ -87,13 +88,16 @@ def make_log(
     )
     with RunLog(path) as log:
         log.config(
-            run,
-            robot,
-            world,
-            backend="sim",
-            plan=plan,
-            ground=ground_of(ground),
-            torque_constant_n_m_a=1.78,
+            Header(
+                run,
+                robot,
+                world,
+                backend="sim",
+                plan=plan,
+                ground=ground_of(ground),
+                torque_constant_n_m_a=1.78,
+                pose_evidence=SIMULATED,
+            )
         )
         log.event(0.0, "start", "torque on; ramp of 1.2 s to the shape")
         visited: set[int] = set()

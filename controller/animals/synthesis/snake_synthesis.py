@@ -22,6 +22,8 @@ from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, gr
 from snakewalk.controller.animals.synthesis.synthesis import (
     Behaviour,
     Locomotion,
+    Sampling,
+    Start,
     Targets,
     synthesise,
     varied_pulse,
@@ -306,8 +308,7 @@ class SnakeSynthesis:
             walker.track,
             self.law,
             most,
-            self.dt_s,
-            self.segment_m,
+            Sampling(self.dt_s, self.segment_m),
             grow,
             Behaviour(
                 sliding=lambda t: curves.sliding[t],
@@ -315,8 +316,7 @@ class SnakeSynthesis:
                 head_held=lambda t: curves.head_held[t],
                 calm_tail=lambda t: curves.calm_tail[t],
             ),
-            head_m=run.start_m,
-            heading_rad=heading_rad,
+            start=Start(run.start_m, heading_rad),
             until=observe,
         )
         return plan, states

@@ -10,6 +10,7 @@ moves along the new ``Theta(1, t)``. A track that runs out grows.
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -105,17 +106,35 @@ class Locomotion:
     """(T, N) sample of the track that each point shows."""
 
 
+class Sampling(NamedTuple):
+    """Steps of a synthesis in time and along the body."""
+
+    dt_s: float
+    """Time between frames."""
+    segment_m: float
+    """r, the body's length over N."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Pose and speed in the first frame."""
+
+    head_m: tuple[float, float] = (0.0, 0.0)
+    """Position of the head's tip."""
+    heading_rad: float = 0.0
+    """Rotation from the track's angles to the world."""
+    speed_m_s: float = 0.0
+    """v."""
+
+
 def synthesise(
     track: AngleTrack,
     law: SpeedLaw,
     frames: int,
-    dt_s: float,
-    segment_m: float,
+    sampling: Sampling,
     grow: Grow | None = None,
     behaviour: Behaviour | None = None,
-    head_m: tuple[float, float] = (0.0, 0.0),
-    heading_rad: float = 0.0,
-    speed_m_s: float = 0.0,
+    start: Start = Start(),
     until: Until | None = None,
 ) -> Locomotion:
     """Run ``frames`` frames; the first is the body at the start of the track.
@@ -124,19 +143,18 @@ def synthesise(
         track: contains at least the first body; ``grow`` extends it.
         law: speed from the bends and the turning of the frame before.
         frames: T, or the largest T.
-        dt_s: time between frames.
-        segment_m: r, the body's length over N.
+        sampling: time between frames, and length of a segment.
         grow: appends to the track.
         behaviour: sliding, pulse speed and held ends; default none of it.
-        head_m: where the head's tip starts.
-        heading_rad: rotation from the track's angles to the world.
-        speed_m_s: v of the first frame.
+        start: pose and speed of the first frame.
         until: ends the motion early.
 
     Raises:
         ValueError: the track ran out without ``grow``, or the time step is unstable.
 
     """
+    dt_s, segment_m = sampling
+    heading_rad = start.heading_rad
     how = behaviour or Behaviour()
     n = np.arange(track.points, dtype=float)
     ahead = np.full(track.points, float(track.points))  # place + n + 1: constant if nothing slides
@@ -144,9 +162,9 @@ def synthesise(
     place = np.empty((frames, len(n)))
     points = np.empty((frames, len(n) + 1, 2))
     speed = np.empty(frames)
-    place[0], speed[0] = ahead - n - 1, speed_m_s
+    place[0], speed[0] = ahead - n - 1, start.speed_m_s
     angles[0], _ = _posture(track.body_rad(track.points) + heading_rad, how, 0)
-    points[0] = chain(angles[0], segment_m) + head_m
+    points[0] = chain(angles[0], segment_m) + start.head_m
     turn = 0.0
     last = frames - 1
     mean, bend = _moments(angles[0])

@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.mesh.body_look import animal, rig_look
@@ -19,7 +22,7 @@ from snakewalk.controller.animals.synthesis.tongue_skin import (
 )
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
-from snakewalk.controller.report.film import film_motion
+from snakewalk.controller.report.film import FPS, SIZE, renderer, speed_up
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.results import ANIMAL
 from snakewalk.controller.track.bone_motion import BoneMotion
@@ -116,18 +119,18 @@ def film_over(
 
     """
     run = prepared.run
+    film = renderer()
+    frames, count = bones.front_m.shape[:2]
+    turns = Rotation.from_matrix(bones.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    poses = np.concatenate([bones.front_m, turns.reshape(frames, count, 4)], axis=2)
     with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
-        return film_motion(
-            bones,
+        drawn: int = film.render_film(
+            film.Scene(robot, prepared.world, prepared.ground),
+            bones.time_s,
+            poses.reshape(frames, -1),
             part,
-            look=look,
-            robot=robot,
-            world=prepared.world,
-            ground=prepared.ground,
-            waypoints_m=run.waypoints_m,
-            waypoint_radius_m=run.waypoint_radius_m,
-            reached_s=reached_s,
-            paths=paths,
-            title=title,
-            on_progress=bar.update,
+            style=film.Style(FPS, speed_up(float(bones.time_s[-1])), SIZE, title, look),
+            marks=film.Marks(run.waypoints_m, run.waypoint_radius_m, reached_s, paths),
+            on_frame=bar.update,
         )
+        return drawn

@@ -179,15 +179,25 @@ def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float
     return like.model_copy(update={"joint_axes": "p" * len(joints), "joints": joints})
 
 
+@dataclass(frozen=True, slots=True)
+class CalibrationSettings:
+    """Settings of a calibration."""
+
+    latency_s: float = 0.004
+    """Longest delay of bytes by adapter and driver."""
+    current_a: float = CURRENT_A
+    """Goal current of every servo."""
+    sweep: bool = True
+    """Whether to search for the ends of the ranges."""
+
+
 def calibrate(
     port: BytePort,
     like: RobotConfig,
     observer: Observer,
     *,
     name: str,
-    latency_s: float = 0.004,
-    current_a: float = CURRENT_A,
-    sweep: bool = True,
+    settings: CalibrationSettings = CalibrationSettings(),
     stop_requested: Callable[[], str | None] = lambda: None,
     on_progress: Callable[[str], None] = lambda step: None,
     journal: Journal | None = None,
@@ -199,9 +209,7 @@ def calibrate(
         like: a robot with the same axes and links; its IDs, signs and zeros do not matter.
         observer: the observer that sees the robot.
         name: of the robot that is found.
-        latency_s: how long adapter and driver may hold bytes back.
-        current_a: goal current of every servo.
-        sweep: whether the ends of the ranges are looked for.
+        settings: latency, current, and whether to sweep the ranges.
         stop_requested: returns why the safe link has to latch, or None.
         on_progress: gets a line for each step.
         journal: of an interrupted calibration, which continues; saved after each answer and range.
@@ -212,13 +220,12 @@ def calibrate(
         DriverError: a servo does not do what an instruction asks, or safety has latched.
 
     """
-    if journal is None:
-        journal = Journal(CalibrationProgress(joint_axes=like.joint_axes))
+    journal = journal or Journal(CalibrationProgress(joint_axes=like.joint_axes))
     on_progress("search for servos")
-    servos = find_servos(port, latency_s, like.joint_count, feetech=like.is_feetech)
+    servos = find_servos(port, settings.latency_s, like.joint_count, feetech=like.is_feetech)
     journal.known.check_servos(servos, "--resume")
-    unknown = unknown_chain(like, servos, current_a)
-    bench = CalibrationBench(port, unknown, latency_s, stop_requested, on_progress)
+    unknown = unknown_chain(like, servos, settings.current_a)
+    bench = CalibrationBench(port, unknown, settings.latency_s, stop_requested, on_progress)
     journal.note(servos=servos)
     steps = _Steps(like, bench, on_progress, journal)
     for row, servo_id in enumerate(unknown.servo_ids):
@@ -230,9 +237,9 @@ def calibrate(
         observer.straighten()
         straight_rad = dict(zip(unknown.servo_ids, bench.where_rad().tolist(), strict=True))
         journal.note(zeros_rad=straight_rad)
-    if sweep:
+    if settings.sweep:
         steps.sweep(unknown.servo_ids)
-    return _found(like, name, unknown, journal.known, sweep=sweep)
+    return _found(like, name, unknown, journal.known, sweep=settings.sweep)
 
 
 @dataclass

@@ -101,8 +101,7 @@ def doctor(
                 findings += examine_segments(
                     segments,
                     described,
-                    job.safety,
-                    job.cycle_hz,
+                    job,
                     wiggle=wiggle,
                     on_progress=status.update,
                 )
@@ -110,8 +109,7 @@ def doctor(
                 findings += examine(
                     line,
                     described,
-                    job.safety,
-                    job.cycle_hz,
+                    job,
                     latency_s=line.latency_s,
                     latency_timer_ms=line.latency_timer_ms,
                     wiggle=wiggle,

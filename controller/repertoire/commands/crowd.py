@@ -14,8 +14,9 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
-from snakewalk.controller.repertoire.crowd_film import FPS, CrowdScene, film_crowd
+from snakewalk.controller.repertoire.crowd_film import FPS, SIZE_PX, CrowdScene, film_crowd
 from snakewalk.controller.repertoire.repertoire import load_repertoire
+from snakewalk.sim.rendering.crowd_film import CrowdView
 
 
 @command(
@@ -69,12 +70,9 @@ def crowd(
     with atomic_write(out) as part, ProgressBar("film", seconds * FPS, transient=True) as bar:
         frames = film_crowd(
             scene,
-            robot,
-            place,
-            ground,
-            bodies,
-            seconds,
+            CrowdView(robot, place, ground, bodies, SIZE_PX),
             part,
+            seconds=seconds,
             frame_s=repertoire.frame_s,
             on_frame=bar.update,
         )

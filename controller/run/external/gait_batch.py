@@ -16,11 +16,13 @@ from snakewalk.controller.run.external.robot_batch import BatchRow, RobotBatch
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.servo_setup import motor_constants
 from snakewalk.controller.runlog.evidence import SIMULATED
+from snakewalk.controller.runlog.record import Header
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.cycle_row import log_cycle
 from snakewalk.controller.runtime.derating import Derating
 from snakewalk.controller.runtime.drive import SETTLE_S
+from snakewalk.controller.runtime.loop import Tick
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
@@ -89,15 +91,17 @@ class _Row:
         self.log = log
         torque_constant_n_m_a, winding = motor_constants(robot)
         self.log.config(
-            run,
-            robot,
-            prepared.world,
-            backend=BACKEND,
-            plan=plan,
-            initial_pose=pose,
-            torque_constant_n_m_a=torque_constant_n_m_a,
-            winding=winding,
-            pose_evidence=SIMULATED,
+            Header(
+                run,
+                robot,
+                prepared.world,
+                backend=BACKEND,
+                plan=plan,
+                initial_pose=pose,
+                torque_constant_n_m_a=torque_constant_n_m_a,
+                winding=winding,
+                pose_evidence=SIMULATED,
+            )
         )
         self.is_over = False
         self._motion = prepared.make_source(self._event)
@@ -140,8 +144,7 @@ class _Row:
             self.link,
             state,
             goal,
-            deadline_s=time_s,
-            lateness_s=0.0,
+            tick=Tick(0, time_s, 0.0, 0),
             wire_busy_s=float("nan"),
             energy=self.body.energy(),
         )

@@ -10,7 +10,7 @@ from snakewalk.controller.pose.sample import PoseSample
 from snakewalk.controller.pose.tracked_body import TrackedBody
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
-from snakewalk.controller.runlog.record import POSE_CHECK
+from snakewalk.controller.runlog.record import POSE_CHECK, Header
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import BodyPose, JointState
@@ -45,15 +45,17 @@ class PoseCheckPage:
         self._tracked = TrackedBody(prepared.robot, config)
         self._straight = np.zeros(prepared.robot.joint_count)
         log.config(
-            prepared.run,
-            prepared.robot,
-            prepared.world,
-            backend=POSE_CHECK,
-            plan=prepared.check_plan(),
-            ground=prepared.ground,
-            pose_evidence=PoseEvidence(
-                Kind.MEASURED, source, config.noise_m, float(np.radians(config.noise_deg))
-            ),
+            Header(
+                prepared.run,
+                prepared.robot,
+                prepared.world,
+                backend=POSE_CHECK,
+                plan=prepared.check_plan(),
+                ground=prepared.ground,
+                pose_evidence=PoseEvidence(
+                    Kind.MEASURED, source, config.noise_m, float(np.radians(config.noise_deg))
+                ),
+            )
         )
 
     def show(self, time_s: float, sample: PoseSample) -> None:

@@ -145,7 +145,6 @@ def simulated_line(
             ServoBank(ids, records, rate),
             plant,
             clock,
-            rate,
             mounting=mounting,
             motors=on_it,
             supply_and_ambient=around or SupplyAndAmbient(supply_v=robot.servo.supply_v),

@@ -29,7 +29,7 @@ from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.map_walk import MapWalk
-from snakewalk.controller.walk.pilot import Aimed, Pilot, ShapeChooser
+from snakewalk.controller.walk.pilot import Aimed, Pilot, PitchControl, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
 from snakewalk.controller.walk.replanning import PathPlanner
 from snakewalk.controller.walk.roll_planner import RollPlanner
@@ -162,17 +162,17 @@ class WalkRun(PathRun):
                 travel=time_law.head,
                 feedback=run.motion != "walk-blind",
             ),
-            pitch_fitter=None if level or self.ground is None else fitter or self.pitch_fitter,
-            pitch_lead_s=robot.servo.pitch_lead_s,
-            roll=None if level or not robot.pitch_joints else RollCompensation(robot),
+            pitch=PitchControl(
+                None if level or self.ground is None else fitter or self.pitch_fitter,
+                robot.servo.pitch_lead_s,
+                None if level or not robot.pitch_joints else RollCompensation(robot),
+            ),
             fall_back=(
                 chooser.fall_back
                 if isinstance(chooser, PredictiveWalker) and run.walk.fallback
                 else None
             ),
-            length_m=robot.length_m,
             carrot_m=run.walk.carrot_m,
-            feedback=run.motion != "walk-blind",
             aim_at_waypoint=run.motion == "walk-printed",
         )
 

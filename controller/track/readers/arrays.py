@@ -152,13 +152,13 @@ def track_from_arrays(
             time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
             rate_assumed=rate_hz is None and _flag(held, "rate_assumed", default=False),
             status=_status(held, len(points)),
-            source=_text(held, "source", "not stated"),
-            licence=_text(held, "licence", "not stated"),
-            notes=[str(one) for one in held.get("notes", np.array([])).reshape(-1)],
         )
         sure = _scalar(file, "head_sure", held.get("head_sure", np.array(np.nan)))
         return replace(
             track,
+            source=_text(held, "source", "not stated"),
+            licence=_text(held, "licence", "not stated"),
+            notes=tuple(str(line) for line in held.get("notes", np.array([])).reshape(-1)),
             places_recorded=_flag(held, "places_recorded", default=True),
             head_sure=sure if np.isfinite(sure) else None,
         )

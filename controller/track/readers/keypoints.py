@@ -4,7 +4,7 @@ Pixel rows count downwards. Points with a low score are missing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -183,7 +183,7 @@ class Keypoints:
             )
         bridged, which = bridge(places)
         status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
-        return track_from_points(
+        track = track_from_points(
             self.file.stem,
             bridged,
             KEYPOINT_RATE_HZ if self.rate_hz is None else self.rate_hz,
@@ -191,8 +191,8 @@ class Keypoints:
             scale_m=self.scale_m,
             rate_assumed=self.rate_hz is None,
             status=status,
-            notes=self.notes,
         )
+        return replace(track, notes=tuple(self.notes))
 
 
 def zigzag(places: Floats) -> float:

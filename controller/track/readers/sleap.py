@@ -7,7 +7,7 @@ each other, and names as JSON. Pixel rows count downwards.
 """
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,23 @@ _PREDICTED = 1
 _NO_TRACK = "no track"
 
 
+class SleapRows(NamedTuple):
+    """T rows of a table."""
+
+    whose: list[str]
+    """Track name of each."""
+    frame: Floats
+    """(T,) frame numbers."""
+    xy: Floats
+    """(T, K, 2) pixels."""
+    scores: Floats | None
+    """(T, K)."""
+
+
 def load_table(
     file: Path,
     nodes: list[str],
-    whose: list[str],
-    frame: Floats,
-    xy: Floats,
-    scores: Floats | None,
+    rows: SleapRows,
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
@@ -40,15 +50,13 @@ def load_table(
     Args:
         file: for faults and the name.
         nodes: names of the K keypoints.
-        whose: track name of each of T rows.
-        frame: (T,) frame numbers.
-        xy: (T, K, 2) pixels.
-        scores: (T, K), or None.
+        rows: the rows.
         rate_hz: frames per second.
         least_score: keypoints below it are missing.
         choice: animal and order of the midline.
 
     """
+    whose, frame, xy, scores = rows
     if not np.isfinite(frame).all():
         raise InputError(f"{file}: frame_idx must be given in every row")
     names = list(dict.fromkeys(name or _NO_TRACK for name in whose))

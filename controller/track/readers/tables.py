@@ -14,7 +14,7 @@ from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.track.readers.marker_tables import is_vicon, load_vicon
 from snakewalk.controller.track.readers.markers import MISSING
-from snakewalk.controller.track.readers.sleap import load_table
+from snakewalk.controller.track.readers.sleap import SleapRows, load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
 _MIDLINE: dict[tuple[str, str], float | None] = {
@@ -197,4 +197,11 @@ def _sleap(
     if "track" in column:
         at = column["track"]
         whose = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
-    return load_table(file, keypoints, whose, table[:, 0], xy, scores, rate_hz, least_score, choice)
+    return load_table(
+        file,
+        keypoints,
+        SleapRows(whose, table[:, 0], xy, scores),
+        rate_hz,
+        least_score,
+        choice,
+    )

@@ -18,7 +18,7 @@ from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesi
 from snakewalk.controller.animals.synthesis.synthesis_skin import FILM_SEGMENTS, SynthesisSkin
 from snakewalk.controller.run.factory import prepare_playback, prepare_walk
 from snakewalk.controller.track.readers.load import load_track
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 from tests.helpers.command import snakewalk
 
 BEHAVIOUR = """
@@ -170,7 +170,7 @@ def test_the_bones_lie_on_the_skeleton_and_the_film_draws_the_posed_skin(
     np.testing.assert_allclose(ends, points[:, FILM_SEGMENTS::FILM_SEGMENTS], atol=2e-3)  # bent
 
     look = rig_look(spine_rig(worn.skin, bones.bone_m), worn.dressed.texture)
-    model = dressed_model(prepared.robot, prepared.world, prepared.ground, look=look)
+    model = dressed_model(Scene(prepared.robot, prepared.world, prepared.ground), look=look)
     assert model.nbody == 1 + len(bones.bone_m)  # the robot's links are gone
     data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=1000)
     frame = 300

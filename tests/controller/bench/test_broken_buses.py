@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.robot import RobotConfig, ServoConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.scan import ScanResult, scan
 from snakewalk.controller.console.finding import Finding, worst
@@ -434,8 +434,7 @@ def doctor(line: TestLine, kind: Kind | None = None, robot: RobotConfig = ROBOT)
     return examine(
         line,
         robot,
-        SafetyConfig(),
-        50.0 if kind is None else kind.rate_hz,
+        RunConfig(name="test", motion="source", cycle_hz=50.0 if kind is None else kind.rate_hz),
         latency_s=0.02 if kind is not None and "usb_latency_s" in kind.line else 0.004,
         latency_timer_ms=None if kind is None else kind.timer_ms,
         wiggle=kind is not None and kind.wiggle,

@@ -103,7 +103,6 @@ def wiggled(robot: RobotConfig, cabled: RobotConfig) -> list[Finding]:
     line = SimLine(
         ServoBank(robot.servo_ids, robot.servo_models, robot.servo.baud),
         BenchPlant(robot.joint_count),
-        baud=robot.servo.baud,
         supply_and_ambient=SupplyAndAmbient.of(cabled),
     )
     return supply_check.supply_under_load(

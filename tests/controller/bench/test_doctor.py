@@ -6,7 +6,7 @@ from pytest_mock import MockerFixture
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.robot import ImuConfig, RobotConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench import adapter
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.imu_check import imu_finding
@@ -38,8 +38,7 @@ def doctor(line: SimLine, rate_hz: float = 50.0, timer_ms: int | None = None) ->
     return examine(
         line,
         ROBOT,
-        SafetyConfig(),
-        rate_hz,
+        RunConfig(name="test", motion="source", cycle_hz=rate_hz),
         latency_s=0.004,
         latency_timer_ms=timer_ms,
     )
@@ -158,7 +157,7 @@ def test_nobody_answers(line: Recorder) -> None:
 
 
 def test_a_rate_that_the_wire_does_not_carry(line: Recorder) -> None:
-    assert of(doctor(line, rate_hz=5000.0), "wire budget").grade == "fail"
+    assert of(doctor(line, rate_hz=1000.0), "wire budget").grade == "fail"
     longest = chain_budget(4, 1_000_000, fast=True)  # 10 bytes of state, 4 of a check
     assert f"{longest.cycle_s * 1e3:.2f} ms per cycle" in of(doctor(line), "wire budget").found
     budget = wire_budget(16, 1_000_000, fast=True)
@@ -253,7 +252,9 @@ def test_the_doctor_expects_the_imu_of_the_robot_and_no_other() -> None:
     line = an_imu(DUCK, np.eye(3))
     line.bank["Return Delay Time"][:] = 0
     robot = ROBOT.model_copy(update={"imu": DUCK})
-    told = examine(line, robot, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    told = examine(
+        line, robot, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
     assert worst(told) == "ok"
     assert of(told, "imu").grade == "ok"
     unknown = of(doctor(line), "servo IDs")

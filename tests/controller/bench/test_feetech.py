@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench import torque_off as stopping
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.eeprom_backup import back_up, plan_restore
@@ -37,7 +37,9 @@ def a_line(servos: str = "1-12:STS3215", baud: int = 1_000_000) -> FeetechLine:
 
 
 def doctor(line: FeetechLine) -> Sequence[Finding]:
-    return examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    return examine(
+        line, ROBOT, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
 
 
 SLOW = pytest.mark.slow  # a scan of all rates needs 5 s
@@ -203,7 +205,9 @@ def test_one_port_has_one_make() -> None:
 def test_the_doctor_measures_the_supply_under_load() -> None:
     line = a_line()
     findings = examine(
-        *(line, ROBOT, SafetyConfig(), 50.0),
+        line,
+        ROBOT,
+        RunConfig(name="test", motion="source"),
         latency_s=0.004,
         latency_timer_ms=None,
         wiggle=True,

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import ImuConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.cli.command_line import app
@@ -407,7 +407,9 @@ def test_a_command_without_a_robot_asks_for_one_and_names_no_file(
 
 def test_servos_of_protocol_1_are_named() -> None:
     line = Ax12Line(Ax12Servos([1, 2, 3, 4], BenchPlant(4)))
-    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    findings = examine(
+        line, ROBOT, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
     assert check(findings, "protocol").found == (
         "in Protocol 1.0 servos 1 to 4 reply at 1000000 baud"
     )
@@ -420,7 +422,9 @@ def test_servos_of_protocol_1_are_named() -> None:
 def test_a_silent_servo_next_to_protocol_1_is_named_by_itself() -> None:
     """Servo 4 is silent; the others of its chain have power, but another protocol."""
     line = Ax12Line(Ax12Servos([1, 2, 3], BenchPlant(3)))
-    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    findings = examine(
+        line, ROBOT, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
     rows = [(each.found, each.remedy) for each in findings if each.check == "servo IDs"]
     assert [found for found, _ in rows] == [
         "servos 1 to 3 reply in another protocol than the robot's servos",
@@ -433,7 +437,9 @@ def test_a_silent_servo_next_to_protocol_1_is_named_by_itself() -> None:
 def test_feetech_servos_of_a_robot_with_dynamixel_servos_are_named() -> None:
     """They were reported as DYNAMIXEL servos of Protocol 1.0."""
     line = bench_line(parse_chain("1-4:STS3215"), 1_000_000)
-    findings = examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    findings = examine(
+        line, ROBOT, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
     named = check(findings, "protocol")
     assert named.found == "servos 1 to 4 are STS3215, of another make than XM430-W350"
     assert "'STS3215'" in named.remedy
@@ -444,7 +450,9 @@ def test_dynamixel_servos_of_a_robot_with_feetech_servos_are_named() -> None:
     """The doctor asked whether they have power."""
     robot = load_robot("sts3215-12")
     line = bench_line(parse_chain("1-11:XM430-W350"), 1_000_000)
-    findings = examine(line, robot, SafetyConfig(), 50.0, latency_s=0.004, latency_timer_ms=None)
+    findings = examine(
+        line, robot, RunConfig(name="test", motion="source"), latency_s=0.004, latency_timer_ms=None
+    )
     named = check(findings, "protocol")
     assert named.found == "servos 1 to 11 are XM430-W350, of another make than STS3215"
     rows = [each.found for each in findings if each.check == "servo IDs" and each.grade != "ok"]

@@ -7,7 +7,7 @@ import pytest
 
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.scan import ScanResult, scan
 from snakewalk.controller.console.finding import Finding, worst
@@ -33,7 +33,9 @@ def a_line(*faults: dict[str, object], seed: int = 1) -> SimLine:
 
 
 def doctor(line: SimLine) -> list[Finding]:
-    return examine(line, ROBOT, SafetyConfig(), 50.0, latency_s=0.02, latency_timer_ms=None)
+    return examine(
+        line, ROBOT, RunConfig(name="test", motion="source"), latency_s=0.02, latency_timer_ms=None
+    )
 
 
 def strays(line: TestLine) -> None:

@@ -24,6 +24,7 @@ from functools import cache
 from glob import glob
 from itertools import count, pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import cv2
@@ -121,7 +122,10 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
 
     def short_drive(**parts: Any) -> Any:
         now.was_cut = True
-        return drive(**parts | {"run": parts["run"].model_copy(update={"time_limit_s": MOTION_S})})
+        plan = parts["plan"]
+        run = plan.run.model_copy(update={"time_limit_s": MOTION_S})
+        short = SimpleNamespace(run=run, robot=plan.robot, gain=plan.gain)
+        return drive(**parts | {"plan": short})
 
     forecast = walk_run.forecast
 
@@ -144,7 +148,9 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     monkeypatch.setattr(run_robot, "Drive", short_drive)
     monkeypatch.setattr(walk_run, "forecast", short_forecast)
     monkeypatch.setattr(artifacts, "make_artifacts", few_artifacts)
-    monkeypatch.setattr(artifacts, "_draw", lambda record, made="": artifacts._Drawn([], "", made))
+    monkeypatch.setattr(
+        artifacts, "_draw", lambda record, made="": artifacts.Drawings([], "", made)
+    )
     for module in (pool, trials):
         monkeypatch.setattr(module, "each", first_of)
     monkeypatch.setattr(
@@ -158,8 +164,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> "Budget":
     )
 
     def short_film(*parts: Any, **options: Any) -> Any:
-        scene, robot, place, ground, bodies, _, path = parts
-        return crowd(scene, robot, place, ground, bodies, 0.1, path, **options)
+        return crowd(*parts, **options | {"seconds": 0.1})
 
     monkeypatch.setattr(repertoire_recording, "record", lambda *a, **b: record(*a, few, **b))
     monkeypatch.setattr(crowd_film, "film_crowd", short_film)

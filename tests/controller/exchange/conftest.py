@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.reader import read_log
-from snakewalk.controller.runlog.record import PlanSummary, RunRecord
+from snakewalk.controller.runlog.record import Header, PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import (
     BatteryTable,
     FrictionTable,
@@ -49,11 +50,16 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     zeros = np.zeros(joints, dtype=np.uint8)
     with RunLog(path) as file:
         file.config(
-            *(run, robot, world),
-            backend="sim",
-            plan=plan,
-            ground=ground,
-            torque_constant_n_m_a=1.78,
+            Header(
+                run,
+                robot,
+                world,
+                backend="sim",
+                plan=plan,
+                ground=ground,
+                torque_constant_n_m_a=1.78,
+                pose_evidence=SIMULATED,
+            )
         )
         file.event(0.0, "start", 'torque on; "quoted", ünïcode')
         for k in range(ROWS):

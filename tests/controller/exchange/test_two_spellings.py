@@ -51,7 +51,7 @@ def test_a_command_gives_the_same_bytes(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the report is not compared: it has the time of day
-    monkeypatch.setattr(artifacts, "_draw", lambda *_: artifacts._Drawn([], "", ""))
+    monkeypatch.setattr(artifacts, "_draw", lambda *_: artifacts.Drawings([], "", ""))
     results = []
     for spelling in ("a", "b"):
         folder = tmp_path / spelling

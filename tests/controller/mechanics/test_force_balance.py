@@ -6,8 +6,8 @@ import pytest
 from snakewalk.config.friction_law import LawName
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rigid_motion import (
+    Inertia,
     NoBalanceError,
-    inertial_velocity,
     rigid_velocity,
 )
 from tests.controller.mechanics.test_rigid_motion import LINE, wave
@@ -77,7 +77,8 @@ def test_a_straight_body_holds_on_the_slope_of_its_coefficient(
     assert np.abs(w).max() < 0.02
     with pytest.raises(NoBalanceError):
         rigid_velocity(points, headings, still, milk_snake(law), tangential=pull(1.1))
-    w = inertial_velocity(
-        points, headings, still, milk_snake(law), still, 0.1, tangential=pull(1.1)
+    inertia = Inertia(still, 0.1)
+    w = rigid_velocity(
+        points, headings, still, milk_snake(law), tangential=pull(1.1), inertia=inertia
     )
     assert w[0] == pytest.approx(0.1 * mu * 9.81 * 0.1, rel=0.05)

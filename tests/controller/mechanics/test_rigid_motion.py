@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.mechanics.rigid_motion import (
+    Inertia,
     NoBalanceError,
-    inertial_velocity,
     rigid_velocity,
 )
 from snakewalk.controller.mechanics.slope_load import holding_factor
@@ -192,8 +192,9 @@ def test_friction_carries_the_pull_of_the_slope() -> None:
 @pytest.mark.parametrize("slope", [-0.2, 0.0, 0.2])
 def test_with_inertia_a_sliding_body_gains_what_friction_leaves_of_gravity(slope: float) -> None:
     before, step_s = np.tile([1.0, 0.0], (17, 1)), 0.02
-    w = inertial_velocity(
-        LINE, np.zeros(17), np.zeros((17, 2)), SNAKE, before, step_s, **ramp(slope, 0.0)
+    inertia = Inertia(before, step_s)
+    w = rigid_velocity(
+        LINE, np.zeros(17), np.zeros((17, 2)), SNAKE, inertia=inertia, **ramp(slope, 0.0)
     )
     gained = step_s * GRAVITY_M_S2 * (np.sin(slope) - SNAKE.along * np.cos(slope))
     np.testing.assert_allclose(w, [1.0 + gained, 0.0, 0.0], atol=1e-6)

@@ -16,7 +16,9 @@ from snakewalk.controller.repertoire.crowd_film import (
     HIDDEN,
     MIDDLE,
     NEAR,
+    SIZE_PX,
     CrowdScene,
+    CrowdView,
     DetailedCrowd,
     detail_levels,
     film_crowd,
@@ -117,7 +119,8 @@ def test_a_film_is_drawn(repertoire: Repertoire, hills: HeightField, tmp_path: P
     robot, world = load_robot("yaw16"), load_world("jacksboro-basin")
     scene = CrowdScene(repertoire, robot, hills, 8)
     film = tmp_path / "a.mp4"
-    assert film_crowd(scene, robot, world, hills, 8, 0.1, film, frame_s=repertoire.frame_s) == 2
+    view = CrowdView(robot, world, hills, 8, SIZE_PX)
+    assert film_crowd(scene, view, film, seconds=0.1, frame_s=repertoire.frame_s) == 2
     assert film.stat().st_size > 5000
     assert scene.costs.levels.sum() == 16
 

@@ -77,11 +77,14 @@ def test_a_waypoint_is_green_from_when_the_log_has_it_reached(
         frames[0] = done
 
     film.render_film(
-        record.header.robot, record.header.world, None, time_s[:100], qpos[:100],
-        tmp_path / "film.mp4", style=film.Style(fps=10, size=(32, 32)),
+        film.Scene(record.header.robot, record.header.world, None),
+        time_s[:100],
+        qpos[:100],
+        tmp_path / "film.mp4",
+        style=film.Style(fps=10, size=(32, 32)),
         marks=film.Marks(waypoints_m=[(5.0, 5.0), (6.0, 6.0)], reached_s=[0.31, 0.32]),
         on_frame=on_frame,
-    )  # fmt: skip
+    )
     assert marked == [(0, 4), (1, 4)]
 
 
@@ -124,7 +127,7 @@ def test_film_and_page_come_from_the_log_alone(make: Make, tmp_path: Path) -> No
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out the pictures of a page, which other tests draw."""
-    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts._Drawn([], "", made))
+    monkeypatch.setattr(artifacts, "_draw", lambda record, made: artifacts.Drawings([], "", made))
 
 
 @pytest.mark.usefixtures("without_pictures")

@@ -19,13 +19,12 @@ from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.figures.path import body_outline_m
 from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.summary import summary
-from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report import artifacts
 from snakewalk.controller.report import page as page_module
 from snakewalk.controller.report.artifacts import build_report
 from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.film import film_times
-from snakewalk.controller.report.page import Section, film_on_page, page
+from snakewalk.controller.report.page import Drawings, Section, film_on_page, page
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
 
@@ -99,7 +98,7 @@ def test_a_run_that_hardly_began_has_a_page_and_always_the_same(make: Make, tmp_
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without pictures and curves, of which others tell."""
-    monkeypatch.setattr(artifacts, "_draw", lambda record: artifacts._Drawn([], "", ""))
+    monkeypatch.setattr(artifacts, "_draw", lambda record: artifacts.Drawings([], "", ""))
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -120,15 +119,14 @@ def _film(folder: Path) -> Path:
 def test_what_the_log_says_is_text_not_markup(record: RunRecord, tmp_path: Path) -> None:
     evil = [Event(1.0, "info' onload='x", "<b>", "<script>alert(1)</script>")]
     names = replace(summary(record), run="<script>alert(2)", robot="' onload='x")
+    run = record.header.run.model_copy(update={"track": "</pre><script>"})
+    sections = [Section("<script>alert(3)", "' onload='x", "data:,' onload='x")]
     html = page(
+        replace(record, events=evil, header=replace(record.header, run=run)),
         names,
-        verdict(record, names),
-        [Section("<script>alert(3)", "' onload='x", "data:,' onload='x")],
+        Drawings(sections, made="<script>alert(4)"),
         film=film_on_page(_film(tmp_path), tmp_path),
-        events=evil,
-        config={"run": "</pre><script>"},
         links=["' onload='x"],
-        made="<script>alert(4)",
     )
     parsed(html)
     assert "<script>alert" not in html
@@ -258,15 +256,7 @@ def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None
 
 
 def test_the_foot_says_what_made_the_page(record: RunRecord) -> None:
-    html = page(
-        summary(record),
-        verdict(record, summary(record)),
-        [],
-        film=None,
-        events=[],
-        config={},
-        made="Made by <me>",
-    )
+    html = page(record, summary(record), Drawings([], made="Made by <me>"))
     assert "Made by &lt;me&gt;" in html
 
 
@@ -291,17 +281,15 @@ def test_an_absolute_path_becomes_the_name_of_its_file(text: str) -> None:
 def test_a_page_contains_no_folder_of_the_user_unless_it_is_asked_for(record: RunRecord) -> None:
     secret = "/home/ann b/secret/x.toml"
     numbers = replace(summary(record), robot=secret, log_note=f"torn: {secret.replace(' ', '')}")
-    words = {
-        "events": [Event(0.0, "info", "map", "map: /home/ann/secret/x.toml: written")],
-        "config": {"run": {"track": secret, "list": [{secret: secret}]}},
-        "made": "Made by snakewalk run /home/ann/secret/x.toml",
-    }
-    judged = verdict(record, numbers)
-    html = page(numbers, judged, [], film="", **words)  # type: ignore[arg-type]
+    events = [Event(0.0, "info", "map", "map: /home/ann/secret/x.toml: written")]
+    run = record.header.run.model_copy(update={"track": secret, "robot": secret})
+    record = replace(record, events=events, header=replace(record.header, run=run))
+    drawings = Drawings([], made="Made by snakewalk run /home/ann/secret/x.toml")
+    html = page(record, numbers, drawings)
     assert "x.toml" in html
     assert "secret" not in html
     assert "/home" not in html
-    assert secret in page(numbers, judged, [], film="", **words, folders=True)  # type: ignore[arg-type]
+    assert secret in page(record, numbers, drawings, folders=True)
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:

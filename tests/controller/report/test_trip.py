@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import summary
-from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.report.curves import curves_html
-from snakewalk.controller.report.page import page
+from snakewalk.controller.report.page import Drawings, page
 from snakewalk.controller.report.trip import trip_of
 from snakewalk.controller.runlog.record import Event, RunRecord
 from snakewalk.drivers.safety.limits import SafetyLimits
@@ -70,12 +69,11 @@ def test_a_trip_of_no_joint_has_time_and_reason_alone(record: RunRecord) -> None
 def test_the_page_states_the_trip_above_its_numbers(tripped: RunRecord) -> None:
     label = tripped.header.robot.joint_label(JOINT)
     numbers = summary(tripped)
-    judged = verdict(tripped, numbers)
-    html = page(numbers, judged, [], film=None, events=[], config={}, trip=trip_of(tripped))
+    html = page(tripped, numbers, Drawings([]))
     head = html[html.index("<body>") : html.index("<section class='tiles'>")]
     assert f"Trip at <button data-time='29.500'>29.50 s</button>: {label}</h2>" in head
     assert "<tr class='error'><td>current</td><td>3 A, exceeded</td>" in head
-    assert "Trip at" not in page(numbers, judged, [], film=None, events=[], config={})
+    assert "Trip at" not in page(replace(tripped, events=()), numbers, Drawings([]))
 
 
 @pytest.mark.parametrize("is_tripped", [True, False])

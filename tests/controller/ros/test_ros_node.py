@@ -46,6 +46,8 @@ from snakewalk.controller.run.factory import prepare_commanded
 from snakewalk.controller.run.observers import Observers
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.controller.runlog.evidence import SIMULATED
+from snakewalk.controller.runlog.record import Header as LogHeader
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
 from snakewalk.controller.runlog.topics import PathTable
@@ -290,7 +292,7 @@ def test_the_path_in_force_waits_for_whoever_comes_late(
     plan = PlanSummary(np.array([[0.0, 0.0], [2.0, 1.0]]), np.array([[2.0, 1.0]]), 0.3)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     with RunLog(tmp_path / "log.mcap", graph.on_row) as log:
-        log.config(run, robot, world, backend="sim", plan=plan)
+        log.config(LogHeader(run, robot, world, backend="sim", plan=plan, pose_evidence=SIMULATED))
         graph.robot.step(1.0)
         heard = client.listen(PathMessage, "/path", latched)
         client.until(lambda: heard)

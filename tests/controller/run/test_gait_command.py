@@ -196,7 +196,7 @@ def test_live_from_a_terminal(tmp_path: Path) -> None:
     command = (  # with a page without pictures
         "from snakewalk.controller.cli.main import main\n"
         "from snakewalk.controller.report import artifacts\n"
-        "artifacts._draw = lambda record, made: artifacts._Drawn([], '', made)\n"
+        "artifacts._draw = lambda record, made: artifacts.Drawings([], '', made)\n"
         "main()"
     )
     words = ["gait", "run", "rolling", "--live", "--no-film", "--json", "--out", str(tmp_path)]

@@ -8,7 +8,8 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_run, load_world
-from snakewalk.controller.runlog.record import MotorEnergy, PlanSummary, Winding
+from snakewalk.controller.runlog.evidence import SIMULATED
+from snakewalk.controller.runlog.record import Header, MotorEnergy, PlanSummary, Winding
 from snakewalk.controller.runlog.topics import (
     BatteryTable,
     FrictionTable,
@@ -52,13 +53,16 @@ def write_log(path: Path, cycles: int) -> Path:
     ground = HeightField(np.outer(np.arange(300), np.ones(200)) * 1e-3, 0.02, -2.0, -3.0)
     with RunLog(path) as log:
         log.config(
-            run,
-            robot,
-            world,
-            backend="sim",
-            plan=plan,
-            ground=ground,
-            winding=Winding(5.2, 2.5),
+            Header(
+                run,
+                robot,
+                world,
+                backend="sim",
+                plan=plan,
+                ground=ground,
+                winding=Winding(5.2, 2.5),
+                pose_evidence=SIMULATED,
+            )
         )
         log.event(0.0, "start", "torque on")
         for k in range(cycles):

@@ -14,8 +14,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest, load_robot, load_run, load_world
 from snakewalk.controller.runlog import reader, tables
 from snakewalk.controller.runlog.column import Table
+from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.reader import LogError, read_log
-from snakewalk.controller.runlog.record import PlanSummary, Winding
+from snakewalk.controller.runlog.record import Header, PlanSummary, Winding
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import TABLES, WaypointTable
 from snakewalk.controller.runlog.writer import RunLog, part_path
@@ -124,11 +125,14 @@ def test_waypoints_that_were_set_on_the_way_are_the_plans(tmp_path: Path) -> Non
     first = np.array([[1.0, 0.0], [2.0, 0.0]])
     with RunLog(path) as log:
         log.config(
-            load_run("flat-square"),
-            load_robot("yaw16"),
-            load_world("flat"),
-            backend="sim",
-            plan=PlanSummary(np.zeros((2, 2)), first, 0.3),
+            Header(
+                load_run("flat-square"),
+                load_robot("yaw16"),
+                load_world("flat"),
+                backend="sim",
+                plan=PlanSummary(np.zeros((2, 2)), first, 0.3),
+                pose_evidence=SIMULATED,
+            )
         )
         log.add(WaypointTable, 1.0, waypoints_m=[*first, (3.0, 1.0)])
         log.add(WaypointTable, 2.0, waypoints_m=[first[0], (0.0, 4.0)])
@@ -157,11 +161,14 @@ def test_no_rows_give_empty_tables(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with RunLog(path) as log:
         log.config(
-            load_run("flat-square"),
-            load_robot("yaw16"),
-            load_world("flat"),
-            backend="sim",
-            plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+            Header(
+                load_run("flat-square"),
+                load_robot("yaw16"),
+                load_world("flat"),
+                backend="sim",
+                plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+                pose_evidence=SIMULATED,
+            )
         )
     record = read_log(path)
     assert record.cycle.asked_rad.shape == (0, 16)
@@ -200,11 +207,14 @@ def test_nan_in_a_command_is_kept_as_unknown(
     asked[2], asked[5] = np.nan, np.inf
     with RunLog(tmp_path / "run.mcap") as log:
         log.config(
-            load_run("flat-square"),
-            load_robot("yaw16"),
-            load_world("flat"),
-            backend="sim",
-            plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+            Header(
+                load_run("flat-square"),
+                load_robot("yaw16"),
+                load_world("flat"),
+                backend="sim",
+                plan=PlanSummary(np.zeros((2, 2)), np.zeros((1, 2)), 0.3),
+                pose_evidence=SIMULATED,
+            )
         )
         log.cycle(0.0, asked, np.zeros(16), state_of(0), deadline_s=0.0, lateness_s=0.0)
     row = read_log(tmp_path / "run.mcap").cycle.asked_rad[0]

@@ -1,6 +1,7 @@
 """Recordings with gaps, every n-th frame or few cycles: figures from consecutive frames only."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -137,6 +138,7 @@ def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: P
 
 
 def test_notes_stay_in_the_file_that_is_written(tmp_path: Path) -> None:
-    track = track_from_points("a", wave_points(20, 10.0), 10.0, notes=["2 markers are left out"])
+    track = track_from_points("a", wave_points(20, 10.0), 10.0)
+    track = replace(track, notes=("2 markers are left out",))
     save_track(tmp_path / "a.npz", track)
     assert load_file(tmp_path / "a.npz").notes == ("2 markers are left out",)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.synthesis.synthesis import Behaviour, synthesise
+from snakewalk.controller.animals.synthesis.synthesis import Behaviour, Sampling, Start, synthesise
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.pulse_speed import measure_pulse_speed
@@ -188,7 +188,9 @@ def test_the_synthesis_sliding_weight_is_measured_again(sliding: float) -> None:
     track.append(oldest_first[100:])
     law = SpeedLaw.printed(0.15)
     how = Behaviour(sliding=sliding)
-    run = synthesise(track, law, 120, 0.04, 0.01, behaviour=how, speed_m_s=0.24)
+    run = synthesise(
+        track, law, 120, Sampling(0.04, 0.01), behaviour=how, start=Start(speed_m_s=0.24)
+    )
     found = analyse(track_from_points("made", run.points_m[20:], 25.0))
     assert found.sliding == pytest.approx(sliding, abs=0.02)
 

@@ -12,6 +12,8 @@ from snakewalk.controller.animals.synthesis.synthesis import (
     NECK,
     Behaviour,
     Locomotion,
+    Sampling,
+    Start,
     Targets,
     synthesise,
     varied_pulse,
@@ -48,14 +50,20 @@ def grow(track: AngleTrack, _: object = None) -> None:
 
 
 def go(frames: int = 250, law: SpeedLaw = LAW, **how: object) -> Locomotion:
-    return synthesise(fresh(), law, frames, DT, R, grow, Behaviour(**how))  # type: ignore[arg-type]
+    return synthesise(fresh(), law, frames, Sampling(DT, R), grow, Behaviour(**how))  # type: ignore[arg-type]
 
 
 def one_segment_a_frame(frames: int, sliding: float = 0.0) -> Locomotion:
     """The body advances r in each frame, whatever its bends."""
     keep = SpeedLaw(1e-12, 0.0, 0.0, 0.0)
     return synthesise(
-        fresh(), keep, frames, DT, R, grow, Behaviour(sliding=sliding), speed_m_s=R / DT
+        fresh(),
+        keep,
+        frames,
+        Sampling(DT, R),
+        grow,
+        Behaviour(sliding=sliding),
+        Start(speed_m_s=R / DT),
     )
 
 
@@ -128,10 +136,10 @@ def test_the_steady_speed_is_that_of_the_shape() -> None:
 
 def test_a_track_that_runs_out_grows_or_is_an_error() -> None:
     track = fresh()
-    synthesise(track, LAW, 100, DT, R, grow)
+    synthesise(track, LAW, 100, Sampling(DT, R), grow)
     assert track.end > N + 40
     with pytest.raises(ValueError, match="the track ends at sample 99"):
-        synthesise(fresh(), LAW, 100, DT, R)
+        synthesise(fresh(), LAW, 100, Sampling(DT, R))
 
 
 def test_clamping_instead_of_growing_straightens_the_body() -> None:
@@ -143,7 +151,7 @@ def test_clamping_instead_of_growing_straightens_the_body() -> None:
 def test_a_walk_of_states_feeds_it_and_the_ground_carries_it() -> None:
     shapes = embedded("worm-like").angles_rad
     walker = Walker(shapes - shapes.mean(axis=1, keepdims=True), WalkConfig())
-    run = synthesise(walker.track, LAW, 80, DT, R, lambda *_: walker.decide(0.0, 0.0))
+    run = synthesise(walker.track, LAW, 80, Sampling(DT, R), lambda *_: walker.decide(0.0, 0.0))
     placed = GroundStep(None).place(run.angles_rad, run.points_m[:, -1], R, 0.03)
     np.testing.assert_allclose(placed.points_m[..., :2], run.points_m, atol=1e-9)
 
@@ -289,10 +297,9 @@ def test_printed_lookup_of_fractions_blurs_the_body_and_ours_does_not() -> None:
         track,
         steady,
         401,
-        DT,
-        R,
+        Sampling(DT, R),
         lambda t, _: t.append(wave(2.5 * (t.end + np.arange(50)))),
-        speed_m_s=0.5 * R / DT,
+        start=Start(speed_m_s=0.5 * R / DT),
     )
     np.testing.assert_allclose(run.angles_rad[-1], wave(2.5 * (299 - np.arange(N))), atol=1e-9)
 

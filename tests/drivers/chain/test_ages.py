@@ -22,9 +22,8 @@ PERIOD_S = 0.02
 
 
 def on_line(robot: RobotConfig, baud: int = 1_000_000, **line: float) -> tuple[ServoChain, SimLine]:
-    bank = ServoBank(robot.servo_ids)
-    bank["Baud Rate"][:] = {57_600: 1, 1_000_000: 3}[baud]
-    sim = SimLine(bank, BenchPlant(robot.joint_count), baud=baud, **line)  # type: ignore[arg-type]
+    bank = ServoBank(robot.servo_ids, baud=baud)
+    sim = SimLine(bank, BenchPlant(robot.joint_count), **line)  # type: ignore[arg-type]
     return ServoChain(DynamixelBus(sim), robot), sim
 
 

@@ -28,7 +28,7 @@ class Rig:
 
     def __init__(self, joints: int = 4, baud: int = 1_000_000) -> None:
         robot = RobotConfig(name="some", joint_axes="y" * joints)
-        self.line = SimLine(ServoBank(robot.servo_ids, baud=baud), BenchPlant(joints), baud=baud)
+        self.line = SimLine(ServoBank(robot.servo_ids, baud=baud), BenchPlant(joints))
         self.joints, self.events = joints, list[str]()
         chain = ServoChain(DynamixelBus(self.line, robot.models_by_id), robot, watchdog_s=2.54)
         chain.on_event = self.events.append

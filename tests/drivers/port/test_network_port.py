@@ -23,7 +23,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig, ServoConfig
 from snakewalk.config.robot.ports import URL_SCHEMES
-from snakewalk.config.run import SafetyConfig
+from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench import torque_off
 from snakewalk.controller.bench.adapter import permission
 from snakewalk.controller.bench.doctor import examine
@@ -78,7 +78,7 @@ class FarEnd:
 
     def __init__(self, kind: str) -> None:
         bank = ServoBank(ROBOT.servo_ids, SERVO.model, BAUD)
-        self.line = SimLine(bank, BenchPlant(3), baud=BAUD)
+        self.line = SimLine(bank, BenchPlant(3))
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.url = f"{kind}://127.0.0.1:{self._listener.getsockname()[1]}"
         if kind == "rfc2217":
@@ -222,8 +222,7 @@ def test_doctor_and_torque_off_over_a_network(
         findings = examine(
             port,
             ROBOT,
-            SafetyConfig(),
-            5.0,
+            RunConfig(name="slow", motion="source", cycle_hz=5.0),
             latency_s=port.latency_s,
             latency_timer_ms=port.latency_timer_ms,
         )

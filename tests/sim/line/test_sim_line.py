@@ -50,7 +50,7 @@ def test_clock_only_moves_on() -> None:
 def test_cycle_of_16_servos_takes_its_time_on_the_wire(
     code: int, baud: int, cycle_ms: float
 ) -> None:
-    line = SimLine(ServoBank(range(1, 17), baud=baud), BenchPlant(16), baud=baud)
+    line = SimLine(ServoBank(range(1, 17), baud=baud), BenchPlant(16))
     for servo in range(1, 17):
         write(line, servo, 9, 0, 1)
     length = 16 * 21 if code == PLAIN else 8 + 16 * 14

@@ -6,7 +6,7 @@ import pytest
 
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SHADE, SUN_DIRECTION, SoftShade, add_sheet, shade_picture
 
@@ -42,7 +42,7 @@ def test_a_ball_in_the_air_darkens_the_ground_where_the_sun_puts_it(hills: bool)
     if hills:
         ground = HeightField(0.2 * np.random.default_rng(0).random((41, 41)), 0.2, -4.0, -4.0)
     model = dressed_model(
-        load_robot("alternating16"), load_world("flat"), ground, additions=(add_sheet,)
+        Scene(load_robot("alternating16"), load_world("flat"), ground), additions=(add_sheet,)
     )
     data, option, camera = mujoco.MjData(model), mujoco.MjvOption(), mujoco.MjvCamera()
     mujoco.mj_forward(model, data)

@@ -8,7 +8,15 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.sim.rendering.film import _scale_m
-from snakewalk.sim.rendering.looks import REACHED, _contours, _legs, dressed_model, mark_reached
+from snakewalk.sim.rendering.looks import (
+    REACHED,
+    Marks,
+    Scene,
+    _contours,
+    _legs,
+    dressed_model,
+    mark_reached,
+)
 from snakewalk.sim.rendering.trail import (
     AXES,
     AXES_GEOMS,
@@ -102,7 +110,7 @@ def test_no_hill_covers_a_rod() -> None:
 @pytest.mark.parametrize("hollow", [False, True])
 def test_waypoints_whose_arrival_is_not_measured_are_hollow(hollow: bool) -> None:
     robot, world = load_robot("yaw16"), load_world("flat")
-    model = dressed_model(robot, world, None, [(1.0, 0.0)], hollow=hollow)
+    model = dressed_model(Scene(robot, world, None), Marks([(1.0, 0.0)], hollow=hollow))
     mark_reached(model, 0)
     opacity = {name: model.geom(name).rgba[3] for name in ("waypoint0", "waypoint0ring1")}
     assert opacity == dict.fromkeys(opacity, 0.0 if hollow else 1.0)

@@ -16,7 +16,7 @@ from snakewalk.controller.animals.mesh.body_motion import from_poses, robot_skin
 from snakewalk.controller.animals.mesh.body_skin import body_skin
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.run.results import check_look, film_look
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 
 
 def header(track: str = "worm-like") -> Any:
@@ -29,7 +29,7 @@ def test_mujoco_draws_the_posed_skin() -> None:
     of = header()
     look = skin_look("snake", of)
     assert look is not None
-    model = dressed_model(of.robot, of.world, None, look=look)
+    model = dressed_model(Scene(of.robot, of.world, None), look=look)
     data, scene = mujoco.MjData(model), mujoco.MjvScene(model, maxgeom=1000)
     rng = np.random.default_rng(1)
     turn = Rotation.from_rotvec([0.2, -0.3, 1.4]).as_quat(scalar_first=True)
@@ -46,8 +46,8 @@ def test_mujoco_draws_the_posed_skin() -> None:
 
 def test_a_skin_stands_in_place_of_capsules_and_adds_no_mass() -> None:
     of = header()
-    plain = dressed_model(of.robot, of.world, None)
-    animal = dressed_model(of.robot, of.world, None, look=skin_look("snake", of))
+    plain = dressed_model(Scene(of.robot, of.world, None))
+    animal = dressed_model(Scene(of.robot, of.world, None), look=skin_look("snake", of))
     assert (plain.nskin, animal.nskin) == (0, 1)
     assert animal.ngeom < plain.ngeom
     assert animal.body_mass.sum() == pytest.approx(plain.body_mass.sum())

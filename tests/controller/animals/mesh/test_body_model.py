@@ -24,7 +24,7 @@ from snakewalk.controller.animals.mesh.mesh import body_mesh
 from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.images.mesh_files import write_mesh
 from snakewalk.controller.mechanics.ground_step import GroundStep, half_heights_m
-from snakewalk.sim.rendering.looks import dressed_model
+from snakewalk.sim.rendering.looks import Scene, dressed_model
 from tests.helpers.command import snakewalk
 
 LINE = np.stack([90.0 - np.linspace(0.0, 80.0, 41), np.full(41, 20.0)], axis=-1)  # head at right
@@ -221,7 +221,7 @@ def test_the_robot_s_profile_is_the_look_s_skin() -> None:
     assert robot.radii_m(5) == pytest.approx([robot.body_radius_m] * 5)
     skins = []
     for one in (robot, shaped):
-        model = dressed_model(one, load_world("flat"), None)
+        model = dressed_model(Scene(one, load_world("flat"), None))
         skin = [
             float(model.geom_size[g, 0])
             for g in range(model.ngeom)

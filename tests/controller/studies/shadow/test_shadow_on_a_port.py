@@ -43,7 +43,7 @@ class Bench:
         baud = robot.servo.baud
         bank = ServoBank(robot.servo_ids, robot.servo_models, baud)
         mounting, motors = Mounting.of(robot), motors_of(robot)
-        self.line = SimLine(bank, plant, baud=baud, mounting=mounting, motors=motors)
+        self.line = SimLine(bank, plant, mounting=mounting, motors=motors)
         self.clock = ServedClock()
         self.server = opened.enter_context(PtyServer(self.line, self.clock))
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,8 @@ def test_a_track_comes_back(suffix: str, scale_m: float | None, tmp_path: Path) 
 
 
 def test_the_command_writes_tables_for_r_and_tierpsy(tmp_path: Path) -> None:
-    track = track_from_points("eel", ends(wave_angles())[:, ::4], RATE_HZ, notes=["one note"])
+    track = track_from_points("eel", ends(wave_angles())[:, ::4], RATE_HZ)
+    track = replace(track, notes=("one note",))
     write_track(tmp_path / "eel.npz", track, ".npz")
     wcon = tmp_path / "out.wcon"
     assert snakewalk("animal", "track", str(tmp_path / "eel.npz"), "-o", str(wcon)).returncode == 0
