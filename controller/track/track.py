@@ -137,10 +137,10 @@ def track_from_points(
         time_s = number / rate_hz
         uneven = True
         rate_hz = 1.0 / float(np.median(np.diff(time_s[whole])))
+    exchanged: tuple[str, ...] = ()
     if whole.any():
         points = points.copy()
         points[whole], exchanged = with_ends_in_place(points[whole], number[whole])
-        notes = (*notes, *exchanged)
     absent = _absent(number, time_s if uneven else None, rate_hz)
     dropped = int(len(points) - whole.sum())
     if time_s is not None and uneven:
@@ -161,6 +161,7 @@ def track_from_points(
         dropped=dropped,
         absent=absent,
         every=every,
+        notes=exchanged,
         rate_assumed=rate_assumed,
         uneven=uneven,
         status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),

@@ -192,7 +192,7 @@ class Keypoints:
             rate_assumed=self.rate_hz is None,
             status=status,
         )
-        return replace(track, notes=tuple(self.notes))
+        return replace(track, notes=(*self.notes, *track.notes))
 
 
 def zigzag(places: Floats) -> float:
