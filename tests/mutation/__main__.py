@@ -122,18 +122,25 @@ def try_every(modules: list[str]) -> tuple[list[str], list[str]]:
     return [*head, *rows, "", *reasons], unexplained
 
 
+class FailingTestsError(RuntimeError):
+    """Tests fail without a mutant, so that they cannot show anything."""
+
+
 def survivors_of(module: str, tried: list[Mutant], files: list[str]) -> list[Mutant]:
     """Return the mutants of a module that no test of the files notices."""
     if not tried or not files:
         return tried
     trial = try_mutants(f"snakewalk.{module}", tried, files, BUDGET_S)
     if trial.failing:
-        raise SystemExit(f"{module}: tests fail without a mutant: {', '.join(trial.failing)}")
+        raise FailingTestsError(", ".join(trial.failing))
     return [tried[index] for index in trial.survivors]
 
 
-def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]]:
-    """Try a sample of each drawn module; yield it, its row of the page, and if it passes."""
+def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str | None, bool]]:
+    """Try a sample of each drawn module; yield it, its row of the page, and if it passes.
+
+    A module whose tests fail without a mutant has no row, and the others are tried all the same.
+    """
     for package, module in drawn_modules():
         if names and package not in names and module not in names:
             continue
@@ -143,8 +150,13 @@ def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]
             yield module, f"| `{package}` | `{module}` | 0 | 0 | |", True
             continue
         near = nearest_tests(module)
-        left = survivors_of(module, drawn, near[:FILES])
-        left = survivors_of(module, left, near[FILES : FILES + FURTHER_FILES])
+        try:
+            left = survivors_of(module, drawn, near[:FILES])
+            left = survivors_of(module, left, near[FILES : FILES + FURTHER_FILES])
+        except FailingTestsError as error:
+            print(f"{module}: tests fail without a mutant: {error}", file=sys.stderr)
+            yield module, None, False
+            continue
         for mutant in left:
             print(f"{module}:{mutant.line}: {mutant.name}", file=sys.stderr)
         noticed = len(drawn) - len(left)
@@ -190,12 +202,13 @@ def main() -> None:
     if given.names[:1] == [PACKAGES]:
         rows, failed = {}, []
         for module, row, passes in try_packages(given.names[1:], given.sample):
-            print(row, flush=True)
-            rows[module] = row
             failed += [] if passes else [module]
-            write_between(PACKAGES, joined_rows(lines_between(PACKAGES), rows))
+            if row is not None:
+                print(row, flush=True)
+                rows[module] = row
+                write_between(PACKAGES, joined_rows(lines_between(PACKAGES), rows))
         if failed:
-            print(f"below {100 * SHARE:.0f} %:", *failed, sep="\n", file=sys.stderr)
+            print(f"below {100 * SHARE:.0f} %, or not tested:", *failed, sep="\n", file=sys.stderr)
             raise SystemExit(1)
         return
     lines, unexplained = try_every(given.names or list(TARGETS))

@@ -3,10 +3,11 @@
 import ast
 import gc
 import json
+import math
 import os
 import resource
 import signal
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -20,6 +21,12 @@ from tests.tiers.costs import cpu_s
 ROOT: Final = Path(__file__).resolve().parents[2]
 STUCK_S: Final = 600
 """Wall time after which a test that waits for ever has noticed its mutant."""
+START_S: Final = 10.0
+"""Time that a process has beside a multiple of the CPU time of its tests without a mutant."""
+TIMES_CPU: Final = 3.0
+"""A mutant may need this multiple of the CPU time of its tests."""
+TIMES_WALL: Final = 20.0
+"""A mutant whose tests wait may need this multiple of their CPU time: the machine may be busy."""
 TEST_S: Final = 4.0
 """CPU time of the most expensive test that is run on each mutant."""
 WORDS: Final = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
@@ -75,8 +82,13 @@ def _functions(file: Path) -> dict[tuple[str, int], list[FunctionType]]:
     return found
 
 
+def _file_of(name: str) -> str:
+    """Return the file of a test, by the name of the test."""
+    return name.partition("::")[0]
+
+
 class _Forks:
-    """A plugin of pytest that runs the collected tests once for each mutant."""
+    """A plugin of pytest that runs the tests on each mutant, the cheapest files first."""
 
     def __init__(self, file: Path, mutants: Sequence[Mutant], budget_s: float) -> None:
         self._file = file
@@ -94,7 +106,7 @@ class _Forks:
         """Fork; a child returns None, and pytest runs its tests."""
         functions = _functions(self._file)
         read, write = os.pipe()
-        if self._fork(10.0 * self._budget_s) == 0:
+        if self._fork(5.0 * self._budget_s, STUCK_S) == 0:
             self._out = write
             session.config.option.maxfail = 0
             return None
@@ -103,23 +115,28 @@ class _Forks:
             measured = [json.loads(line) for line in lines]
         os.wait()
         kept_s = {name: s for name, s, passed in measured if passed and s <= TEST_S}
-        session.items = [item for item in session.items if item.nodeid in kept_s]
+        files_s: Counter[str] = Counter()
+        for name, spent_s in kept_s.items():
+            files_s[_file_of(name)] += spent_s
+        kept = [item for item in session.items if item.nodeid in kept_s]
+        session.items = sorted(kept, key=lambda item: files_s[_file_of(item.nodeid)])
+        all_s = files_s.total()
         survivors = []
         for index, mutant in enumerate(self._mutants if kept_s else ()):
-            if self._fork(10.0 + 3.0 * sum(kept_s.values())) == 0:
+            if self._fork(START_S + TIMES_CPU * all_s, START_S + TIMES_WALL * all_s) == 0:
                 self._apply(mutant, functions)
                 return None
             if os.waitstatus_to_exitcode(os.wait()[1]) == 0:
                 survivors.append(index)
         failing = [name for name, _, passed in measured if not passed]
-        self.trial = Trial(survivors, len(kept_s), sum(kept_s.values()), failing)
+        self.trial = Trial(survivors, len(kept_s), all_s, failing)
         return True
 
-    def _fork(self, limit_s: float) -> int:
+    def _fork(self, limit_s: float, stuck_s: float) -> int:
         child = os.fork()
         if child == 0:
             self.is_child = True
-            signal.alarm(STUCK_S)
+            signal.alarm(math.ceil(stuck_s))
             used_s = sum(resource.getrusage(resource.RUSAGE_SELF)[:2])
             resource.setrlimit(resource.RLIMIT_CPU, (int(used_s + limit_s) + 1,) * 2)
         return child
