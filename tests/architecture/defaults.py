@@ -6,10 +6,10 @@ same with a unit) and the same number or text as their default, each as a litera
 
 import ast
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final, NamedTuple
 
-ROOT: Final = Path(__file__).resolve().parents[2]
+from tests.helpers.library import Module, library
+
 _OTHERS: Final = {
     "animals/commands/people.py:motion": "how a person moves; that of a run moves a robot",
     "bench/commands/bus_serve.py:latency": "of a USB adapter in ms; the other is a camera's in s",
@@ -33,25 +33,30 @@ class Default(NamedTuple):
 
 def repeated() -> list[tuple[Default, Default]]:
     """Return the defaults of commands that the code of their package, or a schema, repeats."""
-    schemas = [each for file in (ROOT / "config").rglob("*.py") for each in defaults(file)]
+    schemas = [each for file in library("config/") for each in defaults(file)]
+    controller = library("controller/")
+    packages = {file.name.split("/")[1] for file in controller if _is_command(file)}
     found = []
-    for package in sorted(folder.parent for folder in ROOT.glob("controller/*/commands")):
-        files = sorted(package.rglob("*.py"))
-        below = [f for f in files if f.parent.name != "commands"]
+    for package in sorted(packages):
+        files = [file for file in controller if file.name.split("/")[1] == package]
+        below = [file for file in files if not _is_command(file)]
         known = [*schemas, *(each for file in below for each in defaults(file))]
-        for file in files:
-            if file.parent.name == "commands":
-                for one in defaults(file):
-                    same = [other for other in known if _is_same(one, other)]
-                    key = f"{package.name}/commands/{file.name}:{one.name}"
-                    found += [(one, same[0])] if same and key not in _OTHERS else []
+        for file in filter(_is_command, files):
+            for one in defaults(file):
+                same = [other for other in known if _is_same(one, other)]
+                key = f"{file.name.removeprefix('controller/')}:{one.name}"
+                found += [(one, same[0])] if same and key not in _OTHERS else []
     return found
 
 
-def defaults(file: Path) -> Iterator[Default]:
+def _is_command(file: Module) -> bool:
+    return file.name.split("/")[-2] == "commands"
+
+
+def defaults(file: Module) -> Iterator[Default]:
     """Yield the literal defaults of public functions and of fields of classes."""
-    place = str(file.relative_to(ROOT))
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    place = file.name
+    for node in file.nodes:
         if isinstance(node, ast.FunctionDef) and node.name[0] != "_":
             both = [*node.args.posonlyargs, *node.args.args]
             given = [None] * (len(both) - len(node.args.defaults)) + list(node.args.defaults)

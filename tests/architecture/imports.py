@@ -9,13 +9,14 @@ from pathlib import Path
 import networkx as nx
 
 from tests.architecture.layout import TOPS
+from tests.helpers.library import library
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True)
 class Source:
-    """What a file says, of what these tests ask; its syntax tree would be kept by the thousand."""
+    """What a file says, of what these tests ask."""
 
     imported: set[str]
     """Modules and names of ours, and of tests, that it imports, without ``snakewalk``."""
@@ -26,10 +27,16 @@ class Source:
 
 
 def read_source(text: str) -> Source:
+    """Return what the text of a file says."""
+    tree = ast.parse(text)
+    return read_tree(tree, ast.walk(tree))
+
+
+def read_tree(tree: ast.Module, nodes: Iterable[ast.AST]) -> Source:
+    """Return what a file says, by its syntax tree and all nodes of it."""
     names: set[str] = set()
     defined: list[tuple[str, int]] = []
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
+    for node in nodes:
         match node:
             case ast.Import():
                 names |= {alias.name for alias in node.names}
@@ -50,13 +57,15 @@ def read_source(text: str) -> Source:
     return Source(ours | others, defined, classes)
 
 
+def _dotted(path: str) -> str:
+    return path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+
+
 @cache
 def read_folder(top: str) -> Mapping[str, Source]:
-    """Every module of a top folder (dotted, without ``snakewalk``)."""
+    """Every module of a folder that is not of the library (dotted)."""
     return {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): (
-            read_source(file.read_text(encoding="utf-8"))
-        )
+        _dotted(file.relative_to(ROOT).as_posix()): read_source(file.read_text(encoding="utf-8"))
         for file in sorted((ROOT / top).rglob("*.py"))
     }
 
@@ -64,7 +73,7 @@ def read_folder(top: str) -> Mapping[str, Source]:
 @cache
 def sources() -> Mapping[str, Source]:
     """Every module of the packages (dotted, without ``snakewalk``), read once for all tests."""
-    return {name: source for top in TOPS for name, source in read_folder(top).items()}
+    return {_dotted(file.name): read_tree(file.tree, file.nodes) for file in library()}
 
 
 def module_of(name: str, known: Iterable[str]) -> str | None:

@@ -22,9 +22,13 @@ class Module(NamedTuple):
     """All nodes of the tree."""
 
 
+def library(below: str = "") -> tuple[Module, ...]:
+    """Return every file of the packages, or those below a path, in the order of their names."""
+    return tuple(module for module in _modules() if module.name.startswith(below))
+
+
 @cache
-def library() -> tuple[Module, ...]:
-    """Return every file of the packages, in the order of their names."""
+def _modules() -> tuple[Module, ...]:
     modules = []
     for top in TOPS:
         for file in sorted((ROOT / top).rglob("*.py")):

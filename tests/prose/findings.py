@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import NamedTuple
 
 from tests.prose.patterns import LONGEST_WORDS, PATTERNS
@@ -33,6 +34,7 @@ def findings(kind: str) -> Iterator[Finding]:
             yield Finding(place, LONG, sentence)
 
 
+@cache
 def count(kind: str) -> dict[str, int]:
     """Return the number of findings of each pattern, and of all sentences."""
     counts = dict.fromkeys([*PATTERNS, LONG], 0)

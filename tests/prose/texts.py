@@ -2,9 +2,7 @@
 
 import ast
 import inspect
-import io
 import re
-import tokenize
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import Any, Final
 
 import typer
 
+from tests.architecture.tokens import TOKEN
 from tests.helpers.library import library
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,9 +84,10 @@ def docstrings() -> Iterator[tuple[str, str]]:
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
                 for paragraph in docstring_paragraphs(value.value):
                     yield f"{name}:{value.lineno}", paragraph
-        for token in tokenize.generate_tokens(io.StringIO(source).readline):
-            if token.type == tokenize.COMMENT and "noqa" not in token.string:
-                yield f"{name}:{token.start[0]}", token.string.lstrip("#: ")
+        for token in TOKEN.finditer(source):
+            if token.lastgroup == "comment" and "noqa" not in token[0]:
+                line = source.count("\n", 0, token.start()) + 1
+                yield f"{name}:{line}", token[0].lstrip("#: ")
 
 
 def messages() -> Iterator[tuple[str, str]]:

@@ -20,6 +20,7 @@ from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.studies.sweep_points import points_of
 from snakewalk.controller.studies.trials import Case, trials
 from tests.helpers.dying_workers import square
+from tests.helpers.library import library
 
 distributed = pytest.importorskip("distributed")
 
@@ -163,18 +164,12 @@ def test_trials_never_fork_beside_the_physics(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_processes_are_started_in_one_place_and_spawned() -> None:
-    root = Path(__file__).parents[3]
-    sources = [
-        p for top in ("config", "controller", "drivers", "sim") for p in (root / top).rglob("*.py")
-    ]
     names = (
         "get_context(", "subprocess", "set_start_method", "multiprocessing.pool", "os.fork",
         "os.spawn", "os.posix_spawn", "os.exec", "os.system", "os.popen", "pty.spawn", "runpy",
         "LocalCluster",
     )  # fmt: skip
-    starters = {
-        p.relative_to(root).as_posix() for p in sources if any(n in p.read_text() for n in names)
-    }
+    starters = {file.name for file in library() if any(name in file.text for name in names)}
     stop_program = "drivers/safety/stop_output.py"  # runs a program of the user's, not of ours
     assert starters == {"controller/console/child_process.py", stop_program}
     with process_pool(1) as pool:

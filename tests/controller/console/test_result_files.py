@@ -34,9 +34,9 @@ from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runtime.drive import Progress
 from snakewalk.controller.studies.tune import Tuned
+from tests.helpers.library import library
 from tests.helpers.tiers import slow_after
 
-CONTROLLER = Path(__file__).resolve().parents[3] / "controller"
 WRITERS = {
     "write_text",
     "write_bytes",
@@ -280,11 +280,10 @@ def test_commands_leave_nothing_on_a_full_disk(
         assert out.read_bytes() == old
 
 
-def unsafe(source: str) -> list[int]:
+def unsafe(nodes: list[ast.AST]) -> list[int]:
     """Lines that write a file outside ``with atomic_write``, or a folder that is deleted again."""
-    tree = ast.parse(source)
     safe: set[ast.AST] = set()
-    for block in ast.walk(tree):
+    for block in nodes:
         if isinstance(block, ast.With):
             calls = [item.context_expr for item in block.items]
             names = {getattr(c.func, "id", "") for c in calls if isinstance(c, ast.Call)}
@@ -294,7 +293,7 @@ def unsafe(source: str) -> list[int]:
             safe |= set(ast.walk(block))  # a writer itself: its callers are examined
     return [
         node.lineno
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Call) and node not in safe and writes(node)
     ]
 
@@ -312,11 +311,11 @@ def writes(call: ast.Call) -> bool:
 @pytest.mark.costs("reads every source file")
 def test_every_result_is_written_atomically() -> None:
     found = {
-        f"{file.relative_to(CONTROLLER)}:{line}"
-        for file in sorted(CONTROLLER.rglob("*.py"))
-        if file.name not in STREAMS
-        and file.relative_to(CONTROLLER).as_posix() not in WRITERS_OF_A_KIND
-        for line in unsafe(file.read_text(encoding="utf-8"))
+        f"{file.name}:{line}"
+        for file in library("controller/")
+        if file.name.rpartition("/")[2] not in STREAMS
+        and file.name.removeprefix("controller/") not in WRITERS_OF_A_KIND
+        for line in unsafe(file.nodes)
     }
     assert found == set()
 
