@@ -104,23 +104,27 @@ def test_a_page_touches_as_many_files_as_it_says(name: str, count: int) -> None:
     assert re.search(rf"^(?:You change )?{count} files?\b", files, re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_a_gait_is_found_shown_and_run(extended: Extended) -> None:
     assert "sway" in only(extended.shown, "gait list")
     assert "bend_rad" in only(extended.shown, "gait show sway")
     assert "first" in only(extended.shown, "gait run sway")
 
 
+@pytest.mark.slow
 def test_a_command_is_listed_and_runs(extended: Extended) -> None:
     assert "length" in only(extended.shown, "robot --help")
     assert "1.19" in only(extended.shown, "robot length yaw16")
     assert "Print the length of a robot." in extended.shown["snakewalk robot length --help"]
 
 
+@pytest.mark.slow
 def test_a_fault_kind_is_accepted_and_played(extended: Extended) -> None:
     assert '"hang"' in only(extended.shown, "tools schema faults")
     assert any("hang.toml" in line for line in extended.shown)
 
 
+@pytest.mark.slow
 def test_a_measured_quantity_is_in_summary_report_and_export(extended: Extended) -> None:
     folder = extended.folder
     with (folder / "tables/cycle.csv").open(encoding="utf-8") as file:
@@ -168,6 +172,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
         del sys.modules[name]
 
 
+@pytest.mark.slow
 def test_a_pose_source_is_a_package_of_the_user(installed: Path) -> None:
     pytest.importorskip("mujoco")
     steps = page("add-a-pose-source")

@@ -126,6 +126,7 @@ def test_every_command_that_a_page_names_exists() -> None:
     assert [each for each in sorted(names) if not exists(each[1])] == []
 
 
+@pytest.mark.slow
 def test_every_command_that_a_help_or_a_message_names_exists() -> None:
     names = {
         (module.name, words)

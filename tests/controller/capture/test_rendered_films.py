@@ -72,6 +72,7 @@ def test_colours_of_equal_brightness_are_told_apart() -> None:
     assert median_error(scene, seen) < 0.01 * scene.length_px
 
 
+@pytest.mark.slow
 def test_the_head_stays_the_head_after_a_gap() -> None:
     scene = replace(CLEAN, length_px=130.0, frames=22)
     frames = list(film(scene))

@@ -29,7 +29,6 @@ from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_file
-from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_crossings import CrossingScene, crossing_film, crossing_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -40,8 +39,8 @@ PAIR = CrossingScene(
 PLATE = CrossingScene(length_px=50.0, sizes=0.1, greys=10.0)
 
 
-@pytest.mark.costs("three animals cross in 110 frames")
-@pytest.mark.parametrize("seed", slow_except([503], [500, 503]))
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [500, 503])
 def test_identities_are_kept_through_crossings(seed: int) -> None:
     scene = CrossingScene(seed=seed, frames=110)
     midlines = crossing_midlines(scene)

@@ -362,7 +362,7 @@ COSTS = {
 
 
 @pytest.mark.slow_cases(120, "243 commands in all")
-@pytest.mark.fast_cases(48)
+@pytest.mark.fast_cases(30)
 @pytest.mark.parametrize(
     ("words", "said"),
     [pytest.param(*row, id=row[0], marks=COSTS.get(row[0], ())) for row in ROWS],

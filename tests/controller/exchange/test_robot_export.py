@@ -260,7 +260,7 @@ def test_the_exported_body_says_how_its_friction_differs(tmp_path: Path) -> None
     assert "give --mjcf FILE" in str(CliRunner().invoke(app, alone).exception)
 
 
-@pytest.mark.costs("runs a gait in snakewalk and in plain MuJoCo")
+@pytest.mark.slow
 def test_rollers_slip_across_and_roll_along() -> None:
     """A body without them stays where it is: 0.00 of our speed, with them 1.13."""
     ours_m_s, rollers, ice = exported_speeds("lateral-undulation", "yaw16", ("rollers", "none"))

@@ -180,6 +180,7 @@ def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRec
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
 def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_page(
     hills: Path,

@@ -157,6 +157,7 @@ PHASES = {
 """What a signal interrupts: the function called then, the state of torque, the name of the log."""
 
 
+@pytest.mark.fast_cases(16)
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("phase", PHASES)
 def test_each_signal_in_each_phase_says_what_became_of_torque_and_log(

@@ -61,7 +61,7 @@ def moved(robot_name: str, world_name: str, kind: type) -> list[bytes]:
     return [each.tobytes() for each in (*arrays, *drive.columns())]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.costs("runs the uncompiled public interface for comparison")
 @compiled_here
 @pytest.mark.parametrize(("robot", "world"), CASES)

@@ -82,6 +82,7 @@ def alarms(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Alarms:
     return run
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.slow_cases(1, "a run with its shadow each: 5 s of CPU")
 @pytest.mark.costs("a run with its shadow")
 @pytest.mark.parametrize("seed", slow_except([0], range(3)))

@@ -56,6 +56,7 @@ def well(seed: int) -> dict[str, Floats | float]:
     }
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("cause", "index", "key", "value"),
     [
@@ -102,7 +103,7 @@ def test_a_load_comes_on_top_of_a_head_with_cameras() -> None:
     )
 
 
-@pytest.mark.costs("a run with its shadow")
+@pytest.mark.slow
 def test_a_host_that_computes_for_some_milliseconds_is_no_cause(
     goals: Goals, signatures: Signatures
 ) -> None:
