@@ -24,15 +24,16 @@ from rich.console import Console
 from benchmarks.rows import found_table
 from benchmarks.shadow import planted
 from snakewalk.config.arrays import Floats
-from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
+    Resistance,
     fit_friction,
     with_mass,
+    with_resistance,
 )
 from snakewalk.controller.studies.shadow.diagnosis import Goals, goals_of
 from snakewalk.sim.physics.plant import FLOOR_STEP_S
@@ -68,9 +69,9 @@ def current_a(log: FrictionLog) -> float:
     return float(np.abs(log.answers[0]).mean())
 
 
-def forecast(goals: Goals, friction: FrictionConfig, mass: float = 1.0) -> FrictionLog:
+def forecast(goals: Goals, friction: Resistance, mass: float = 1.0) -> FrictionLog:
     """Simulate a run with a friction, and a mass over the file's."""
-    world = goals.world.model_copy(update={"friction": friction})
+    world = with_resistance(goals.world, friction)
     goals = replace(goals, world=world, robot=with_mass(goals.robot, mass))
     return FrictionLog.simulated(goals, NO_DEVIATION)
 

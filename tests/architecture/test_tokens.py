@@ -68,6 +68,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.console": (7750, "0188-options-are-fields.md"),
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
+    "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (9200, "0193-budget-of-the-live-page.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""

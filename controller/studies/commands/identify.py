@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 from rich.table import Table
@@ -14,6 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.loader import checked, load_robot, load_world, with_keys
+from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import robot_toml, template
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import command
@@ -31,8 +32,12 @@ from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.identification.friction_fit import (
+    Found,
+    FrictionFit,
     FrictionLog,
+    Resistance,
     fit_friction,
+    resistance_of,
     with_mass,
 )
 from snakewalk.controller.studies.identification.law_fit import LawFit, fit_laws
@@ -44,6 +49,7 @@ from snakewalk.controller.studies.identification.pendulum_fit import (
 from snakewalk.controller.studies.identification.pendulum_log import PendulumLog, read_pendulum_log
 from snakewalk.controller.studies.identification.servo_constants import (
     CONSTANTS,
+    ServoConstants,
     bam_text,
     check_servo,
     ranges,
@@ -52,21 +58,11 @@ from snakewalk.controller.studies.identification.servo_constants import (
     robot_with,
 )
 
-if TYPE_CHECKING:
-    from snakewalk.config.robot import RobotConfig
-    from snakewalk.config.world import FrictionConfig, WorldConfig
-    from snakewalk.controller.studies.identification.friction_fit import (
-        Found,
-        FrictionFit,
-        FrictionLog,
-    )
-    from snakewalk.controller.studies.identification.servo_constants import ServoConstants
-
 
 class _RobotFile(NamedTuple):
     """A robot to write with the results."""
 
-    before: "RobotConfig"
+    before: RobotConfig
     out: Path
 
 
@@ -198,8 +194,8 @@ def _check_robot_out(out: Path | None) -> None:
 
 
 def _read_runs(
-    paths: list[Path], judge: list[Path], given: "WorldConfig | None", *, lifting: bool
-) -> "dict[Path, FrictionLog]":
+    paths: list[Path], judge: list[Path], given: WorldConfig | None, *, lifting: bool
+) -> dict[Path, FrictionLog]:
 
     logs = {}
     for path in (*paths, *judge):
@@ -214,7 +210,9 @@ def _read_runs(
             raise InputError(f"{path}: {error}") from None
     first = next(iter(logs.values())).goals
     for path, log in logs.items():
-        if log.goals.robot != first.robot or log.goals.world.friction != first.world.friction:
+        if log.goals.robot != first.robot or resistance_of(log.goals.world) != resistance_of(
+            first.world
+        ):
             raise InputError(
                 f"{path}: is of another robot or another friction than {paths[0]}; give logs of "
                 "one robot, and --world WORLD if their worlds differ"
@@ -245,9 +243,11 @@ def _friction(
     first = logs[paths[0]].goals
     name = first.world.name if out is None else out.stem
     ground = checked(WorldConfig, first.world.model_dump() | {"name": name}, str(out))
-    with ProgressBar("laws of friction", transient=True) as bar:
-        laws = fit_laws([logs[path] for path in paths], bar.update)
-    if laws.is_decided:
+    laws = None
+    if first.world.ground.kind == "flat":
+        with ProgressBar("laws of friction", transient=True) as bar:
+            laws = fit_laws([logs[path] for path in paths], bar.update)
+    if laws is not None and laws.is_decided:
         logs = {path: log.under(laws.best) for path, log in logs.items()}
         friction = ground.friction.model_copy(update={"law": laws.best})
         ground = ground.model_copy(update={"friction": friction})
@@ -264,15 +264,15 @@ def _friction(
             part.write_text(text, encoding="utf-8")
     if found.mass is not None and outs.robot is not None:
         _write_mass(outs.robot, first.robot, found.mass, paths)
-    kept = found.world(ground).friction
+    kept, _ = resistance_of(found.world(ground))
     _tell_friction(found, laws, kept, logs, paths, outs, as_json=as_json)
 
 
 def _tell_friction(
-    found: "FrictionFit",
-    laws: LawFit,
-    kept: "FrictionConfig",
-    logs: "dict[Path, FrictionLog]",
+    found: FrictionFit,
+    laws: LawFit | None,
+    kept: Resistance,
+    logs: dict[Path, FrictionLog],
     paths: list[Path],
     outs: _Outs,
     *,
@@ -280,20 +280,19 @@ def _tell_friction(
 ) -> None:
     first = logs[paths[0]].goals
     out = outs.world
-    told = first.world.friction
+    told, names = resistance_of(first.world)
+    table_key = "ground" if laws is None else "friction"
     errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
-    settings = [
-        f"world.friction.{key}={getattr(kept, key):.4g}"
-        for key in ("along", "across", "back")
-        if key in found.found
-    ]
-    if laws.is_decided:
-        settings.append(f"world.friction.law={laws.best}")
+    settings = [f"world.{table_key}.{key}={getattr(kept, key):.4g}" for key in names]
+    law = laws.best if laws is not None and laws.is_decided else None
+    if law is not None:
+        settings.append(f"world.friction.law={law}")
     fitted = {str(path) for path in paths}
     if as_json:
         result: dict[str, object] = {
-            "law": laws.best if laws.is_decided else None,
-            "law_misfit": {law: round(value, 3) for law, value in laws.misfit.items()},
+            "law": law,
+            "law_misfit": {} if laws is None else {k: round(v, 3) for k, v in laws.misfit.items()},
+            "correlation": found.together,
             "friction": {key: one.value for key, one in found.found.items()},
             "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
             "not_told": [key for key, one in found.found.items() if not one.determined],
@@ -327,7 +326,15 @@ def _tell_friction(
             f"{math.degrees(after_rad):.1f} degrees with this"
             f"{'' if log_name in fitted else ' (not fitted)'}"
         )
-    console.print(laws.text(), soft_wrap=True)
+    for pair, correlation in found.together.items():
+        known = "ratio" if correlation > 0.0 else "product"
+        console.print(
+            f"{pair.replace('_', ' ')}: these logs hardly separate them (correlation "
+            f"{correlation:.2f}); their {known} is more accurate",
+            soft_wrap=True,
+        )
+    if laws is not None:
+        console.print(laws.text(), soft_wrap=True)
     console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
     if found.mass is not None:
         mass = found.mass.times(_spine_kg(first.robot))
@@ -338,11 +345,11 @@ def _tell_friction(
         )
 
 
-def _spine_kg(robot: "RobotConfig") -> float:
+def _spine_kg(robot: RobotConfig) -> float:
     return robot.mean_link_mass_kg * robot.link_count
 
 
-def _write_mass(out: Path, robot: "RobotConfig", mass: "Found", paths: list[Path]) -> None:
+def _write_mass(out: Path, robot: RobotConfig, mass: Found, paths: list[Path]) -> None:
 
     after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
     comment = (
@@ -440,7 +447,7 @@ def _servo(
         )
 
 
-def _reached_bounds(found: "ServoConstants") -> dict[str, tuple[float, str]]:
+def _reached_bounds(found: ServoConstants) -> dict[str, tuple[float, str]]:
     """Return the constants on an end of their range, and warn of each."""
     reached = ranges(found.actuator).bounds_reached(found.values)
     for name, (bound, which) in reached.items():
@@ -454,7 +461,7 @@ def _reached_bounds(found: "ServoConstants") -> dict[str, tuple[float, str]]:
     return reached
 
 
-def _constants_table(found: "ServoConstants", reached: dict[str, tuple[float, str]]) -> Table:
+def _constants_table(found: ServoConstants, reached: dict[str, tuple[float, str]]) -> Table:
     table = Table("constant", "value", "95 % interval", "", box=None)
     for constant, value, low, high in zip(
         CONSTANTS, found.values, found.low, found.high, strict=True
@@ -465,7 +472,7 @@ def _constants_table(found: "ServoConstants", reached: dict[str, tuple[float, st
     return table
 
 
-def _write_robot(file: _RobotFile, found: "ServoConstants", logs: list[Path]) -> "RobotConfig":
+def _write_robot(file: _RobotFile, found: ServoConstants, logs: list[Path]) -> RobotConfig:
 
     after = with_keys(robot_with(file.before, found), {"name": file.out.stem}, str(file.out))
     with atomic_write(file.out) as part:

@@ -25,7 +25,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.friction_law import LawName
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.world import FrictionConfig, WorldConfig
+from snakewalk.config.world import FrictionConfig, Water, WorldConfig
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.runlog.record import RunRecord
@@ -69,6 +69,32 @@ twice the value (ours)."""
 _NORMAL_95: Final = 1.96
 
 
+_MOST_STEPS = 12
+_CONVERGED: Final = 0.01
+"""Steps with friction alone when laws are compared, and the step that ends them: a law that is not
+fitted to the end seems to be wrong (ours)."""
+_TOGETHER_FROM: Final = 0.9
+"""Correlation of two errors from which they are reported (ours)."""
+Resistance = FrictionConfig | Water
+"""Part of a world that resists a body: the friction of a floor, or the water."""
+
+
+def resistance_of(world: WorldConfig) -> tuple[Resistance, tuple[str, ...]]:
+    """Return the friction or the water of a world, and the names of its constants to identify."""
+    water = world.ground
+    if isinstance(water, Water):
+        linear = ("linear_along_m_s", "linear_across_m_s")
+        some = [name for name in linear if getattr(water, name) > 0.0]
+        return water, ("drag_along", "drag_across", *some)
+    back = [] if world.friction.back is None else ["back"]
+    return world.friction, ("along", "across", *back)
+
+
+def with_resistance(world: WorldConfig, part: Resistance) -> WorldConfig:
+    """Return a world with another friction or water."""
+    return world.model_copy(update={"ground" if isinstance(part, Water) else "friction": part})
+
+
 @dataclass(frozen=True, slots=True)
 class FrictionLog:
     """Data of a log for the fit: goals, replies, and displacements of the body."""
@@ -102,10 +128,12 @@ class FrictionLog:
                 f"the pose of this run was estimated by {way}, which assumes the friction; use "
                 "a run with a pose measured by a camera, or a simulated run"
             )
-        goals, answered = goals_of(record, world)
+        goals, answered = goals_of(record, world, in_water=True)
         cycle = record.cycle
         stop = cycle.verdict.index("veto") if "veto" in cycle.verdict else None
-        time_s = cycle.time_s[:stop][-len(goals.since_start_s) :]
+        count = len(goals.since_start_s)
+        is_start = goals.world.ground.kind == "water"
+        time_s = cycle.time_s[:stop][slice(count) if is_start else slice(-count, None)]
         known = np.isfinite(pose.links_m).all(axis=(1, 2))
         pose_s = pose.time_s[known]
         if not ((pose_s < time_s[0] + WINDOW_S).any() and (pose_s > time_s[-1] - WINDOW_S).any()):
@@ -170,12 +198,11 @@ class FrictionLog:
         friction = self.goals.world.friction.model_copy(update={"law": law})
         return replace(self, goals=self.with_friction(friction))
 
-    def with_friction(self, friction: FrictionConfig) -> Goals:
-        """Return the same goals on ground of another friction."""
-        world = self.goals.world.model_copy(update={"friction": friction})
-        return replace(self.goals, world=world)
+    def with_friction(self, friction: Resistance) -> Goals:
+        """Return the same goals on ground of another friction, or in other water."""
+        return replace(self.goals, world=with_resistance(self.goals.world, friction))
 
-    def errors(self, friction: FrictionConfig) -> tuple[float, float]:
+    def errors(self, friction: Resistance) -> tuple[float, float]:
         """Root mean square error of displacement (m) and turn (rad) of a window with a friction."""
         again = FrictionLog.simulated(self.with_friction(friction), NO_DEVIATION)
         off = self.motion - again.motion
@@ -211,9 +238,11 @@ class Found:
 class FrictionFit:
     """Friction that makes the simulator move as the logs say."""
 
-    friction: FrictionConfig
+    friction: Resistance
     found: dict[str, Found]
-    """``along``, ``across``, perhaps ``back``, and the ratio of the first two."""
+    """Names of ``resistance_of``, and the ratio of the first two."""
+    together: dict[str, float]
+    """Correlation of pairs of errors that the logs hardly separate."""
     mass: Found | None = None
     """Mass of the spine's links over the robot's file; None if it was not estimated."""
 
@@ -221,8 +250,8 @@ class FrictionFit:
         """Return a world with this friction; undetermined values stay."""
         told = [name for name, one in self.found.items() if one.determined and name != RATIO]
         changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in told}
-        friction = world.friction.model_copy(update=changes)
-        return world.model_copy(update={"friction": friction})
+        part, _ = resistance_of(world)
+        return with_resistance(world, part.model_copy(update=changes))
 
     def comment(self, paths: Sequence[Path]) -> list[str]:
         """Lines for the head of a world's file."""
@@ -286,8 +315,7 @@ class _Fit:
         self._workers = workers
         self._on_progress = on_progress
         first = logs[0].goals
-        told = first.world.friction
-        frictions = ("along", "across") if told.back is None else ("along", "across", "back")
+        told, frictions = resistance_of(first.world)
         self._start = np.log([getattr(told, name) for name in frictions] + [1.0] * mass)
         self._names = (*frictions, *[MASS] * mass)
         constants = Constants(first.robot)
@@ -338,7 +366,7 @@ class _Fit:
         values = self._start.copy()
         others = np.zeros(len(self._steps))
         now = self._simulated(np.append(values, others))
-        for _ in range(_ALONE):
+        for _ in range(_MOST_STEPS):
             effects = self._columns(np.append(values, others), now, range(k), 1)
             self._set_noise(self._measured - now, effects)
             curvature, pull = self._normal(effects, self._measured - now)
@@ -346,6 +374,8 @@ class _Fit:
             step = np.linalg.solve(curvature, pull)
             values += step * min(1.0, _MOST / np.abs(step).max())
             now = self._simulated(np.append(values, others))
+            if np.abs(step).max() < _CONVERGED:
+                break
         square = (self._measured - now) ** 2
         misfit = 0.0
         for kind, (floor, per_sample) in enumerate(zip(_FLOORS, _PER_SAMPLE, strict=True)):
@@ -367,10 +397,15 @@ class _Fit:
             each[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
             each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
             mass = of(each[k - 1])
+        pairs = {}
+        for i, one in enumerate(found):
+            for j, other in enumerate(list(found)[:i]):
+                size = math.sqrt(covariance[i, i] * covariance[j, j])
+                pairs[f"{other}, {one}"] = float(covariance[i, j]) / size
         found[RATIO] = of(each[1] - each[0])
-        return FrictionFit(
-            _friction(self._names, values, self._logs[0].goals.world.friction), found, mass
-        )
+        told, _ = resistance_of(self._logs[0].goals.world)
+        together = {names: one for names, one in pairs.items() if abs(one) > _TOGETHER_FROM}
+        return FrictionFit(_friction(self._names, values, told), found, together, mass)
 
     def _simulated(self, values: Floats) -> Floats:
         out: Floats = _simulated(self._logs, self._names, values)[self._known]
@@ -411,7 +446,7 @@ class _Fit:
             self._noise[kind] = max(floor, float((rest[of] ** 2).sum()) / spare)
 
 
-def _friction(names: Sequence[str], logs: Floats, told: FrictionConfig) -> FrictionConfig:
+def _friction(names: Sequence[str], logs: Floats, told: Resistance) -> Resistance:
     values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # range that a world accepts
     found = dict(zip(names, map(float, values), strict=True))
     return told.model_copy(update={name: each for name, each in found.items() if name != MASS})
@@ -419,7 +454,7 @@ def _friction(names: Sequence[str], logs: Floats, told: FrictionConfig) -> Frict
 
 def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats) -> Floats:
     """Answer and motion (N,) of all logs, simulated with these values."""
-    friction = _friction(names, values, logs[0].goals.world.friction)
+    friction = _friction(names, values, resistance_of(logs[0].goals.world)[0])
     others = np.concatenate([np.zeros(2), values[len(names) :]])
     deviation = Constants(logs[0].goals.robot).deviation(others)
     goals = [log.with_friction(friction) for log in logs]

@@ -247,25 +247,36 @@ class Constants:
         return (float(values[0]),)
 
 
-def check_level(world: WorldConfig) -> None:
+def check_level(world: WorldConfig, *, in_water: bool = False) -> None:
     """Reject ground on which a shadow is meaningless.
+
+    Args:
+        world: the ground.
+        in_water: whether a pool is accepted, too.
 
     Raises:
         InputError: it is not a level, open floor.
 
     """
+    if in_water and world.ground.kind == "water":
+        return
     if world.ground.kind != "flat" or world.obstacle is not None:
         raise InputError(
             f"world {world.name}: a shadow needs a level floor without obstacles; use a flat world"
         )
 
 
-def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals, Floats]:
+def goals_of(
+    record: RunRecord, world: WorldConfig | None = None, *, in_water: bool = False
+) -> tuple[Goals, Floats]:
     """Return a shadow's input and the measurements (2, T, J) of a log, up to a veto.
+
+    In water they are those of the first seconds: the body begins at rest, as its shadow does.
 
     Args:
         record: the log.
         world: the chain's assumed ground; by default the log's.
+        in_water: whether a pool is accepted, too.
 
     Raises:
         InputError: the log is too short, or the ground is not level.
@@ -274,8 +285,10 @@ def goals_of(record: RunRecord, world: WorldConfig | None = None) -> tuple[Goals
     header = record.header
     cycle = record.cycle
     world = header.world if world is None else world
-    check_level(world)
-    count = next((k for k, verdict in enumerate(cycle.verdict) if verdict == "veto"), None)
+    check_level(world, in_water=in_water)
+    count = next((k for k, v in enumerate(cycle.verdict) if v == "veto"), len(cycle.verdict))
+    if world.ground.kind == "water":
+        count = min(count, round(MOST_S * header.run.cycle_hz))
     rows = (cycle.deadline_s, cycle.sent_rad, cycle.current_a, cycle.measured_rad)
     due_s, sent_rad, current_a, measured_rad = (each[:count] for each in rows)
     least = LEAST_S * header.run.cycle_hz

@@ -22,12 +22,15 @@ from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.studies.identification.friction_fit import (
     FrictionLog,
     fit_friction,
+    resistance_of,
     with_mass,
+    with_resistance,
 )
 from snakewalk.controller.studies.identification.law_fit import LawFit, fit_laws
 from tests.helpers.uneven import UNEVEN
 
 PLANTED = {"along": 0.16, "across": 0.45}
+DRAG = {"drag_along": 0.06, "drag_across": 1.4}
 
 
 @pytest.fixture(scope="module")
@@ -143,6 +146,50 @@ def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_pat
     assert "end its name with .toml" in refused(log, "-o", tmp_path / "a.json")
     assert "a pendulum has none" in refused(recording, "--world", "flat")
     assert "No such file" in refused(tmp_path / "none.mcap")
+
+
+@pytest.fixture(scope="module")
+def swimming(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Log of a short body that swims, in water that is not the shipped one."""
+    prepared = prepare_gait("anguilliform", robot="yaw16", seconds=5.0)
+    robot = RobotConfig(name="short", joint_axes="y" * 8, link_mass_kg=0.2)
+    run = prepared.run.model_copy(update={"physics_step_s": 0.005, "cycle_hz": 25.0})
+    water = prepared.world.ground.model_copy(update=DRAG)
+    world = prepared.world.model_copy(update={"ground": water})
+    folder = tmp_path_factory.mktemp("swim") / "planted"
+    short = replace(prepared, robot=robot, run=run, world=world)
+    return run_robot(RunRequest(short, folder, stoppable=False)).log
+
+
+def test_a_log_in_water_begins_at_its_start_and_tells_the_drag(swimming: Path) -> None:
+    log = FrictionLog.of(read_log(swimming), load_world("pool"))
+    part, names = resistance_of(log.goals.world)
+    assert (part.kind, names) == ("water", ("drag_along", "drag_across"))
+    linear = part.model_copy(update={"linear_along_m_s": 0.1})
+    world = with_resistance(log.goals.world, linear)
+    assert resistance_of(world)[1][2:] == ("linear_along_m_s",)
+    true = part.model_copy(update=DRAG)
+    again = FrictionLog.simulated(log.with_friction(true), NO_DEVIATION)
+    np.testing.assert_allclose(again.motion, log.motion, atol=2e-3)
+    assert log.errors(part)[0] > 5.0 * log.errors(true)[0]
+    with pytest.raises(InputError, match="needs a level floor"):
+        FrictionLog.of(read_log(swimming), load_world("shore"))
+
+
+@pytest.mark.nightly("a complete identification: 8 s of CPU")
+def test_planted_drag_comes_back_and_goes_into_a_world(swimming: Path, tmp_path: Path) -> None:
+    out = tmp_path / "pool2.toml"
+    words = ("robot", "identify", str(swimming), "--world", "pool", "--workers", "1")
+    done = CliRunner().invoke(app, [*words, "-o", str(out), "--json"], catch_exceptions=False)
+    told = json.loads(done.stdout)
+    for name, value in DRAG.items():
+        low, high = told["interval_95"][name]
+        assert low <= value <= high, (name, told)
+    assert told["law"] is None
+    assert told["settings"][0].startswith("world.ground.drag_along=")
+    water = load_world(str(out)).ground
+    assert water.kind == "water"
+    assert water.drag_along == pytest.approx(told["friction"]["drag_along"], rel=1e-3)
 
 
 @pytest.fixture(scope="module")
