@@ -15,7 +15,7 @@ _STILL = 0.02  # of the body's length: as much may it move between frames that a
 _USUAL = 5.0  # times the median motion between frames, likewise
 _GAP = 3  # missing frames after which the place says nothing
 _SHORTER = 0.7  # of its length, by which a polyline ends where labels of the ends are exchanged
-_UNSURE = 0.4  # share of exchanged frames above which the others are no clear majority
+_UNSURE = 0.4  # share of exchanged frames from which the majority is not clear
 
 
 def with_ends_in_place(points: Floats, number: Ints) -> tuple[Floats, tuple[str, ...]]:
@@ -29,6 +29,8 @@ def with_ends_in_place(points: Floats, number: Ints) -> tuple[Floats, tuple[str,
         The points, and a line on each kind of exchange that was found.
 
     """
+    if len(points) < 2 or points.shape[1] < 2:
+        return points, ()
     notes = []
     points = points.copy()
     labels = _exchanged_labels(points)
@@ -46,8 +48,8 @@ def with_ends_in_place(points: Floats, number: Ints) -> tuple[Floats, tuple[str,
         )
     if bodies.mean() > _UNSURE:
         notes.append(
-            f"which end is the head cannot be told: {bodies.mean():.0%} of the frames contradict "
-            "the others; correct the labels"
+            f"the head may be the other end: {bodies.mean():.0%} of the frames contradict the "
+            "others; correct the labels"
         )
     return points, tuple(notes)
 

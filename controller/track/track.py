@@ -8,7 +8,6 @@ import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_runs import (
     common_step,
     is_mostly_every_nth,
@@ -137,10 +136,6 @@ def track_from_points(
         time_s = number / rate_hz
         uneven = True
         rate_hz = 1.0 / float(np.median(np.diff(time_s[whole])))
-    exchanged: tuple[str, ...] = ()
-    if whole.any():
-        points = points.copy()
-        points[whole], exchanged = with_ends_in_place(points[whole], number[whole])
     absent = _absent(number, time_s if uneven else None, rate_hz)
     dropped = int(len(points) - whole.sum())
     if time_s is not None and uneven:
@@ -161,7 +156,6 @@ def track_from_points(
         dropped=dropped,
         absent=absent,
         every=every,
-        notes=exchanged,
         rate_assumed=rate_assumed,
         uneven=uneven,
         status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),

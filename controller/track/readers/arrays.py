@@ -154,12 +154,11 @@ def track_from_arrays(
             status=_status(held, len(points)),
         )
         sure = _scalar(file, "head_sure", held.get("head_sure", np.array(np.nan)))
-        stated = (str(line) for line in held.get("notes", np.array([])).reshape(-1))
         return replace(
             track,
             source=_text(held, "source", "not stated"),
             licence=_text(held, "licence", "not stated"),
-            notes=(*stated, *track.notes),
+            notes=tuple(str(line) for line in held.get("notes", np.array([])).reshape(-1)),
             places_recorded=_flag(held, "places_recorded", default=True),
             head_sure=sure if np.isfinite(sure) else None,
         )

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import Track, track_from_points
 
@@ -182,6 +183,10 @@ class Keypoints:
                 f"{', '.join(self.nodes)}; say --keypoints with those of the midline, head first"
             )
         bridged, which = bridge(places)
+        number = np.arange(len(places)) if self.frame is None else self.frame
+        whole = np.asarray(np.isfinite(bridged).all(axis=(1, 2)))
+        bridged = bridged.copy()
+        bridged[whole], exchanged = with_ends_in_place(bridged[whole], number[whole])
         status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
         track = track_from_points(
             self.file.stem,
@@ -192,7 +197,7 @@ class Keypoints:
             rate_assumed=self.rate_hz is None,
             status=status,
         )
-        return replace(track, notes=(*self.notes, *track.notes))
+        return replace(track, notes=(*self.notes, *exchanged))
 
 
 def zigzag(places: Floats) -> float:

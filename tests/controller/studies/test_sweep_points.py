@@ -47,7 +47,7 @@ def test_replaced_values_go_with_each_point_into_its_run() -> None:
     with pytest.raises(InputError, match="did you mean"):
         plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"wrld.friction.across": 1})
     with pytest.raises(InputError, match="--param"):
-        plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"run.gait.name": "rolling"})
+        plan_sweep(None, None, 1, seed=0, seconds=4.0, keys={"run.gait.parameters.waves": 1})
 
 
 def test_what_is_named_twice_is_drawn_once() -> None:
