@@ -302,7 +302,7 @@ KINDS = [
         "wire budget",
         "at most",
         "fail",
-        rate_hz=5000.0,
+        rate_hz=1000.0,
     ),
     Kind(
         "status return level 0",

@@ -124,7 +124,10 @@ ROWS = [
     ("plan flat-slalom --with repertoire --set run.seed=3", "does not use --motion"),
     ("play worm-like --set run.robot=yaw16", "run.robot: is given by --robot"),
     ("play worm-like --set world.friction.along=-1", "world flat: friction.along: "),
-    ("gait run rolling --set run.gait.by=cpg", "run.gait.by: is given by --param"),
+    (
+        "gait run rolling --set run.gait.parameters.waves=1",
+        "run.gait.parameters.waves: is given by --param",
+    ),
     ("gait run rolling --set robot.link_mas_kg=1", "did you mean link_mass_kg?"),
     ("trials run flat-slalom --seeds 1 --over run=3", "run: a key begins with run., robot."),
     ("trials run flat-slalom --seeds 1 --over run.seed=3 --over run.seed=4", "run.seed=V1,V2"),
