@@ -156,6 +156,7 @@ def test_help_of_every_command(results: dict[tuple[str, ...], Result]) -> None:
         assert "Usage: " in results[words].out
 
 
+@pytest.mark.nightly("runs loops in Python: 6 s of CPU")
 def test_servos_move_without_the_compiler_at_a_rate_that_it_sustains(tmp_path: Path) -> None:
     fast = (*GAIT[:3], "--out", "fast", "--set", "run.cycle_hz=100", *ON_SERVOS)
     scanned, examined, moved, rejected = call(

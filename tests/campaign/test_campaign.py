@@ -30,7 +30,7 @@ from tests.helpers.tiers import slow_after
 from tests.oracles.raw_positions import raw_positions
 
 
-@pytest.mark.slow_cases(8, "the campaign plays all kinds at night")
+@pytest.mark.slow_cases(3, "the campaign plays all kinds at night")
 @pytest.mark.parametrize("kind", slow_after(6, KINDS))
 def test_each_kind_of_fault(kind: str) -> None:
     whole, _ = campaign([((kind,), KINDS.index(kind))], cycles=80)

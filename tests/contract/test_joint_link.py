@@ -215,6 +215,7 @@ def tamper(lines: tuple[Line, ...], change: Callable[[bytes], list[bytes]] | Non
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_enable_moves_nothing(backend: Backend) -> None:
     found = backend.link.enable()
     later = backend.cycles(25)
@@ -225,6 +226,7 @@ def test_enable_moves_nothing(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_goals_are_followed(backend: Backend) -> None:
     start = backend.link.enable().position_rad
 
@@ -237,6 +239,7 @@ def test_goals_are_followed(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_state_is_whole_and_read_only(backend: Backend) -> None:
     state = backend.link.enable()
     joints = backend.link.joint_count
@@ -254,6 +257,7 @@ def test_state_is_whole_and_read_only(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
     first = backend.link.enable()
     second = backend.cycles(5)
@@ -265,6 +269,7 @@ def test_time_runs_on_and_fresh_values_have_no_age(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
     goal = backend.link.enable().position_rad.copy()
     goal[0] = np.nan
@@ -277,6 +282,7 @@ def test_a_goal_that_is_no_number_never_leaves(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_disable_may_come_at_any_time(backend: Backend) -> None:
     backend.link.disable()
     backend.link.enable()
@@ -287,6 +293,7 @@ def test_disable_may_come_at_any_time(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_enable_again_after_disable(backend: Backend) -> None:
     backend.link.enable()
     backend.cycles(5)
@@ -297,6 +304,7 @@ def test_enable_again_after_disable(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -316,6 +324,7 @@ def test_failed_reads_hold_values_and_age(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_a_bent_answer_is_never_taken_for_a_value(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -336,6 +345,7 @@ def test_a_servo_with_an_alarm_is_not_enabled(backend: Backend) -> None:
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -> None:
     lines = simulated(backend)
     backend.link.enable()
@@ -351,6 +361,7 @@ def test_the_servos_stop_by_themselves_when_the_host_is_gone(backend: Backend) -
 
 
 @pytest.mark.fast_cases(5)
+@pytest.mark.slow_cases(7, "24 links in all")
 def test_a_lost_port_is_an_error_that_says_so(backend: Backend) -> None:
     simulated(backend)
     backend.link.enable()

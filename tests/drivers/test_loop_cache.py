@@ -81,7 +81,7 @@ def test_without_any_folder_loops_are_compiled_at_each_start(folder: Path, case:
     assert "each start compiles them again; name a writable folder by NUMBA_CACHE_DIR" in told
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("three starts of an interpreter: 4 s of CPU")
 def test_stored_loops_serve_accounts_that_cannot_write_next_to_them(folder: Path) -> None:
     """Two accounts: with the folder for temporary files, and without any."""
     assert start(folder)[:2] == ["compiled", "4.0 6.0 1"]

@@ -185,7 +185,7 @@ def test_a_wheel_holds_every_file_and_one_top_level_name(source: Path, wheel: Pa
     assert {name for name in names if ".dist-info/" not in name} == shipped(source)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("builds the wheel twice: 7 s of CPU")
 def test_a_wheel_built_from_the_sdist_is_the_same(
     source: Path, wheel: Path, tmp_path: Path
 ) -> None:

@@ -188,6 +188,7 @@ def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) ->
     np.testing.assert_allclose(given.mean(axis=(0, 1)), copied.mean(axis=(0, 1)), atol=25.0)
 
 
+@pytest.mark.slow_cases(5, "19 cases of 0.2 s of CPU")
 @pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("words", "fault"),

@@ -234,6 +234,7 @@ def test_the_older_graph_of_states_keeps_the_snake_on_its_path() -> None:
     assert made.facts()["bend_k_rad"] > 0.3  # type: ignore[operator]
 
 
+@pytest.mark.slow_cases(1, "3 cases of 1.9 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("how", [["--motion", "walk"], ["--motion", "kp"], ["--animal", "lizard"]])
 def test_frames_beyond_the_path_end_at_the_edge_of_the_map(how: list[str], tmp_path: Path) -> None:
@@ -277,7 +278,7 @@ def test_a_motion_on_paper_is_refused_as_a_run() -> None:
     assert "kp is a motion on paper: snakewalk animal synthesise" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_an_animal_with_legs_is_led_over_the_hills(tmp_path: Path) -> None:
     out = tmp_path / "lizard"
     run = ["animal", "synthesise", "jacksboro-traverse", "--animal", "lizard", "-o", str(out)]
@@ -325,7 +326,7 @@ def test_an_animal_of_ones_own_is_filmed_and_written_as_gltf(tmp_path: Path) -> 
     assert out.with_suffix(".mp4").stat().st_size > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: Path) -> None:
     words = ["animal", "synthesise", "flat-square", "--frames", "40", "--json"]
     slip = {}

@@ -441,6 +441,7 @@ def doctor(line: TestLine, kind: Kind | None = None, robot: RobotConfig = ROBOT)
     )
 
 
+@pytest.mark.slow_cases(10, "40 cases of 0.0 s of CPU")
 @pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_the_doctor_names_what_is_broken(kind: Kind) -> None:

@@ -45,6 +45,7 @@ def doctor(line: FeetechLine) -> Sequence[Finding]:
 SLOW = pytest.mark.slow  # a scan of all rates needs 5 s
 
 
+@pytest.mark.slow_cases(1, "3 cases of 3.6 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "model", ["STS3215", pytest.param("SCS0009", marks=SLOW), pytest.param("HLS3606", marks=SLOW)]
@@ -112,7 +113,7 @@ def register(name: str, value: int) -> Callable[[FeetechLine], None]:
     return plant
 
 
-@pytest.mark.slow_cases(3, "a complete examination each: 1.4 s of CPU")
+@pytest.mark.slow_cases(1, "a complete examination each: 1.4 s of CPU")
 @pytest.mark.parametrize(
     ("plant", "check", "found"),
     slow_after(
@@ -201,7 +202,7 @@ def test_one_port_has_one_make() -> None:
         RobotConfig.model_validate({"name": "two", "joints": joints, "servo": servo})
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a complete examination: 2 s of CPU")
 def test_the_doctor_measures_the_supply_under_load() -> None:
     line = a_line()
     findings = examine(

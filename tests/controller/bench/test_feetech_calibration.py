@@ -85,7 +85,7 @@ def trio(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.slow_cases(1, "a complete calibration each: 10 to 30 s of CPU")
-@pytest.mark.slow
+@pytest.mark.nightly("a complete calibration: 8 s of CPU")
 @pytest.mark.parametrize("trio", ["HLS3606", "SCS0009", "STS3215"], indirect=True)
 def test_calibrate_finds_joints_signs_and_zeros(trio: Trio) -> None:
     result = trio.calibrate()

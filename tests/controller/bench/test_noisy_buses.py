@@ -106,6 +106,7 @@ def test_a_few_bytes_of_noise_are_a_warning() -> None:
     assert noise.remedy
 
 
+@pytest.mark.slow_cases(2, "5 cases of 0.4 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("of", ["answers", "both"])
 @pytest.mark.parametrize("kind", slow_after(2, ["corrupt", "truncate", "drop"]))

@@ -71,7 +71,7 @@ def test_scan_finds_the_servos_of_both_makes(service: TwoMakes) -> None:
     assert [each["model"][:3] for each in found] == 3 * ["XM4"] + 3 * ["STS"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a complete examination of two ports: 5 s of CPU")
 def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_path: Path) -> None:
     robot = service.robot(tmp_path)
     told = json.loads(service("doctor", "--robot", robot, "--wiggle", "--json").stdout)
@@ -93,6 +93,7 @@ def test_the_doctor_examines_each_port_by_its_own_make(service: TwoMakes, tmp_pa
         )
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.4 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize(("servo_id", "limit"), [(2, "PWM Limit(36)"), (5, "PWM Limit(16)")])
 def test_the_doctor_names_the_registers_of_the_port(

@@ -67,7 +67,7 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     assert float(str(stated)) == pytest.approx(float(str(found["head_sigma_median_m"])), rel=0.5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("draws and searches a picture in every cycle: 6 s of CPU")
 @pytest.mark.usefixtures("drawn")
 def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_path: Path) -> None:
     small = SMALL | {"centre_m": (-0.62, 0.0), "field_width_m": 1.4}

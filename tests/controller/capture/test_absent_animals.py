@@ -37,7 +37,7 @@ def visited(scene: SnakeScene, present: range) -> tuple[list[Image], Floats]:
 
 
 @pytest.mark.slow
-@pytest.mark.slow_cases(2, "a film each: 5 s of CPU")
+@pytest.mark.slow_cases(1, "a film each: 5 s of CPU")
 @pytest.mark.parametrize("kind", ["dark, rarely seen", *FILMS][:5])
 def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None:
     scene, present = FILMS[kind]
@@ -51,7 +51,7 @@ def test_an_animal_that_is_mostly_absent_is_found_where_it_is(kind: str) -> None
         assert point_error(line, truth[k]) < 2.0 * seen.expected_px[k]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 4 s of CPU")
 def test_compressed_frames_without_an_animal_show_nothing() -> None:
     scene, present = FILMS["dark"]
     frames, _ = visited(scene, present)

@@ -316,7 +316,7 @@ def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     assert load_track(str(again)).head_sure == load_track(str(cropped)).head_sure
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 3 s of CPU")
 def test_a_head_that_is_not_sure_is_a_warning(
     swim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

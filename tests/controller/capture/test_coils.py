@@ -94,7 +94,7 @@ def test_what_the_body_does_not_explain_is_told_apart(
     assert FrameStatus.COIL_UNLIKE in status
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_ends_that_changed_places_in_a_coil_are_put_right(
     images: list[Image], coils: list[int]
 ) -> None:

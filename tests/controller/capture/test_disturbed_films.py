@@ -49,7 +49,7 @@ def errors_px(scene: SnakeScene, seen: Capture) -> tuple[np.ndarray, np.ndarray]
     return np.array(off), seen.expected_px[used]
 
 
-@pytest.mark.slow_cases(2, "a film each: 2 s of CPU")
+@pytest.mark.slow_cases(1, "a film each: 2 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", slow_except(["small, stained"], FILMS))
 def test_the_whole_body_is_found_and_its_expected_error_holds(name: str) -> None:

@@ -182,7 +182,7 @@ def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
     assert goes_on_faintly(align_ends(found).skeletons, store) is expected
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 6 s of CPU")
 def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path: Path) -> None:
     scene = replace(SCENE, rows=220, columns=260)
     rng = np.random.default_rng(4)
@@ -206,6 +206,7 @@ CHANCE: dict[str, tuple[list[FrameStatus], int, bool]] = {
 }
 
 
+@pytest.mark.slow_cases(1, "3 cases of 1.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", CHANCE)
 def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_an_interrupted_capture_is_continued(
         capture_recording(replace(options, resume=True))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 3 s of CPU")
 @pytest.mark.usefixtures("short_parts")
 def test_parts_are_joined_with_the_head_first_in_all(frames: Path, tmp_path: Path) -> None:
     facts = capture_recording(options_of(frames, tmp_path))
@@ -140,7 +140,7 @@ def test_frames_of_finished_parts_do_not_stay_in_memory() -> None:
     assert len(parts.finished) >= 3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 3 s of CPU")
 def test_a_finished_part_leaves_no_points_in_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,7 +69,7 @@ def with_something(draw: object) -> tuple[list[np.ndarray], np.ndarray]:
     return frames, empty(SCENE)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_a_small_animal_that_touches_the_body_is_noticed() -> None:
     def beside(frame: np.ndarray, line: np.ndarray) -> None:
         ahead = line[50] - line[44]

@@ -30,6 +30,7 @@ def median_error(scene: SnakeScene, seen: Capture) -> float:
     return float(np.median([point_error(seen.points_px[k], truth[k]) for k in good]))
 
 
+@pytest.mark.slow_cases(1, "2 cases of 2.1 s of CPU")
 @pytest.mark.parametrize("length_px", slow_except([20.0], [20.0, 40.0, 100.0]))
 def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     scene = replace(CLEAN, length_px=length_px)
@@ -41,6 +42,7 @@ def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     assert seen.head_by == "travel"
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.8 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("length_px", slow_except([130.0], [50.0, 130.0]))
 def test_noise_blur_uneven_light_and_shadow_are_stood(length_px: float) -> None:
@@ -86,7 +88,7 @@ def test_the_head_stays_the_head_after_a_gap() -> None:
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_the_user_may_say_where_the_head_is() -> None:
     scene = replace(CLEAN, length_px=80.0)
     frames = list(film(scene))
@@ -97,7 +99,7 @@ def test_the_user_may_say_where_the_head_is() -> None:
     assert all(swapped(found, true) for found, true in zip(seen.points_px, truth, strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_a_body_cut_by_the_edge_is_told_not_guessed() -> None:
     scene = replace(CLEAN, length_px=100.0)
     # the window's edge runs through the circle on which the animal swims

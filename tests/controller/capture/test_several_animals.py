@@ -39,6 +39,7 @@ PAIR = CrossingScene(
 PLATE = CrossingScene(length_px=50.0, sizes=0.1, greys=10.0)
 
 
+@pytest.mark.slow_cases(1, "2 cases of 2.6 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [500, 503])
 def test_identities_are_kept_through_crossings(seed: int) -> None:
@@ -63,7 +64,7 @@ def test_animals_that_hardly_move_are_not_part_of_the_background() -> None:
     assert count.short <= 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_stains_do_not_replace_a_background_that_shows_the_animals() -> None:
     scene = replace(PLATE, animals=4, rows=300, columns=300, frames=90, seed=3102)
     images = list(crossing_film(scene, crossing_midlines(scene)))
@@ -206,7 +207,7 @@ def test_two_animals_in_a_film_of_one_are_rejected() -> None:
         capture(images, make_detector(images), 15.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 13 s of CPU")
 def test_a_film_that_is_mostly_lost_names_the_option_that_captures_it(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

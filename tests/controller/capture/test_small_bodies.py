@@ -45,6 +45,7 @@ def watch(scene: SnakeScene) -> tuple[Capture, np.ndarray]:
     return seen, errors
 
 
+@pytest.mark.slow_cases(1, "4 cases of 1.5 s of CPU")
 @pytest.mark.costs("a film of small bodies")
 @pytest.mark.parametrize(
     "change",

@@ -364,7 +364,7 @@ COSTS = {
 }
 
 
-@pytest.mark.slow_cases(120, "243 commands in all")
+@pytest.mark.slow_cases(40, "243 commands in all")
 @pytest.mark.fast_cases(30)
 @pytest.mark.parametrize(
     ("words", "said"),

@@ -24,6 +24,7 @@ def test_the_first_level_fits_a_screen() -> None:
     assert listed == [*VERBS, *(w for w in FAMILIES if " " not in w and w != "trials")]
 
 
+@pytest.mark.slow_cases(6, "27 cases of 0.2 s of CPU")
 @pytest.mark.fast_cases(9)
 @pytest.mark.parametrize("old", FORMER)
 def test_a_former_name_works_with_one_line(old: str) -> None:

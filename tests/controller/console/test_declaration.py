@@ -56,6 +56,7 @@ def plain(info: Any) -> dict[str, Any] | str:
     }
 
 
+@pytest.mark.slow_cases(12, "58 cases of 0.1 s of CPU")
 @pytest.mark.fast_cases(12)
 @pytest.mark.parametrize("listed", COMMANDS, ids=lambda each: each.name)
 def test_the_declaration_equals_that_of_the_function(listed: Any) -> None:

@@ -234,6 +234,7 @@ def arguments(command: str, out: Path) -> list[str]:
     }[command]
 
 
+@pytest.mark.slow_cases(4, "13 cases of 0.5 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.costs("starts commands on a full disk")
 @pytest.mark.parametrize(

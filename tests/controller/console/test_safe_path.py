@@ -35,11 +35,11 @@ GAIT = "lateral-undulation"
 SHORT = ("--seconds", "5", "--seeds", "1", "--workers", "1")
 PAGE = ("--view", "--view-at", "127.0.0.1:0")
 SLOW = pytest.mark.slow
-NIGHTLY = pytest.mark.nightly("trials in processes that all import planted files: 65 s of CPU")
+NIGHTLY = pytest.mark.nightly("runs in processes that all import planted files: 75 s of CPU")
 COMMANDS = [
     pytest.param(("robot", "import", "model.xml", "-o", "robot.toml"), id="import"),
     pytest.param(
-        ("gait", "run", GAIT, "--seconds", "0.1", "--no-film", *PAGE), id="page", marks=SLOW
+        ("gait", "run", GAIT, "--seconds", "0.1", "--no-film", *PAGE), id="page", marks=NIGHTLY
     ),
     pytest.param(("trials", "run", GAIT, *SHORT), id="trials", marks=SLOW),
     pytest.param(

@@ -58,6 +58,7 @@ def test_opposite_hands_are_mirror_images_and_backward_is_reversed(gait: Gait) -
     np.testing.assert_allclose(back, gait.joints_rad(ROBOT, -PHASES), atol=1e-12)
 
 
+@pytest.mark.slow_cases(1, "3 cases of 0.8 s of CPU")
 @pytest.mark.costs("simulates a climb")
 @pytest.mark.parametrize(
     ("gait", "world", "sign"),
@@ -85,7 +86,7 @@ def test_it_climbs_as_far_a_cycle_as_a_rolling_body_does(
     assert run.plant.contact_count >= 3
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further climb: 2 s of CPU")
 def test_short_links_climb_a_pole_as_rolling_without_slip_does() -> None:
     gait = HelixPole()
     climb = follow(gait, "alternating32", "pole", 8.0, hold_s=1.0).way_m(1)[2]

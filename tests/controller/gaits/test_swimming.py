@@ -80,6 +80,7 @@ def test_printed_standing_wave_is_its_own_reverse_and_has_no_thrust_direction(mo
     assert min(apart) > 0.1 * np.abs(forth).max()
 
 
+@pytest.mark.slow_cases(1, "3 cases of 0.9 s of CPU")
 @pytest.mark.costs("simulates a swimmer")
 @pytest.mark.parametrize("mode", slow_after(1, MODES))
 def test_every_mode_swims_forward_as_the_planar_model_says(mode: str) -> None:

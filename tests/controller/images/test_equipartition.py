@@ -183,6 +183,7 @@ def test_the_path_of_the_proof_ends_at_an_equipartition(seed: int, n: int) -> No
     assert (np.diff(places) > 0.0).all()
 
 
+@pytest.mark.slow_cases(1, "4 cases of 0.5 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("n", [4, 5, 6, 7, 8])
 def test_few_chords_divide_every_smooth_body(n: int) -> None:

@@ -110,6 +110,7 @@ def test_a_world_without_a_law_is_reported_as_the_assumed_ellipse(record: RunRec
     assert friction.law_text == "ellipse (assumed)"
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.5 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("words", "code", "source"),

@@ -42,15 +42,16 @@ DEAD_RECKONED = {
     ("changes", "sentence"),
     [
         ({}, "2 of 2 waypoints, 1.2 cm from its path, 12.3 s"),
-        ({"waypoints": 1, "waypoints_reached": 1, "path_error_mean_m": None},
-         "1 of 1 waypoint, 12.3 s"),
+        (
+            {"waypoints": 1, "waypoints_reached": 1, "path_error_mean_m": None},
+            "1 of 1 waypoint, 12.3 s",
+        ),
         ({"waypoints": 0}, "moved 1.50 m, 12.3 s"),
         ({"waypoints": 0, "travelled_m": None, "duration_s": None}, ""),
         (DEAD_RECKONED, "2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by dead reckoning"),
         (DEAD_RECKONED | {"waypoints": 0}, "moved 2.50 m, 12.3 s, by dead reckoning"),
         ({"waypoints": 0, "trip": "heat"}, "stopped by safety, moved 1.50 m, 12.3 s"),
-        ({"waypoints": 0, "outcome": "interrupted by Ctrl-C"},
-         "interrupted, moved 1.50 m, 12.3 s"),
+        ({"waypoints": 0, "outcome": "interrupted by Ctrl-C"}, "interrupted, moved 1.50 m, 12.3 s"),
     ],
 )
 def test_the_sentence(record: RunRecord, changes: dict[str, Any], sentence: str) -> None:

@@ -112,6 +112,7 @@ def slope(degrees: float) -> HeightField:
     return HeightField(np.tile(np.tan(np.radians(degrees)) * x_m, (81, 1)), 0.1, -4.0, -4.0)
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize(("along", "across"), [(0.1, 0.7), (0.06, 0.3)])
 def test_a_slope_shows_both_frictions(along: float, across: float) -> None:

@@ -104,6 +104,7 @@ def test_markers_that_swap_after_a_slide_change_nothing() -> None:
     slide.assert_found(scene)
 
 
+@pytest.mark.slow_cases(1, "3 cases of 0.9 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("gap_s", slow_after(1, [0.0, 0.3, 2.0]))
 def test_markers_that_swap_for_ever_are_never_believed(gap_s: float) -> None:
@@ -124,6 +125,7 @@ def mirrored_place(time_s: float, sample: PoseSample) -> list[ArrivedPose | Pose
     return [moved(sample, MIRROR @ sample.position_m - sample.position_m)]
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("rest_s", [np.inf, 4.5])
 def test_a_mirrored_feed_is_never_believed(rest_s: float) -> None:

@@ -32,6 +32,7 @@ WANTED = ScheduleConfig(
 )
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.3 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1.4])
 def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(

@@ -384,7 +384,7 @@ def test_what_the_middleware_says_is_told_in_a_line() -> None:
     assert "\n" not in said["fault"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("starts the node: 5 s of CPU")
 def test_no_message_ends_the_run_or_silences_the_stop_service(
     graph: Graph, client: Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -112,6 +112,7 @@ def command(
     return said
 
 
+@pytest.mark.slow_cases(8, "23 cases of 0.3 s of CPU")
 @pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("evidence", EVIDENCE, ids=lambda evidence: evidence.source)
 def test_a_command_states_the_evidence_of_its_numbers(command: Run, evidence: PoseEvidence) -> None:

@@ -71,7 +71,7 @@ def test_the_same_run_finds_the_same(slalom: tuple[RunRecord, RunSummary], tmp_p
     np.testing.assert_array_equal(one.cycle.sent_rad, two.cycle.sent_rad)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further walk: 2 s of CPU")
 def test_a_pose_by_the_joints_tells_nothing_of_friction(tmp_path: Path) -> None:
     """It takes the friction as known."""
     _, summary = walked(tmp_path / "run", "flat-slalom", pose="joints")

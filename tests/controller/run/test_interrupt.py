@@ -157,6 +157,7 @@ PHASES = {
 """What a signal interrupts: the function called then, the state of torque, the name of the log."""
 
 
+@pytest.mark.slow_cases(8, "23 cases of 0.6 s of CPU")
 @pytest.mark.fast_cases(16)
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("phase", PHASES)

@@ -107,6 +107,7 @@ def serve(line: socket.socket) -> None:
         return
 
 
+@pytest.mark.slow_cases(1, "2 cases of 2.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", slow_after(1, ["SIGKILL", "SIGSTOP"]))
 def test_a_process_that_is_killed_or_stopped_is_lost(name: str) -> None:

@@ -43,6 +43,7 @@ def test_a_plan_as_json() -> None:
     assert found["friction_law"] == "ellipse"
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize(("program", "warnings"), [("/nosuch/relay", 1), (sys.executable, 0)])
 def test_a_stop_output_that_cannot_be_started_is_a_warning(program: str, warnings: int) -> None:
@@ -67,7 +68,7 @@ def test_a_plan_tells_the_slopes_under_the_body_and_warns() -> None:
     assert climb == "the path climbs 15.0 deg; the world's climb limit is 11.5 deg"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further walk: 4 s of CPU")
 def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> None:
     keys = {"world.ground.slope_deg": 18.0, "world.planner.variance_limit_m2": 0.01}
     words = [word for key, value in keys.items() for word in ("--set", f"{key}={value}")]

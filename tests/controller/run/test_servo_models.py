@@ -66,7 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.slow_cases(3, "every command for each model")
+@pytest.mark.slow_cases(1, "every command for each model")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("robot", ["xl330.toml", "xl430.toml"])
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def robot_file(tmp_path: Path) -> Path:
     return file
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further run on two ports: 2 s of CPU")
 def test_a_gait_moves_the_whole_simulated_body(robot_file: Path, tmp_path: Path) -> None:
     gait = prepare_gait("lateral-undulation", robot=str(robot_file), seconds=3.0)
     finished = run_robot(RunRequest(gait, tmp_path / "run", stoppable=False))
@@ -123,6 +123,7 @@ def test_a_gait_runs_on_both_ports(ports: Ports, robot_file: Path, tmp_path: Pat
         assert not line.firmware.drive.torque_on.any()
 
 
+@pytest.mark.slow_cases(1, "2 cases of 5.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("silent", slow_except([7], [2, 7]))
 def test_a_servo_that_dies_stops_the_run_on_both_ports(

@@ -50,7 +50,7 @@ def test_four_gaps_do_not_change_the_wave(gap: int, rate_hz: float, noise: float
     assert track.absent == 4 * gap
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_four_gaps_hardly_change_the_other_figures() -> None:
     gap = 50
     track = cut(four_gaps(gap), 25.0, 0.002)

@@ -272,7 +272,7 @@ def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
     assert found.travel is None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("pictures of several tables: 5 s of CPU")
 def test_the_command_takes_names_and_files_and_draws(tmp_path: Path) -> None:
     save_track(tmp_path / "mine.npz", wave_track(0.8))
     words = [

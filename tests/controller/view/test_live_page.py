@@ -569,7 +569,7 @@ def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path
     assert said[:2] == ["let go: it stands in its shape", "held: it moves"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a browser and a run in real time, which a busy computer delays")
 @IN_A_BROWSER
 def test_in_a_browser_a_click_on_the_ground_is_where_the_body_goes(
     tmp_path: Path,

@@ -144,7 +144,7 @@ def test_e_stop_is_in_sight_at_every_width_and_needs_one_tap(page: Page, chromiu
     context.close()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a browser in real time, which a busy computer delays")
 @IN_A_BROWSER
 def test_a_slider_that_was_set_while_the_connection_stalled_moves_nothing(
     page: Page, chromium: Any

@@ -108,6 +108,7 @@ def test_the_block_has_its_own_length_again_after_clean_reads(servos: Servos) ->
     assert servos.lengths[-1] == 10
 
 
+@pytest.mark.slow_cases(2, "7 cases of 0.5 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("is_fast", [False, True])
 @pytest.mark.parametrize("period_s", [0.0, 0.005, 0.02, 0.03])

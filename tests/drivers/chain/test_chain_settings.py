@@ -260,6 +260,7 @@ def test_a_setting_of_the_eeprom_that_changes_in_motion_stops_the_run(
     assert said in str(rig.link.tripped)
 
 
+@pytest.mark.slow_cases(3, "11 cases of 0.2 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("register", "value", "said"), FINGERPRINT_CHANGES)
 def test_a_setting_of_the_eeprom_that_changes_in_a_pause_is_not_gone_on_with(

@@ -73,6 +73,7 @@ def test_a_servo_that_ignores_sync_writes_is_named() -> None:
     assert rig.line.clock.now_s() < 0.5 + (OWN_READS + 1) * 1.3 * PERIOD_S
 
 
+@pytest.mark.slow_cases(2, "5 cases of 1.0 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("kind", ["drop", "corrupt", "truncate", "delay", "late", "duplicate"])
 def test_a_bad_line_gives_no_alarm(kind: str) -> None:

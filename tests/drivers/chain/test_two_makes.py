@@ -144,6 +144,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow_cases(3, "11 cases of 0.4 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("port", [0, 1])
 @pytest.mark.parametrize("fault", FAULTS)

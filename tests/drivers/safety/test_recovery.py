@@ -255,6 +255,7 @@ def test_without_an_operator_confirm_means_no() -> None:
     assert rig.torque() == [0] * 4
 
 
+@pytest.mark.slow_cases(2, "7 cases of 0.3 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("change", "said"),

@@ -175,6 +175,7 @@ NOISE = {
 }
 
 
+@pytest.mark.slow_cases(2, "5 cases of 0.5 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("kind", "seed"), slow_after(2, [(kind, seed) for seed, kind in enumerate(NOISE)])

@@ -97,6 +97,7 @@ def test_without_torque_motion_dies_and_never_grows(belly: BellyConfig) -> None:
     assert all(after <= before + 1e-9 for before, after in pairwise(kinetic))
 
 
+@pytest.mark.slow_cases(1, "3 cases of 0.9 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("belly", BELLIES, ids=NAMES)
 def test_compiled_and_numpy_steps_agree_on_hills(belly: BellyConfig) -> None:

@@ -70,7 +70,7 @@ def assert_as_mujoco(m: Mechanics, qpos: Floats) -> None:
     np.testing.assert_array_equal(found.frame[:, :3], expected.frame[:, :3])
 
 
-@pytest.mark.slow_cases(4, "a moving body each: 1 s of CPU")
+@pytest.mark.slow_cases(1, "a moving body each: 1 s of CPU")
 @pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("ground", GROUNDS.values(), ids=GROUNDS)
 @pytest.mark.parametrize("robot", BODIES.values(), ids=BODIES)

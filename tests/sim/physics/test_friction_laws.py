@@ -79,7 +79,7 @@ def test_speed_under_scales_is_that_of_the_publication() -> None:
     assert made[0] == pytest.approx(expected[0], rel=0.01)
 
 
-@pytest.mark.slow_cases(3, "three seconds of a planar model each: 2 s of CPU")
+@pytest.mark.slow_cases(1, "three seconds of a planar model each: 2 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["scales", "wheels", "ellipse"])
 @pytest.mark.parametrize("mu", MU)

@@ -128,6 +128,7 @@ ROBOT_SHARES = np.array(
 ROBOT_SHARES = ROBOT_SHARES / ROBOT_SHARES.sum()
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.0 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("world", ["isotropic", "pool"])
 def test_compiled_and_numpy_steps_agree_with_legs(world: str) -> None:

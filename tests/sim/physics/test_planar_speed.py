@@ -76,6 +76,7 @@ def test_speed_is_that_of_the_independent_model(mu: tuple[float, float], step_s:
     assert np.hypot(*(made - way)) < 0.02 * np.hypot(*way) + 0.003
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.4 s of CPU")
 @pytest.mark.slow
 @pytest.mark.costs("compares with an independent model over whole cycles")
 @pytest.mark.parametrize("mu", [(0.11, 0.2, 0.14), (0.4, 0.4, 0.8)])

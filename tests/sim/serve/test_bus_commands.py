@@ -58,6 +58,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
     assert lines[1]["values"]["model"] == "XL330-M288"
 
 
+@pytest.mark.slow_cases(2, "7 cases of 0.4 s of CPU")
 @pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("words", "said"),

@@ -66,6 +66,7 @@ def test_spine_angles_of_a_rendered_film_are_found() -> None:
     assert np.median(errors.skeleton) < 0.035
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.2 s of CPU")
 @pytest.mark.slow
 @pytest.mark.parametrize("fins", [0.0, 0.12])
 def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
@@ -79,7 +80,7 @@ def test_pectoral_fins_are_found_and_do_not_widen_the_body(fins: float) -> None:
     assert np.abs(px).max() < 0.8
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a further film: 2 s of CPU")
 def test_a_side_view_gives_height_and_pitch() -> None:
     frames = range(20, 80, 20)
     top, model, base = film(TRUTH, frames, 80.0)

@@ -311,13 +311,15 @@ def test_a_run_logs_the_mapping(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path) -> None:
+@pytest.mark.slow_cases(1, "32 damaged files each: 4 s of CPU")
+@pytest.mark.parametrize("seed", range(3))
+def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path, seed: int) -> None:
     table(tmp_path / "a.csv", ["time", *(f"{name}_rad" for name in NAMES)])
     bag(tmp_path / "b.mcap")
     dataset(tmp_path / "set", "v3.0")
     parquet = tmp_path / "set" / "data" / "chunk-000" / "file-000.parquet"
     info = tmp_path / "set" / "meta" / "info.json"
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     answers = {"episode": 0, "unit": "rad"}
     for file, given in (
         (tmp_path / "a.csv", {}),
@@ -327,7 +329,7 @@ def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path) -> None:
     ):
         whole = file.read_bytes()
         played = str(tmp_path / "set") if given else str(file)
-        for _ in range(25):
+        for _ in range(8):
             data = bytearray(whole)
             for at in rng.integers(0, len(data), 3):
                 data[at] = rng.integers(0, 256)

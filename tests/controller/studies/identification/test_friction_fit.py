@@ -47,7 +47,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_robot(RunRequest(short, folder, stoppable=False)).log
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a complete identification: 5 s of CPU")
 def test_a_planted_law_is_found(log: Path) -> None:
     """The same goals on ground with the law of scales, which moves the body far less."""
     given = FrictionLog.of(read_log(log), load_world("flat"))

@@ -121,6 +121,7 @@ def test_a_free_pendulum_swings_at_its_frequency(logs: list[PendulumLog]) -> Non
     np.testing.assert_allclose(out, angle[:50], rtol=1e-12)
 
 
+@pytest.mark.slow_cases(1, "2 cases of 1.2 s of CPU")
 @pytest.mark.costs("fits eight constants")
 @pytest.mark.parametrize(
     ("seed", "limit_a"), slow_except([(1, np.inf)], [(0, np.inf), (1, np.inf), (2, 1.2)])

@@ -33,7 +33,7 @@ def short_run(seconds: float) -> Any:
     return replace(prepared, robot=robot, run=run)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly("a long run with its shadow: 5 s of CPU")
 def test_a_run_says_what_differs_while_it_lasts_and_why_at_its_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
