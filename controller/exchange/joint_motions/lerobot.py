@@ -107,7 +107,7 @@ def _rows(path: Path, feature: str, episode: int) -> tuple[Floats, Floats]:
             )
             times += table["timestamp"].to_pylist()
             rows += table[feature].to_pylist()
-        except (arrow_fault, KeyError, OSError) as error:
+        except (arrow_fault, KeyError, OSError, UnicodeError) as error:
             raise InputError(
                 f"{file}: is not a Parquet file of LeRobot: {first_line(error)}"
             ) from None
