@@ -94,7 +94,7 @@ class MotionCheck:
             return None
         same = np.vdot(way, seen)
         mirrored = np.vdot(way.conj(), seen)
-        size = float(np.sqrt(np.vdot(way, way).real * np.vdot(seen, seen).real)) or 1.0
+        size = float(np.sqrt(np.vdot(way, way).real * np.vdot(seen, seen).real))
         scale = float(np.sqrt(np.vdot(seen, seen).real / np.vdot(way, way).real))
         if scale > SCALE and abs(same) > SHARE * size:
             return f"wrong unit: the head moves {scale:.0f} times as far as expected; send metres"

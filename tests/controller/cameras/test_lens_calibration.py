@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.cameras.calibration_board import BoardPattern, CalibrationBoard
+from snakewalk.controller.cameras.calibration_board import BoardPattern, BoardView, CalibrationBoard
 from snakewalk.controller.cameras.lens import Lens
 from snakewalk.controller.cameras.lens_calibration import LensCalibration, calibrate_lens
 from tests.oracles.board_view import board_picture, board_pictures, lens_rays
@@ -149,3 +149,22 @@ def test_the_printed_board_has_its_size() -> None:
         np.array(picture.shape[::-1]) / 300.0 * 0.0254, BOARD.size_m, rtol=2e-3
     )
     assert BOARD.find(cv2.copyMakeBorder(picture, 40, 40, 40, 40, 0, value=255)) is not None
+
+
+def test_coverage_and_tilt_are_those_of_the_views() -> None:
+    """Corners by projection, without pictures: the part of the picture, and the largest angle."""
+    x, y = np.meshgrid(np.arange(7) * 0.02 - 0.06, np.arange(5) * 0.02 - 0.04)
+    corners_m = np.column_stack([x.ravel(), y.ravel()])
+    solid = np.column_stack([corners_m, np.zeros(len(corners_m))])
+    views = []
+    for tilt_deg, about in ((0.0, 0), (20.0, 0), (35.0, 1), (15.0, 1), (25.0, 0), (10.0, 1)):
+        turn = np.zeros(3)
+        turn[about] = np.radians(tilt_deg)
+        place = np.array([0.01 * len(views) - 0.03, 0.0, 0.4])
+        seen, _ = cv2.projectPoints(solid, turn, place, MATRIX, LENS.distortion)
+        views.append(BoardView(seen.reshape(-1, 2), corners_m))
+    found = calibrate_lens(views, LENS.size_px)
+    cells = {(int(6 * u / 640.0), int(6 * v / 480.0)) for view in views for u, v in view.corners_px}
+    assert found.coverage == pytest.approx(len(cells) / 36.0)
+    assert found.tilt_deg == pytest.approx(35.0, abs=0.5)
+    assert found.rms_px < 0.01

@@ -57,3 +57,29 @@ def test_loops_draw_the_same_as_python() -> None:
     np.testing.assert_allclose(compiled[0], python[0], rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(compiled[1], python[1], rtol=1e-12, atol=1e-14)
     assert python[0].max() > 0.01
+
+
+def test_spots_beyond_each_edge_draw_the_part_that_is_inside() -> None:
+    """Each picture is the cut of that of the same spots in a larger one."""
+    rng = np.random.default_rng(1)
+    area, slopes = np.linspace(0.5, 2.0, 6), rng.normal(size=(3, 4, 6))
+    places = np.array([[-2.0, 15.0, 4.0, 9.0, -3.0, 16.0], [5.0, 4.0, -2.0, 12.0, -2.0, 12.5]])
+    cuts = []
+    for margin in (0, 20):
+        shape = 11 + 2 * margin, 14 + 2 * margin
+        cover, by = np.zeros(shape), np.zeros((5, *shape))
+        thin_body_fit.draw_spots.py_func(*(places + margin), area, *slopes, 1.7, cover, by)
+        inside = slice(margin, shape[0] - margin), slice(margin, shape[1] - margin)
+        cuts.append((cover[inside], by[:, *inside]))
+    np.testing.assert_allclose(cuts[0][0], cuts[1][0], atol=1e-15)
+    np.testing.assert_allclose(cuts[0][1], cuts[1][1], atol=1e-14)
+    assert cuts[0][0].max() > 0.01
+
+
+@pytest.mark.parametrize("reach", [0.5, 2.2])
+def test_a_fit_that_leaves_its_guess_is_none(reach: float) -> None:
+    """A guess half as long as the body, or more than twice as long, is of something else."""
+    shown, _ = thin_body_fit._picture(values(), SHAPE)
+    true = np.stack([thin_body_fit._FINE @ v for v in np.split(values()[:18], 2)], axis=1)
+    middle = true.mean(axis=0)
+    assert fitted(middle + reach * (true[::8] - middle), shown.astype(np.float32), 4.0) is None

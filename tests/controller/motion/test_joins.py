@@ -335,3 +335,36 @@ def test_a_recording_faster_than_the_robot_is_slowed_and_a_bad_one_refused() -> 
         InputError, match=r"joint \w+ \(ID \d+\) bends to .* in frame \d+; its limit"
     ):
         Recorded(robot, time_s, 5.0 * joints)
+
+
+@pytest.mark.parametrize(("axis", "needs"), [("y", (True, False)), ("p", (False, True))])
+def test_a_recording_needs_the_joints_that_it_moves(axis: str, needs: tuple[bool, bool]) -> None:
+    robot = ROBOTS["alternating16"]
+    time_s = np.arange(0.0, 4.0, 0.1)
+    joints = np.zeros((len(time_s), robot.joint_count))
+    joints[:, robot.yaw_joints if axis == "y" else robot.pitch_joints] = (
+        0.1 * np.sin(time_s)[:, None]
+    )
+    recording = Recorded(robot, time_s, joints)
+    assert (recording.needs.yaw, recording.needs.pitch) == needs
+
+
+@pytest.mark.parametrize("seconds", [0.4, 1.0, 3.0])
+def test_a_fast_recording_has_longer_ramps_before_it_is_slowed_further(seconds: float) -> None:
+    """The ramps take at most the recording's own time, and joints accelerate within the limit."""
+    robot = ROBOTS["yaw16"]
+    time_s = np.linspace(0.0, seconds, 40)
+    joints = np.outer(0.6 * time_s / seconds, np.ones(robot.joint_count))
+    recording = Recorded(robot, time_s, joints)
+    ramp_s = recording.duration_s - seconds * recording.slowed
+    assert 0.0 < ramp_s <= seconds * recording.slowed + 1e-9
+    most = recording.pace().acceleration_rad_s2.max()
+    assert most <= 0.9 * robot.joint_acceleration_limit_rad_s2 * (1.0 + 1e-6)
+    speed = 0.6 / (seconds * recording.slowed)
+    assert recording.pace().speed_rad_s == pytest.approx(speed, rel=1e-6)
+    # a quintic ramp to a speed accelerates by 15/8 of speed over time
+    assert most == pytest.approx(1.875 * speed / ramp_s, rel=0.02)
+    is_slowed_for_the_ramp = recording.slowed > max(
+        1.0, 0.6 / seconds / (0.9 * robot.joint_speed_limit_rad_s) + 1e-9
+    )
+    assert not is_slowed_for_the_ramp or ramp_s == pytest.approx(seconds * recording.slowed)

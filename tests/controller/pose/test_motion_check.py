@@ -22,6 +22,7 @@ def checked(
     frame_deg: float = 0.0,
     mirror: float = 1.0,
     turn_rad: float = 0.3,
+    sideways: float = 0.0,
     still: bool = False,
     steps: int = LEAST + 2,
 ) -> MotionCheck:
@@ -33,6 +34,7 @@ def checked(
         frame_deg: angle by which the source's positions alone are turned.
         mirror: -1 for a source whose y axis points to the right.
         turn_rad: each step turns by it, to the left and to the right in turn.
+        sideways: share of each step by which the source moves to a side, left and right in turn.
         still: the joints report no motion.
         steps: number of measurements after the first.
 
@@ -40,14 +42,18 @@ def checked(
     check = MotionCheck()
     place = np.array([1.0, 2.0, 0.2])
     frame, positions = turned(np.radians(source_deg)), turned(np.radians(frame_deg))
+    aside = np.zeros(2)
     for k in range(steps + 1):
-        position = scale * positions @ frame @ [place[0], mirror * place[1], 0.0]
+        x, y = place[:2] + aside
+        position = scale * positions @ frame @ [x, mirror * y, 0.0]
         heading = np.radians(source_deg) + mirror * place[2]
         measured = HeadMeasurement(position, turned(heading), NONE, NONE)
         known = np.array([1.0, 2.0, 0.2]) if still else place.copy()
         check.add(measured, Moment(0.5 * k, known, np.zeros(1)))
         place[2] += turn_rad * (-1.0) ** k
-        place[:2] += 0.05 * np.array([np.cos(place[2]), np.sin(place[2])])
+        step = 0.05 * np.array([np.cos(place[2]), np.sin(place[2])])
+        place[:2] += step
+        aside += sideways * (-1.0) ** k * np.array([-step[1], step[0]])
     return check
 
 
@@ -75,6 +81,15 @@ def test_twenty_times_the_way_is_another_unit(scale: float, agrees: bool) -> Non
     else:
         assert check.fault is not None
         assert check.fault.startswith("wrong unit: the head moves 21 times as far")
+
+
+@pytest.mark.parametrize(("scale", "agrees"), [(1.0, True), (12.0, True), (25.0, False)])
+def test_a_source_of_doubtful_directions_agrees_only_in_its_unit(
+    scale: float, agrees: bool
+) -> None:
+    check = checked(scale=scale, sideways=1.0)
+    assert check.fault is None
+    assert check.has_agreed == agrees
 
 
 def test_mirrored_axes_turn_the_other_way() -> None:

@@ -95,3 +95,13 @@ def test_long_names_are_told_apart_at_80_columns(
     table = CliRunner().invoke(app, ["log", "compare", *logs]).stdout
     assert all(table.count(f"seed{seed}") == 2 for seed in range(3))
     assert "\N{HORIZONTAL ELLIPSIS}" not in table
+
+
+def test_the_largest_current_is_that_of_any_joint_and_unknown_without_a_reading(
+    record: RunRecord,
+) -> None:
+    current_a = np.full_like(record.cycle.current_a, np.nan)
+    current_a[1, 2], current_a[1, 3], current_a[2, 0] = 0.3, -0.7, 0.0
+    run = compared_run(replace(record, cycle=replace(record.cycle, current_a=current_a)), "a")
+    assert run.current_a[:3] == pytest.approx([np.nan, 0.7, 0.0], nan_ok=True)
+    assert np.isnan(run.current_a[3:]).all()

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
 from snakewalk.drivers.protocol.parser import PacketParser
 from snakewalk.sim.line.clock import SimClock
@@ -228,3 +229,30 @@ def test_draining_a_line_that_never_falls_quiet_ends() -> None:
         line._rx_queue.add(line.clock.now_s() + 0.003 * k, b"\x55")
     assert 0 < line.drain_until_quiet(0.004) < 100
     assert line.clock.now_s() < 0.2
+
+
+def test_the_next_event_is_the_first_of_an_arrival_and_an_end_of_a_packet() -> None:
+    line = a_line(1)
+    assert line.next_event_s() is None
+    start_s = line.clock.now_s()
+    ping = encode_instruction(InstructionPacket(1, Instruction.PING))
+    line.write(ping)
+    assert line.next_event_s() == pytest.approx(start_s + len(ping) * 10e-6)
+    line.clock.advance(len(ping) * 10e-6)
+    line.settle()
+    first_s = line.next_event_s()
+    assert first_s is not None
+    assert first_s == pytest.approx(line.clock.now_s() + 10e-6)
+    line.read_until(99, line.clock.now_s() + 0.01)
+    assert line.next_event_s() is None
+
+
+def test_a_closed_or_vanished_port_cannot_be_read() -> None:
+    line = a_line(1)
+    line.closePort()
+    with pytest.raises(PortError, match="the port is closed"):
+        line.read_until(1, line.clock.now_s() + 1.0)
+    assert line.openPort()
+    line.disconnect()
+    with pytest.raises(PortError, match="the port has vanished"):
+        line.read_until(1, line.clock.now_s() + 1.0)

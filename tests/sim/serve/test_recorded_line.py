@@ -82,3 +82,15 @@ def test_the_command_serves_it(recorded: tuple[Path, list[object], float]) -> No
     assert json.loads(done.stdout.splitlines()[0])["ids"] == [3, 7]
     assert snakewalk("bus", "serve", "--play", path, "--servos", "1").returncode == 2
     assert snakewalk("bus", "serve", "--play", path, "--console").returncode == 2
+
+
+def test_a_write_of_another_value_has_the_reply_of_the_recorded_one(
+    recorded: tuple[Path, list[object], float],
+) -> None:
+    """Goals depend on the host's clock; a write has the same place, and no other."""
+    bus = DynamixelBus(RecordedLine.of(recorded[0]))
+    bus.ping(3)
+    bus.read(7, "Present Position")
+    bus.write(3, "LED", 0)  # 1 was recorded
+    with pytest.raises(NoAnswerError):
+        bus.write(3, "Torque Enable", 1)

@@ -291,3 +291,25 @@ def test_usb_latency_delays_what_the_host_sees_and_not_the_wire() -> None:
         times_s.append((line.clock.now_s() - start_s, line.busy_s - busy_s))
     assert times_s[1][0] - times_s[0][0] == pytest.approx(0.016)
     assert times_s[1][1] == times_s[0][1]
+
+
+def test_a_trajectory_of_a_turned_servo_is_shown_in_its_own_direction() -> None:
+    """Positions fall where those of the shaft rise, and a servo without a profile shows none."""
+    line = SimLine(ServoBank([1]), BenchPlant(1))
+    setup(line, (10, 1, 1), (112, 50, 4), (108, 20, 4), *RUN, (116, 3072, 4))
+    wait(line, 0.5)
+    assert 2048 < read(line, 1, 140, 4) < 3072
+    assert read(line, 1, 140, 4) == pytest.approx(read(line, 1, 132, 4), abs=60)
+    assert 0 < read(line, 1, 136, 4) <= 50
+    still = SimLine(ServoBank([1]), BenchPlant(1))
+    setup(still, (11, 16, 1), *RUN, (100, 100, 2))  # PWM mode
+    wait(still, 0.3)
+    assert read(still, 1, 136, 4) == 0
+
+
+@pytest.mark.parametrize("pwm", [300, -300])
+def test_a_servo_without_a_current_sensor_shows_the_load_of_its_output(pwm: int) -> None:
+    line = SimLine(ServoBank([1], "XL430-W250"), BenchPlant(1, dry_n_m=50.0))
+    setup(line, (11, 16, 1), *RUN, (100, pwm, 2))
+    wait(line, 0.2)
+    assert read(line, 1, 126, 2) == pytest.approx(1000 * pwm / 885, abs=2)

@@ -128,3 +128,18 @@ def test_chains_are_named_briefly(text: str, ids: tuple[int, ...], model: str) -
 def test_a_wrong_chain_is_one_clear_line(text: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         parse_chain(text)
+
+
+def test_packets_of_several_registers_are_told_servo_by_servo() -> None:
+    data = bytes((1, 65, 0, 1, 0, 1, 2, 116, 0, 4, 0)) + (3000).to_bytes(4, "little")
+    question, *_ = decoded((0xFE, Instruction.BULK_WRITE, data))
+    assert question.values == {"1: LED": 1, "2: Goal Position": 3000}
+    asked = bytes((1, 144, 0, 2, 0, 2, 132, 0, 4, 0))
+    for code in (Instruction.BULK_READ, Instruction.FAST_BULK_READ):
+        question, *answers = decoded((0xFE, code, asked))
+        assert question.values == {"1": "Present Input Voltage", "2": "Present Position"}
+        told = [answer.values for answer in answers]
+        if code == Instruction.BULK_READ:
+            assert told == [{"Present Input Voltage": 120}, {"Present Position": 2048}]
+        else:
+            assert told == [{"1: Present Input Voltage": 120, "2: Present Position": 2048}]
