@@ -10,6 +10,7 @@ from dynamixel_sdk import PortHandler
 from hypothesis import settings
 
 from snakewalk.controller.cli.main import leave_out_avx512
+from tests.helpers.frozen import freeze
 
 pytest_plugins = ["tests.tiers.cases", "tests.tiers.costs"]
 
@@ -43,7 +44,7 @@ def pytest_collection_finish() -> None:
     And more seldom than in a program: with Python's thresholds that took 3 % of the suite's time.
     """
     gc.collect()
-    gc.freeze()
+    freeze()
     gc.set_threshold(20_000, 20, 20)
 
 

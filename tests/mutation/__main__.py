@@ -95,7 +95,7 @@ def _try(module: str, tree: ast.AST, files: list[str]) -> int:
         setattr(__import__(parent, fromlist=[name]), name, changed)
     except Exception:
         return 1
-    return int(pytest.main([*WORDS, *files]))
+    return int(pytest.main(["-x", *WORDS, *files]))
 
 
 def try_every(modules: list[str]) -> tuple[list[str], list[str]]:

@@ -29,7 +29,7 @@ TIMES_WALL: Final = 20.0
 """A mutant whose tests wait may need this multiple of their CPU time: the machine may be busy."""
 TEST_S: Final = 4.0
 """CPU time of the most expensive test that is run on each mutant."""
-WORDS: Final = ("-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
+WORDS: Final = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 _COMPILED: Final = {"compiled", "njit", "inlined", "vectorize", "guvectorize"}
 
 
@@ -103,12 +103,15 @@ class _Forks:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
-        """Fork; a child returns None, and pytest runs its tests."""
+        """Fork; a child returns None, and pytest runs its tests.
+
+        A file that cannot be collected, as one of a loop's machine code, has no tests here.
+        """
+        session.testsfailed = 0
         functions = _functions(self._file)
         read, write = os.pipe()
         if self._fork(5.0 * self._budget_s, STUCK_S) == 0:
             self._out = write
-            session.config.option.maxfail = 0
             return None
         os.close(write)
         with os.fdopen(read) as lines:
@@ -125,6 +128,7 @@ class _Forks:
         for index, mutant in enumerate(self._mutants if kept_s else ()):
             if self._fork(START_S + TIMES_CPU * all_s, START_S + TIMES_WALL * all_s) == 0:
                 self._apply(mutant, functions)
+                session.config.option.maxfail = 1
                 return None
             if os.waitstatus_to_exitcode(os.wait()[1]) == 0:
                 survivors.append(index)
@@ -183,7 +187,7 @@ def try_mutants(
         if _has_compiled_loops(ast.parse(path_of(module).read_text(encoding="utf-8"))):
             os.environ["NUMBA_DISABLE_JIT"] = "1"
         forks = _Forks(path_of(module), mutants, budget_s)
-        code = pytest.main([*WORDS, *files], plugins=[forks])
+        code = pytest.main([*WORDS, "--continue-on-collection-errors", *files], plugins=[forks])
         if not forks.is_child and forks.trial is not None:
             with os.fdopen(write, "w") as out:
                 json.dump(forks.trial, out)

@@ -158,7 +158,7 @@ PHASES = {
 
 
 @pytest.mark.slow_cases(8, "23 cases of 0.6 s of CPU")
-@pytest.mark.fast_cases(16)
+@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("phase", PHASES)
 def test_each_signal_in_each_phase_says_what_became_of_torque_and_log(
