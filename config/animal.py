@@ -213,7 +213,10 @@ class AnimalConfig(Strict):
     @property
     def all_ornaments(self) -> tuple[OrnamentConfig, ...]:
         """All ornaments, paired ones twice."""
-        return (*self.ornaments, *(one.mirrored for one in self.ornaments if one.paired))
+        return (
+            *self.ornaments,
+            *(ornament.mirrored for ornament in self.ornaments if ornament.paired),
+        )
 
     @property
     def speed_m_s(self) -> float:

@@ -214,12 +214,12 @@ def read_arrays(
                 for member in archive.infolist()
                 if member.filename.endswith(".npy")
             }
-            wanted = {n: m for n, m in members.items() if names is None or n in names}
-            check_members(file, list(wanted.values()))
-            held = {name: _array(archive, member) for name, member in wanted.items()}
+            requested_members = {n: m for n, m in members.items() if names is None or n in names}
+            check_members(file, list(requested_members.values()))
+            arrays = {name: _array(archive, member) for name, member in requested_members.items()}
     except DAMAGE as error:
         raise ValueError(str(error) or type(error).__name__) from None
-    return held, [name for name in members if name not in held]
+    return arrays, [name for name in members if name not in arrays]
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":

@@ -27,15 +27,15 @@ def read_json_lists(file: Path) -> dict[str, Any] | None:
         return None
     text = read_text(file, MOST_STORAGE_BYTES)
     try:
-        held = parse_json(text)
+        data = parse_json(text)
     except ValueError as error:
         if "//" in text or "/*" in text:
             return None
         raise InputError(f"{file}: cannot be read as JSON: {error}; correct it") from None
-    if not isinstance(held, dict):
+    if not isinstance(data, dict):
         raise InputError(f"{file}: lacks names of its matrices; write a JSON object")
     lists: dict[str, Any] = {}
-    for name, value in held.items():
+    for name, value in data.items():
         if isinstance(value, dict) and isinstance(value.get("data"), str):
             return None
         if isinstance(value, str | bool) or value is None:

@@ -171,8 +171,8 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
             place = _title(title, name, row, 1).replace("`[", "`[[").replace("]`", "]]`")
             inner += _tables(place, row)
         elif nested:
-            for one in nested:
-                inner += _tables(_title(title, name, one, len(nested)), one)
+            for nested_model in nested:
+                inner += _tables(_title(title, name, nested_model, len(nested)), nested_model)
             continue
         default = "required" if field.is_required() else f"`{_text(field.default)}`"
         lines.append(f"| `{name}` | {value_kind(field)} | {default} | {description_of(field)} |")
@@ -216,7 +216,7 @@ def _kind(annotation: Any) -> str:
         bounds = [
             bounds_text(bounds_in(rule.metadata)) for rule in rules if isinstance(rule, FieldInfo)
         ]
-        return _kind(inner) + "".join(f" ({told})" for told in bounds if told)
+        return _kind(inner) + "".join(f" ({bound})" for bound in bounds if bound)
     if get_origin(annotation) is Literal:
         return " or ".join(f"`{value}`" for value in get_args(annotation))
     if get_origin(annotation) in {Union, UnionType}:

@@ -90,18 +90,18 @@ class Assumptions:
             raise InputError(f"{missing}; add --assume {key}={shown}")
         return value
 
-    def check_used(self, known: str) -> None:
+    def check_used(self, advice: str) -> None:
         """Reject unused values.
 
         Raises:
-            InputError: a value is unused; ``known`` describes the command's keys.
+            InputError: a value is unused; ``advice`` describes the command's keys.
 
         """
         unused = [key for key in self._values if key not in self._used]
         if unused:
             raise InputError(
                 f"--assume {unused[0]}={self._values[unused[0]]}: this file does not need it; "
-                f"{known}"
+                f"{advice}"
             )
 
     @property

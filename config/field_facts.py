@@ -24,9 +24,9 @@ def description_of(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1:
         return "kind of this table; selects its other keys"
     for rule in (*field.metadata, *_rules(field.annotation)):
-        found = getattr(rule, "description", None) or getattr(rule, "help", None)
-        if found:
-            return str(found)
+        words = getattr(rule, "description", None) or getattr(rule, "help", None)
+        if words:
+            return str(words)
     return ""
 
 
@@ -55,7 +55,11 @@ def bounds_text(bounds: dict[str, float]) -> str:
 
 def _model(annotation: Any) -> type[BaseModel] | None:
     """Return the only model of a table, of a table that may be left out, or of a list of tables."""
-    parts = [each for each in get_args(annotation) if each not in {type(None), Ellipsis}]
+    parts = [
+        member_type
+        for member_type in get_args(annotation)
+        if member_type not in {type(None), Ellipsis}
+    ]
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     if get_origin(annotation) in {Union, UnionType, tuple} and len(parts) == 1:

@@ -78,11 +78,11 @@ def water_surface_m(world: WorldConfig, ground: HeightField | None) -> tuple[Flo
 
 def _mapped(world: str, ground: MapGround) -> HeightField:
     try:
-        held = read_map(Path(ground.source))
+        field = read_map(Path(ground.source))
     except InputError as error:
         raise ConfigError([f"world {world}: ground: {fault}" for fault in error.faults]) from None
-    z_m = ground.vertical_scale * (held.z_m - held.z_m.min())
-    return replace(held, z_m=z_m)
+    z_m = ground.vertical_scale * (field.z_m - field.z_m.min())
+    return replace(field, z_m=z_m)
 
 
 def _ramp(ground: RampGround) -> Floats:
@@ -180,8 +180,8 @@ def _elevation_m(world: str, source: str) -> Floats:
     where = f"world {world}: ground: source {source}"
     path = _jacksboro(where) if source == "jacksboro" else Path(source)
     try:
-        held, _ = read_arrays(path, {"elevation"})
-        elevation = np.asarray(held["elevation"], dtype=float)
+        arrays, _ = read_arrays(path, {"elevation"})
+        elevation = np.asarray(arrays["elevation"], dtype=float)
     except InputError as error:
         raise ConfigError(f"{where}: {error}") from None
     except OSError as error:

@@ -123,13 +123,13 @@ def surface(field: HeightField) -> tuple[Floats, Ints]:
 
 def write_map(file: Path, ground: HeightField) -> None:
     """Write a height field as a map's file."""
-    known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
+    is_known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
     colour: dict[str, Any] = {} if ground.colour is None else {"colour": ground.colour}
     with file.open("wb") as stream:
         np.savez_compressed(
             stream,
             z_m=ground.z_m.astype(np.float32),
-            known=known,
+            known=is_known,
             spacing_m=np.float64(ground.spacing_m),
             x0_m=np.float64(ground.x0_m),
             y0_m=np.float64(ground.y0_m),
@@ -145,15 +145,15 @@ def read_map(file: Path) -> HeightField:
 
     """
     try:
-        held, _ = read_arrays(file, {"z_m", "known", "colour", *_NUMBERS})
-        z_m = held["z_m"].astype(float)
-        known = held["known"]
-        spacing_m, x0_m, y0_m = (float(held[name]) for name in _NUMBERS)
+        arrays, _ = read_arrays(file, {"z_m", "known", "colour", *_NUMBERS})
+        z_m = arrays["z_m"].astype(float)
+        is_known = arrays["known"]
+        spacing_m, x0_m, y0_m = (float(arrays[name]) for name in _NUMBERS)
         if not (0.0 < spacing_m < np.inf and np.isfinite([x0_m, y0_m]).all()):
             raise ValueError("spacing_m must be above 0, x0_m and y0_m must be finite")
         if z_m.size > MOST_SAMPLES:
             raise ValueError(f"holds {z_m.size} samples; {MOST_SAMPLES} are the most")
-        return HeightField(z_m, spacing_m, x0_m, y0_m, known, held.get("colour"))
+        return HeightField(z_m, spacing_m, x0_m, y0_m, is_known, arrays.get("colour"))
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except OSError as error:

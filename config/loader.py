@@ -43,8 +43,8 @@ def shipped(kind: Kind) -> tuple[str, ...]:
     return tuple(sorted(p.name[:-5] for p in _folder(kind).iterdir() if p.name.endswith(".toml")))
 
 
-def locate(kind: Kind, name_or_path: str, beside: Path | None = None) -> Path:
-    """Path of a shipped name or of a ``.toml`` file (relative to ``beside`` if given)."""
+def locate(kind: Kind, name_or_path: str, folder: Path | None = None) -> Path:
+    """Path of a shipped name or of a ``.toml`` file (relative to ``folder`` if given)."""
     if not name_or_path.endswith(".toml"):
         path = _folder(kind) / f"{name_or_path}.toml"
         if path.is_file():
@@ -54,8 +54,8 @@ def locate(kind: Kind, name_or_path: str, beside: Path | None = None) -> Path:
             f"shipped are {', '.join(shipped(kind))}; a file of your own ends in .toml"
         )
     path = Path(name_or_path)
-    if beside is not None and not path.is_absolute() and (beside / path).is_file():
-        path = beside / path
+    if folder is not None and not path.is_absolute() and (folder / path).is_file():
+        path = folder / path
     if not path.is_file():
         raise ConfigError(why_no_file(path))
     return path
@@ -115,9 +115,9 @@ def with_keys(config: M, keys: Mapping[str, object], source: str) -> M:
     return checked(type(config), data, source)
 
 
-def load_robot(name_or_path: str, beside: Path | None = None) -> "RobotConfig":
+def load_robot(name_or_path: str, folder: Path | None = None) -> "RobotConfig":
     """Load a robot by shipped name or path."""
-    path = locate("robots", name_or_path, beside)
+    path = locate("robots", name_or_path, folder)
     data, text = read_toml(path)
     return checked(_schemas().robot, with_models(data, path.parent), str(path), text)
 
@@ -132,35 +132,44 @@ def with_models(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         ConfigError: the faults of such a file.
 
     """
-    found: dict[str, BaseModel] = {}
+    records: dict[str, BaseModel] = {}
 
     def named(table: object) -> object:
         model = table.get("model") if isinstance(table, dict) else None
         record = _schemas().described_model(model, folder) if isinstance(model, str) else None
         if record is None or not isinstance(table, dict):
             return table
-        found[record.model] = record
+        records[record.model] = record
         return {**table, "model": record.model}
 
     servo = named(data.get("servo"))
     joints = data.get("joints")
-    joints = [named(each) for each in joints] if isinstance(joints, list | tuple) else joints
-    if not found:
+    joints = [named(joint) for joint in joints] if isinstance(joints, list | tuple) else joints
+    if not records:
         return data
-    known = [each for each in data.get("described_models", ()) if each.get("model") not in found]
-    more = {"described_models": [*known, *(each.model_dump() for each in found.values())]}
+    described_models = [
+        described_model
+        for described_model in data.get("described_models", ())
+        if described_model.get("model") not in records
+    ]
+    more = {
+        "described_models": [
+            *described_models,
+            *(record.model_dump() for record in records.values()),
+        ]
+    }
     given = {"servo": servo, "joints": joints}
     return data | {key: value for key, value in given.items() if value is not None} | more
 
 
-def load_world(name_or_path: str, beside: Path | None = None) -> "WorldConfig":
+def load_world(name_or_path: str, folder: Path | None = None) -> "WorldConfig":
     """Load a world by shipped name or path; searches its ground's file in the world's folder.
 
     Raises:
         ConfigError: no such file, world or ground, or each fault of it.
 
     """
-    path = locate("worlds", name_or_path, beside)
+    path = locate("worlds", name_or_path, folder)
     world = load(path, _schemas().world)
     named: str | None = getattr(world.ground, "source", None)
     if named is not None:
@@ -188,8 +197,8 @@ def load_gait(name_or_path: str) -> GaitSetConfig:
 
 def known_keys() -> list[str]:
     """Dotted keys of a run, a robot and a world, after the name of their file."""
-    found = [key for name, model in _files().items() for key in _dotted(name, model)]
-    return list(dict.fromkeys(found))
+    keys = [key for name, model in _files().items() for key in _dotted(name, model)]
+    return list(dict.fromkeys(keys))
 
 
 def digest(*models: BaseModel) -> str:
@@ -224,8 +233,8 @@ def _schemas() -> _Schemas:
 
 def _files() -> dict[str, type[BaseModel]]:
     """Schemas of the three files of a run, by name."""
-    found = _schemas()
-    return {"run": found.run, "robot": found.robot, "world": found.world}
+    schemas = _schemas()
+    return {"run": schemas.run, "robot": schemas.robot, "world": schemas.world}
 
 
 def _dotted(path: str, kind: Any) -> Iterator[str]:

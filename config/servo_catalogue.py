@@ -28,21 +28,23 @@ def shipped_models() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
-def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
+def servo_model(name_or_path: str, folder: Path | None = None) -> ServoModel:
     """Model of a shipped name, in any case, or of a ``.toml`` file.
 
-    A path is relative to ``beside`` (the folder of the naming file) if the file is there. A name
+    A path is relative to ``folder`` (the folder of the naming file) if the file is there. A name
     that is not shipped is searched in its folder ``servos``.
 
     Raises:
         ConfigError: the model is unknown; or the faults of its file, one line each.
 
     """
-    path = model_file(name_or_path, beside)
+    path = model_file(name_or_path, folder)
     if path is None:
         shipped = shipped_models()
         name = name_or_path.upper()
-        series = [each for each in shipped if each.startswith(name[:2])] or shipped
+        series = [
+            model_name for model_name in shipped if model_name.startswith(name[:2])
+        ] or shipped
         near = ", ".join(get_close_matches(name, series, 5, 0.2))
         similar = f"similar are {near} ({len(shipped)} are in {FOLDER}); " if near else ""
         raise ConfigError(
@@ -52,25 +54,25 @@ def servo_model(name_or_path: str, beside: Path | None = None) -> ServoModel:
     return _shipped(path.stem) if path.parent == FOLDER else _read(path)
 
 
-def model_file(name_or_path: str, beside: Path | None = None) -> Path | None:
+def model_file(name_or_path: str, start_folder: Path | None = None) -> Path | None:
     """File of a model by the rules of ``servo_model``, or None."""
-    folders = [] if beside is None else [beside]
+    folders = [] if start_folder is None else [start_folder]
     if name_or_path.endswith(".toml"):
-        found = [folder / name_or_path for folder in folders] + [Path(name_or_path)]
+        candidates = [folder / name_or_path for folder in folders] + [Path(name_or_path)]
     else:
-        own = [folder / "servos" / f"{name_or_path}.toml" for folder in folders]
-        found = [FOLDER / f"{printed_name(name_or_path)}.toml", *own]
-    return next((path for path in found if path.is_file()), None)
+        folder_files = [folder / "servos" / f"{name_or_path}.toml" for folder in folders]
+        candidates = [FOLDER / f"{printed_name(name_or_path)}.toml", *folder_files]
+    return next((path for path in candidates if path.is_file()), None)
 
 
-def described_model(name_or_path: str, beside: Path | None) -> ServoModel | None:
+def described_model(name_or_path: str, folder: Path | None) -> ServoModel | None:
     """Model of a file that is not shipped; None for a shipped model's name.
 
     Raises:
         ConfigError: the faults of the file.
 
     """
-    path = model_file(name_or_path, beside)
+    path = model_file(name_or_path, folder)
     if path is None and name_or_path.endswith(".toml"):
         raise ConfigError(f"{name_or_path}: no such file")
     return None if path is None or path.parent == FOLDER else _read(path)
@@ -90,8 +92,8 @@ def models_by_number(folder: Path | None = None, protocol: int | str = 2) -> Map
     shipped = _shipped_by_number(protocol)
     if not files:
         return shipped
-    own = [_read(path) for path in files]
-    return {**shipped, **{m.model_number: m.model for m in own if m.protocol == protocol}}
+    folder_models = [_read(path) for path in files]
+    return {**shipped, **{m.model_number: m.model for m in folder_models if m.protocol == protocol}}
 
 
 @cache
@@ -129,11 +131,11 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
         ConfigError: the other model does not exist, or lacks a register of ``without``.
 
     """
-    own = dict(data)
-    like = own.pop("like", None)
-    without = own.pop("without", [])
+    table = dict(data)
+    like = table.pop("like", None)
+    without = table.pop("without", [])
     if like is None and not without:
-        return own
+        return table
     if not isinstance(like, str):
         raise ConfigError(f"{path}: like: must name a model, or a file")
     if not (isinstance(without, list) and all(isinstance(name, str) for name in without)):
@@ -155,13 +157,13 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
     base["registers"] = {name: row for name, row in registers.items() if name not in without}
     for key in ("source", "friction"):  # they belong to the other model
         base.pop(key, None)
-    return _over(base, own)
+    return _over(base, table)
 
 
-def _over(base: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Values of ``own`` over those of ``base``, table by table."""
+def _over(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Values of ``changes`` over those of ``base``, table by table."""
     merged = dict(base)
-    for key, value in own.items():
+    for key, value in changes.items():
         below = merged.get(key)
         is_table = isinstance(value, dict) and isinstance(below, dict)
         merged[key] = _over(dict(below or {}), value) if is_table else value

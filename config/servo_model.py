@@ -317,10 +317,10 @@ class ServoModel(Strict):
             raise ValueError(f"registers: {', '.join(missing)} missing")
         if len(set(self.bauds)) != len(self.bauds) or any(baud <= 0 for baud in self.bauds):
             raise ValueError("bauds: positive rates, each once")
-        known = FEETECH_MODES if self.is_feetech else MODES
-        unknown = [mode for mode in self.modes if mode not in known]
+        possible_modes = FEETECH_MODES if self.is_feetech else MODES
+        unknown = [mode for mode in self.modes if mode not in possible_modes]
         if unknown:
-            shown = ", ".join(map(str, known))
+            shown = ", ".join(map(str, possible_modes))
             raise ValueError(f"modes: {unknown[0]} is not known; known are {shown}")
         for address, data, count in self.indirect:
             ends = (address + 2 * count, data + count)

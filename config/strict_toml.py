@@ -110,27 +110,27 @@ _KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
 
 def line_number(text: str, loc: Sequence[str | int]) -> int | None:
     """Line that sets the innermost existing key of ``loc`` in a TOML text, or None."""
-    wanted = [str(part) for part in loc if isinstance(part, str)]
+    innermost = [str(part) for part in loc if isinstance(part, str)]
     places = [part for part in loc if isinstance(part, int)]
     table: list[str] = []
-    seen: Counter[str] = Counter()
-    found = None
+    table_counts: Counter[str] = Counter()
+    key_line = None
     depth = 0
-    here = True
+    is_inside_table = True
     for number, line in enumerate(text.splitlines(), start=1):
         if header := _TABLE.match(line):
             keys = table = _parts(header[2])
-            here = header[1] == "[" or places[:1] == [seen[header[2]]]
-            seen[header[2]] += 1
+            is_inside_table = header[1] == "[" or places[:1] == [table_counts[header[2]]]
+            table_counts[header[2]] += 1
         elif key := _KEY.match(line):
             keys = table + _parts(key[1])
         else:
             continue
-        rest = iter(wanted)
-        if here and len(keys) > depth and all(part in rest for part in keys):
-            found = number
+        rest = iter(innermost)
+        if is_inside_table and len(keys) > depth and all(part in rest for part in keys):
+            key_line = number
             depth = len(keys)
-    return found
+    return key_line
 
 
 def _parts(key: str) -> list[str]:

@@ -65,7 +65,11 @@ def _inner(
     field: FieldInfo, choices: list[type[BaseModel]], values: Any, given: Any, where: str
 ) -> Iterator[str]:
     """A table in a table; of several kinds the present one, else the first as comments."""
-    kinds = [str(one.model_fields["kind"].default) for one in choices if "kind" in one.model_fields]
+    kinds = [
+        str(choice.model_fields["kind"].default)
+        for choice in choices
+        if "kind" in choice.model_fields
+    ]
     model = choices[0] if values is None else _kind_of(choices, values)
     yield ""
     if len(kinds) > 1:
@@ -82,9 +86,9 @@ def _inner(
 def _kind_of(choices: list[type[BaseModel]], values: Mapping[str, Any]) -> type[BaseModel]:
     """Schema with the ``kind`` of a table."""
     return next(
-        one
-        for one in choices
-        if len(choices) == 1 or one.model_fields["kind"].default == values["kind"]
+        choice
+        for choice in choices
+        if len(choices) == 1 or choice.model_fields["kind"].default == values["kind"]
     )
 
 

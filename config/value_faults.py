@@ -29,7 +29,7 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
         return "must be a finite number"
     bounds = {key: context[key] for key in ("gt", "ge", "lt", "le") if key in context}
     tag = context.get("tag")
-    known = context.get("expected_tags")
+    expected_tags = context.get("expected_tags")
     said = {
         "missing": "is required",
         "tuple_type": "must be a list: [ ... ]",
@@ -46,7 +46,7 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
         "bool_type": "must be true or false",
         "bool_parsing": "must be true or false",
         "finite_number": "must be a finite number",
-        "union_tag_invalid": f"kind {tag!r} is unknown; use one of {known}",
+        "union_tag_invalid": f"kind {tag!r} is unknown; use one of {expected_tags}",
         "union_tag_not_found": "needs a key kind, which says what it is",
         "literal_error": f"must be {context.get('expected')}",
         "enum": f"must be {context.get('expected')}",
@@ -98,7 +98,7 @@ def _pattern_in_words(pattern: str) -> str:
 
 def _class_in_words(characters: str) -> str:
     ranges = {"a-z": "small letters", "A-Z": "capital letters", "0-9": "digits"}
-    words = [name for each, name in ranges.items() if each in characters]
+    words = [name for character_range, name in ranges.items() if character_range in characters]
     rest = re.sub("a-z|A-Z|0-9", "", characters)
-    listed = words + [repr(each) for each in rest]
+    listed = words + [repr(character) for character in rest]
     return " or ".join([", ".join(listed[:-1]), listed[-1]] if len(listed) > 1 else listed)

@@ -290,14 +290,14 @@ class PegsObstacle(Strict):
         """X and y of each peg, row by row."""
         hexagonal = self.pattern == "hexagonal"
         apart_m = self.spacing_m * (math.sqrt(0.75) if hexagonal else 1.0)
-        found = []
+        places = []
         for row in range(self.rows):
             shift = (0.25 if row % 2 else -0.25) if hexagonal else 0.0
             x_m = self.at_m[0] + (row - 0.5 * (self.rows - 1)) * apart_m
             for peg in range(self.row_pegs):
                 along = peg - 0.5 * (self.row_pegs - 1) + shift
-                found.append((x_m, self.at_m[1] + along * self.spacing_m))
-        return tuple(found)
+                places.append((x_m, self.at_m[1] + along * self.spacing_m))
+        return tuple(places)
 
     def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether a peg is at this place of the floor."""

@@ -62,13 +62,13 @@ def compiled(
             options |= _UNCOUNTED
         # numba's cache does not know the options: a forced fallback would share its files
         cached = makes_arrays or not is_forced("numba")
-        made: F = _jitted(
+        jitted: F = _jitted(
             function, signature, cached=cached, nogil=nogil, error_model=model, **options
         )
-        stats = getattr(made, "stats", None)
+        stats = getattr(jitted, "stats", None)
         if cached and stats is not None and stats.cache_misses:
             report_compiled(f"{function.__module__}.{function.__name__}")
-        return made
+        return jitted
 
     return decorate
 
@@ -80,15 +80,15 @@ def compiled_when_called(function: F) -> F:
 
 def _jitted(function: F, signature: Any, *, cached: bool, **options: Any) -> F:
     """Return numba's dispatcher of a function, compiled if a signature is given."""
-    made: Any = _numba().njit(**options)(function)
-    if made is function:  # NUMBA_DISABLE_JIT=1
+    jitted: Any = _numba().njit(**options)(function)
+    if jitted is function:  # NUMBA_DISABLE_JIT=1
         return function
     if cached:
-        made._cache = _cache_of(made)
+        jitted._cache = _cache_of(jitted)
     if signature is not None:
-        made.compile(signature)
-        made.disable_compile()
-    loop: F = made
+        jitted.compile(signature)
+        jitted.disable_compile()
+    loop: F = jitted
     return loop
 
 
@@ -205,5 +205,5 @@ def inlined(function: F) -> F:
     numba = _numba()
     if numba is None:
         return function
-    made: F = numba.njit(inline="always")(function)
-    return made
+    jitted: F = numba.njit(inline="always")(function)
+    return jitted

@@ -43,10 +43,10 @@ class _Temporary(caching.UserWideCacheLocator):  # type: ignore[misc]  # numba h
     def from_function(cls, py_func: Any, py_file: str) -> "_Temporary | None":
         """Return None without a folder for temporary files."""
         try:
-            found: _Temporary | None = super().from_function(py_func, py_file)
+            cached: _Temporary | None = super().from_function(py_func, py_file)
         except OSError:
-            found = None
-        return found
+            cached = None
+        return cached
 
 
 class _ReadOnly(caching.InTreeCacheLocator):  # type: ignore[misc]  # numba has no types
@@ -87,8 +87,8 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled loop, or None."""
-        if self._has_stored and (found := self._load_stored(sig, target_context)) is not None:
-            return found
+        if self._has_stored and (cached_code := self._load_stored(sig, target_context)) is not None:
+            return cached_code
         with suppress(OSError):
             return super().load_overload(sig, target_context)
         return None
@@ -123,7 +123,7 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
             self._cache_file = usual
 
 
-def _called(loop: Any, known: set[Any]) -> Iterator[str]:
+def _called(loop: Any, visited: set[Any]) -> Iterator[str]:
     """Describe the numbers and the functions of other files that are compiled into a loop.
 
     numba compares only the loop's own file, and would go on with the former text of the others.
@@ -134,12 +134,12 @@ def _called(loop: Any, known: set[Any]) -> Iterator[str]:
             yield f"{name} = {value!r}"
             continue
         function = getattr(value, "py_func", value)
-        if not hasattr(function, "__code__") or function in known:
+        if not hasattr(function, "__code__") or function in visited:
             continue
-        known.add(function)
+        visited.add(function)
         with suppress(OSError):  # in an archive
             yield f"{name}: {_file_stamp(function.__code__.co_filename)}"
-        yield from _called(function, known)
+        yield from _called(function, visited)
 
 
 def _names(code: CodeType) -> Iterator[str]:

@@ -36,12 +36,12 @@ class RobotConfig(JointValues):
         """Derive ``joint_axes`` from the joints if the file does not give it."""
         if not self.joint_axes:
             axes = [joint.axis for joint in self.joints]
-            known = "".join(axis for axis in axes if axis is not None)
-            if not known or len(known) < len(axes):
+            given_axes = "".join(axis for axis in axes if axis is not None)
+            if not given_axes or len(given_axes) < len(axes):
                 raise ValueError(
                     "joint_axes: is required: a letter for each joint, or axis in each of joints"
                 )
-            object.__setattr__(self, "joint_axes", known)  # frozen from here on
+            object.__setattr__(self, "joint_axes", given_axes)  # frozen from here on
         return self
 
     @model_validator(mode="after")
@@ -104,13 +104,13 @@ class RobotConfig(JointValues):
 
     @model_validator(mode="after")
     def _limbs_stand_on_the_spine(self) -> Self:
-        at = [pair.link for pair in self.limbs]
-        if any(link >= self.link_count for link in at):
-            raise ValueError(f"limbs: link {max(at)} of {self.link_count}: 0 is the head")
-        if any(after >= before for before, after in pairwise(at)):
+        limb_links = [pair.link for pair in self.limbs]
+        if any(link >= self.link_count for link in limb_links):
+            raise ValueError(f"limbs: link {max(limb_links)} of {self.link_count}: 0 is the head")
+        if any(after >= before for before, after in pairwise(limb_links)):
             raise ValueError(
                 "limbs: each at a link of its own, from the tail to the head: "
-                f"{sorted(set(at), reverse=True)}"
+                f"{sorted(set(limb_links), reverse=True)}"
             )
         return self
 
@@ -119,7 +119,7 @@ class RobotConfig(JointValues):
         ids = self.servo_ids
         if max(ids) > LAST_ID:
             raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {LAST_ID}")
-        twice = sorted(each for each, count in Counter(ids).items() if count > 1)
+        twice = sorted(servo_id for servo_id, count in Counter(ids).items() if count > 1)
         if twice:
             raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
         return self
@@ -155,11 +155,11 @@ class RobotConfig(JointValues):
     def _power_is_for_the_chain(self) -> Self:
         if self.power is None:
             return self
-        for each, count in Counter(self.power.inject_ids).items():
-            if each not in self.servo_ids:
-                raise ValueError(f"power: inject_ids: ID {each} is not of this robot")
+        for servo_id, count in Counter(self.power.inject_ids).items():
+            if servo_id not in self.servo_ids:
+                raise ValueError(f"power: inject_ids: ID {servo_id} is not of this robot")
             if count > 1:
-                raise ValueError(f"power: inject_ids: ID {each} is named twice")
+                raise ValueError(f"power: inject_ids: ID {servo_id} is named twice")
         cables = len(self.power.cables_ohm)
         if cables not in (0, self.joint_count - 1):
             raise ValueError(
@@ -173,12 +173,21 @@ class RobotConfig(JointValues):
         if not self.ports:
             return self
         needed = [*self.servo_ids, *(() if self.imu is None else (self.imu.id,))]
-        told = Counter(each for port in self.ports for each in port.ids)
+        count_by_id = Counter(servo_id for port in self.ports for servo_id in port.ids)
         names = Counter(port.port for port in self.ports)
         for what, wrong in (
-            ("is on none of them", [each for each in needed if each not in told]),
-            ("is on more than one", [each for each, count in told.items() if count > 1]),
-            ("is not of this robot", [each for each in told if each not in needed]),
+            (
+                "is on none of them",
+                [servo_id for servo_id in needed if servo_id not in count_by_id],
+            ),
+            (
+                "is on more than one",
+                [servo_id for servo_id, count in count_by_id.items() if count > 1],
+            ),
+            (
+                "is not of this robot",
+                [servo_id for servo_id in count_by_id if servo_id not in needed],
+            ),
         ):
             if wrong:
                 raise ValueError(f"ports: ID {', '.join(map(str, sorted(wrong)))} {what}")
@@ -233,8 +242,8 @@ class RobotConfig(JointValues):
         gains = initial_gains(self)
         if by_joint:
             self.__dict__["joints"] = tuple(
-                each.model_copy(update=by_joint.get(joint, {}))
-                for joint, each in enumerate(self.joints)
+                joint_config.model_copy(update=by_joint.get(joint, {}))
+                for joint, joint_config in enumerate(self.joints)
             )
         if gains:
             self.__dict__["servo"] = self.servo.model_copy(update=gains)

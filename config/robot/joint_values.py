@@ -41,18 +41,18 @@ class JointValues(LinkValues):
             ConfigError: a model is unknown.
 
         """
-        known = self.records_by_model
-        return tuple(known[name] for name in self.servo_models)
+        records = self.records_by_model
+        return tuple(records[name] for name in self.servo_models)
 
     @property
     def is_feetech(self) -> bool:
         """Whether all servos speak Feetech's protocol."""
-        return all(each.is_feetech for each in self.records_by_model.values())
+        return all(record.is_feetech for record in self.records_by_model.values())
 
     @property
     def is_mixed(self) -> bool:
         """Whether the ports have servos of different series, each its own."""
-        return len({wire_format(each) for each in self.records_by_model.values()}) > 1
+        return len({wire_format(record) for record in self.records_by_model.values()}) > 1
 
     @property
     def records_by_model(self) -> dict[str, ServoModel]:
@@ -62,16 +62,18 @@ class JointValues(LinkValues):
             ConfigError: a model is not known.
 
         """
-        described = {each.model: each for each in self.described_models}
+        described = {
+            described_model.model: described_model for described_model in self.described_models
+        }
         models = dict.fromkeys(self.servo_models)
         return {name: described.get(name) or servo_model(name) for name in models}
 
     @property
     def motors(self) -> tuple[MotorConfig | None, ...]:
         """Motor constants of each servo; None: those of its model."""
-        own = self.servo.motor
+        motor = self.servo.motor
         of = self.servo.model
-        return tuple(own if model == of else None for model in self.servo_models)
+        return tuple(motor if model == of else None for model in self.servo_models)
 
     @property
     def models_by_id(self) -> dict[int, ServoModel]:
@@ -80,8 +82,8 @@ class JointValues(LinkValues):
 
     def models_on(self, ids: Collection[int] | None) -> dict[int, ServoModel]:
         """``models_by_id`` of the servos of a port; ``ids`` None: of all."""
-        known = self.models_by_id
-        return known if ids is None else {i: each for i, each in known.items() if i in ids}
+        models = self.models_by_id
+        return models if ids is None else {i: model for i, model in models.items() if i in ids}
 
     @property
     def signs(self) -> tuple[int, ...]:
@@ -132,19 +134,21 @@ class JointValues(LinkValues):
         """Value of a key for each joint, by default ``usual``."""
         if not self.joints:
             return usual
-        own = (getattr(joint, key) for joint in self.joints)
-        return tuple(u if o is None else o for o, u in zip(own, usual, strict=True))
+        joint_values = (getattr(joint, key) for joint in self.joints)
+        return tuple(u if o is None else o for o, u in zip(joint_values, usual, strict=True))
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Unique name of each joint, in the order of the bus; valid in ROS."""
-        usual = default_joint_names(self.all_axes, [each.side for each in self.limb_joints])
+        usual = default_joint_names(
+            self.all_axes, [limb_joint.side for limb_joint in self.limb_joints]
+        )
         return self._own("name", usual)
 
     def joint_label(self, joint: int) -> str:
         """Label of a joint in messages: name, servo ID, and port of a segment."""
         servo_id = self.servo_ids[joint]
-        port = next((each.port for each in self.ports if servo_id in each.ids), None)
+        port = next((segment.port for segment in self.ports if servo_id in segment.ids), None)
         return joint_label(self.joint_names[joint], servo_id, port)
 
     def label_of_servo(self, servo_id: int) -> str:

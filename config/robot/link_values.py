@@ -89,9 +89,9 @@ class LinkValues(RobotKeys):
         masses_kg = self.bare_link_masses_kg
         if self.stereo_head is None:
             return masses_kg
-        at = self.stereo_head.link
-        loaded_kg = masses_kg[at] + self.stereo_head.mass_kg
-        return (*masses_kg[:at], loaded_kg, *masses_kg[at + 1 :])
+        head_link = self.stereo_head.link
+        loaded_kg = masses_kg[head_link] + self.stereo_head.mass_kg
+        return (*masses_kg[:head_link], loaded_kg, *masses_kg[head_link + 1 :])
 
     @property
     def bare_link_masses_kg(self) -> tuple[float, ...]:
@@ -139,8 +139,8 @@ class LinkValues(RobotKeys):
         """Value of a key for each link, by default ``usual``."""
         if not self.links:
             return (usual,) * self.link_count
-        own = (getattr(link, key) for link in self.links)
-        return tuple(usual if o is None else o for o in own)
+        link_values = (getattr(link, key) for link in self.links)
+        return tuple(usual if o is None else o for o in link_values)
 
     def radii_m(self, stations: int) -> tuple[float, ...]:
         """Body radius at ``stations`` (1 or more) equidistant places from tip to tip."""
@@ -153,10 +153,10 @@ class LinkValues(RobotKeys):
         profile = self.body_profile or (1.0,)
         radii = []
         for share in shares:
-            at = share * (len(profile) - 1)
-            low = min(int(at), max(len(profile) - 2, 0))
+            position = share * (len(profile) - 1)
+            low = min(int(position), max(len(profile) - 2, 0))
             high = min(low + 1, len(profile) - 1)
-            radii.append(profile[low] + (at - low) * (profile[high] - profile[low]))
+            radii.append(profile[low] + (position - low) * (profile[high] - profile[low]))
         return tuple(self.body_radius_m * radius for radius in radii)
 
     def _radius_at_m(self, place: float) -> float:

@@ -17,9 +17,9 @@ def port_fault(port: str) -> str | None:
     scheme, separator, _ = port.partition("://")
     if not separator or scheme.lower() in URL_SCHEMES:
         return None
-    known = [f"{each}://" for each in URL_SCHEMES]
+    schemes = [f"{scheme_name}://" for scheme_name in URL_SCHEMES]
     return (
-        f"a port cannot be a {scheme}:// URL; use {', '.join(known[:-1])} or {known[-1]}, "
+        f"a port cannot be a {scheme}:// URL; use {', '.join(schemes[:-1])} or {schemes[-1]}, "
         "or the path of a device"
     )
 

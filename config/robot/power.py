@@ -37,6 +37,6 @@ class PowerConfig(Strict):
 
     @model_validator(mode="after")
     def _resistances_are_positive(self) -> Self:
-        if any(not 0.0 < each <= 100.0 for each in self.cables_ohm):
+        if any(not 0.0 < resistance_ohm <= 100.0 for resistance_ohm in self.cables_ohm):
             raise ValueError("cables_ohm: each over 0 and at most 100")
         return self

@@ -37,19 +37,21 @@ def initial_gains(robot: JointValues) -> dict[str, int]:
 
 def initial_joint_gains(robot: JointValues) -> dict[int, dict[str, int]]:
     """Return such gains of joints whose servos are of another model than `[servo]`, by joint."""
-    found: dict[int, dict[str, int]] = {}
-    for joint, (own, facts) in enumerate(zip(robot.joints, robot.servo_records, strict=False)):
+    gains_by_joint: dict[int, dict[str, int]] = {}
+    for joint, (joint_config, facts) in enumerate(
+        zip(robot.joints, robot.servo_records, strict=False)
+    ):
         if facts.model == robot.servo.model:
             continue
         for key, (register, values) in _GAINS.items():
             is_soft = key == "position_p_gain" and robot.all_axes[joint] == "p"
             given = "pitch_p_gain" if is_soft else key
-            if getattr(own, key) is not None or given in robot.servo.model_fields_set:
+            if getattr(joint_config, key) is not None or given in robot.servo.model_fields_set:
                 continue
             row = _row_without(facts, register, getattr(robot, values)[joint])
             if row is not None:
-                found.setdefault(joint, {})[key] = row.initial
-    return found
+                gains_by_joint.setdefault(joint, {})[key] = row.initial
+    return gains_by_joint
 
 
 def register_faults(robot: JointValues) -> list[str]:

@@ -65,7 +65,7 @@ def canonical_joints(robot: JointValues) -> dict[str, Any]:
         return {}
     axes = robot.all_axes
     spine = len(robot.joint_axes)
-    usual = default_joint_names(axes, [each.side for each in robot.limb_joints])
+    usual = default_joint_names(axes, [limb_joint.side for limb_joint in robot.limb_joints])
     rows: list[dict[str, Any]] = [
         {"sign": sign, "zero_rad": zero_rad, "name": None if name == default else name}
         for sign, zero_rad, name, default in zip(

@@ -226,11 +226,11 @@ class ControlCycle:
         if isinstance(by, float):
             raw, reply = self._receive(request, b"", by)
         else:
-            found = by.finish()
-            if isinstance(found, GroupReadReply):
+            outcome = by.finish()
+            if isinstance(outcome, GroupReadReply):
                 self._succeeded()
-                return found
-            raw, reply = self._receive_rest(request, found, by.remaining_s)
+                return outcome
+            raw, reply = self._receive_rest(request, outcome, by.remaining_s)
         responded = reply.answered
         if not self._pending.empty:
             reply = self._without_late(request, reply)

@@ -80,7 +80,7 @@ class DynamixelBus:
         """
         self.port = port
         models = dict(model) if isinstance(model, Mapping) else {}
-        self._tables = {servo_id: load_control_table(each) for servo_id, each in models.items()}
+        self._tables = {servo_id: load_control_table(name) for servo_id, name in models.items()}
         first = next(iter(models.values())) if isinstance(model, Mapping) else model
         self.table: ControlTable = load_control_table(first)
         """Control table of the model, or of the first one."""
@@ -128,13 +128,13 @@ class DynamixelBus:
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
         """Ping each servo; return those that replied."""
-        found = {}
+        replies = {}
         for servo_id in servo_ids:
             try:
-                found[servo_id] = self.ping(servo_id)
+                replies[servo_id] = self.ping(servo_id)
             except NoAnswerError:
                 continue
-        return found
+        return replies
 
     def scan(self) -> dict[int, PingReply]:
         """All servos at the port's baud rate, by a broadcast ping of almost a second."""
@@ -192,14 +192,14 @@ class DynamixelBus:
         values: dict[str, int] = {}
         for block in _blocks(map(table.register, names)):
             first, last = block[0], block[-1]
-            whole = Register(
+            span = Register(
                 first.name if first is last else f"{first.name} to {last.name}",
                 first.address,
                 last.address + last.size - first.address,
                 signed=False,
             )
             try:
-                data = self._read(servo_id, whole)
+                data = self._read(servo_id, span)
             except ServoError:
                 for register in block:
                     try:
@@ -386,7 +386,7 @@ class DynamixelBus:
 def _blocks(registers: Iterable[Register]) -> list[list[Register]]:
     blocks: list[list[Register]] = []
     end = 0
-    for register in sorted(set(registers), key=lambda each: each.address):
+    for register in sorted(set(registers), key=lambda entry: entry.address):
         if not blocks or register.address > end + _GAP_BYTES:
             blocks.append([])
         blocks[-1].append(register)

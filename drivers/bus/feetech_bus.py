@@ -78,14 +78,14 @@ class FeetechBus(DynamixelBus):
 
     def answering(self) -> list[int]:
         """IDs that reply to one ping at the port's baud rate; lasts 3 seconds."""
-        found = []
+        answering_ids = []
         for servo_id in range(MAX_ID + 1):
             try:
                 self._exchange(servo_id, FeetechInstruction.PING, b"", 0)
             except NoAnswerError:
                 continue
-            found.append(servo_id)
-        return found
+            answering_ids.append(servo_id)
+        return answering_ids
 
     def scan(self) -> dict[int, PingReply]:
         """All servos at the port's baud rate."""
@@ -227,9 +227,9 @@ class FeetechBus(DynamixelBus):
 
     def _facts_of(self, servo_ids: Iterable[int]) -> ServoModel:
         """Model of some servos, which must have the same byte order and group reads."""
-        facts = [self.table_of(each).facts for each in servo_ids]
-        if len({(each.byte_order, each.sync_read) for each in facts}) > 1:
-            names = ", ".join(dict.fromkeys(each.model for each in facts))
+        facts = [self.table_of(servo_id).facts for servo_id in servo_ids]
+        if len({(fact.byte_order, fact.sync_read) for fact in facts}) > 1:
+            names = ", ".join(dict.fromkeys(fact.model for fact in facts))
             raise ControlTableError(f"{names}: their words differ; use one series on a port")
         return facts[0] if facts else self.table.facts
 
@@ -268,13 +268,13 @@ class FeetechBus(DynamixelBus):
                 other = len(status.params)
             missing = max(1, STATUS_BYTES + length - reader.pending)
         what = FeetechInstruction(code).name.lower().replace("_", " ")
-        at = f"at {port.getBaudRate()} baud"
+        baud_text = f"at {port.getBaudRate()} baud"
         if other is not None and not self._pending.is_pending(servo_id, other, fast=False):
             raise BusError(f"servo {servo_id}: {what}: {other} bytes came, not {length}")
-        found = f"no answer {at}"
+        reason = f"no answer {baud_text}"
         if reader.dropped_bytes or reader.pending:
-            found = f"damaged bytes {at}: noise on the line, or two servos with this ID"
-        raise NoAnswerError(f"servo {servo_id}: {what}: {found}")
+            reason = f"damaged bytes {baud_text}: noise on the line, or two servos with this ID"
+        raise NoAnswerError(f"servo {servo_id}: {what}: {reason}")
 
 
 def servo_bus(

@@ -80,16 +80,16 @@ class FeetechWrite(GroupWrite):
     def encode(self, values: NDArray[np.int32]) -> bytes:
         """Packets that write ``values`` (N,)."""
         row = self._row
-        each = 1 + self._row.size
+        entry_bytes = 1 + self._row.size
         entries = b"".join(
             bytes((servo_id,)) + encode_word(int(value), row, self._facts, self._name)
             for servo_id, value in zip(self._ids, values, strict=True)
         )
         head = bytes((row.address, row.size))
-        step = MOST_ENTRIES // each * each
+        step = MOST_ENTRIES // entry_bytes * entry_bytes
         return b"".join(
-            frame(BROADCAST_ID, FeetechInstruction.SYNC_WRITE, head + entries[at : at + step])
-            for at in range(0, len(entries), step)
+            frame(BROADCAST_ID, FeetechInstruction.SYNC_WRITE, head + entries[start : start + step])
+            for start in range(0, len(entries), step)
         )
 
 
@@ -162,7 +162,7 @@ class FeetechSingleReads(FeetechCycle):
     ) -> None:
         """Prepare the packets; arguments as ``FeetechCycle``."""
         make = partial(FeetechCycle, latency_s=latency_s, pending=pending, line=line)
-        self._singles = [make(port, (each,), facts, span, convert) for each in ids]
+        self._singles = [make(port, (servo_id,), facts, span, convert) for servo_id in ids]
         super().__init__(
             port, ids, facts, span, convert, latency_s=latency_s, pending=pending, line=line
         )
@@ -182,18 +182,18 @@ class FeetechSingleReads(FeetechCycle):
 
     def finish_read(self) -> GroupReadReply:
         """Read each servo."""
-        replies = [each.read() for each in self._singles]
+        replies = [single.read() for single in self._singles]
         for name in ("timeouts", "unclean", "copies", "drained_bytes", "late_bytes"):
-            total = sum(getattr(each.counters, name) for each in self._singles)
+            total = sum(getattr(single.counters, name) for single in self._singles)
             setattr(self.counters, name, total)
         return GroupReadReply(
-            np.concatenate([each.data for each in replies]),
-            np.concatenate([each.valid for each in replies]),
-            np.concatenate([each.error for each in replies]),
-            np.concatenate([each.answered for each in replies]),
-            clean=all(each.clean for each in replies),
-            whole=all(each.whole for each in replies),
-            flawless=all(each.flawless for each in replies),
+            np.concatenate([reply.data for reply in replies]),
+            np.concatenate([reply.valid for reply in replies]),
+            np.concatenate([reply.error for reply in replies]),
+            np.concatenate([reply.answered for reply in replies]),
+            clean=all(reply.clean for reply in replies),
+            whole=all(reply.whole for reply in replies),
+            flawless=all(reply.flawless for reply in replies),
         )
 
 
@@ -211,8 +211,8 @@ def state_convert(facts: ServoModel, first: str) -> tuple[tuple[int, int], Conve
     def convert(data: Bytes) -> Bytes:
         plain = block.convert(data)
         parts = []
-        for at, size in places:
-            word = np.ascontiguousarray(plain[:, at : at + 2]).view("<i2")[:, 0]
+        for offset, size in places:
+            word = np.ascontiguousarray(plain[:, offset : offset + 2]).view("<i2")[:, 0]
             column = np.ascontiguousarray(word.astype(f"<i{size}"))
             parts.append(column.view(np.uint8).reshape(-1, size))
         return np.ascontiguousarray(np.concatenate(parts, axis=1))

@@ -58,7 +58,7 @@ def find_feetech(
 
     """
     before = port.getBaudRate()
-    found: dict[int, FeetechServo] = {}
+    servo_by_id: dict[int, FeetechServo] = {}
     try:
         for baud in bauds:
             on_progress(f"Feetech servos at {baud} baud")
@@ -69,10 +69,10 @@ def find_feetech(
             for servo_id in bus.answering():
                 servo = identify(bus, servo_id, baud)
                 if servo is not None:
-                    found.setdefault(servo_id, servo)
+                    servo_by_id.setdefault(servo_id, servo)
     finally:
         port.setBaudRate(before)
-    return [found[servo_id] for servo_id in sorted(found)]
+    return [servo_by_id[servo_id] for servo_id in sorted(servo_by_id)]
 
 
 def _anybody(port: BytePort) -> bool:

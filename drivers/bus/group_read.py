@@ -148,7 +148,7 @@ class GroupReadRequest:
         new; earlier packets of the same servo are copies of old ones. Two replies at one place are
         both invalid.
         """
-        told = [
+        packets_in_turn = [
             packet
             for before, packet in zip([None, *packets], packets, strict=False)
             if isinstance(packet, StatusPacket)
@@ -156,7 +156,7 @@ class GroupReadRequest:
             and len(packet.params) in (self.length, 0)  # else to an older request
             and packet != before  # an immediate copy has the same content
         ]
-        turns = [self._index[packet.servo_id] for packet in told]
+        turns = [self._index[packet.servo_id] for packet in packets_in_turn]
         before, after = _run_lengths(turns), _run_lengths([-t for t in reversed(turns)])[::-1]
         longest = max(before, default=0)
         ranks = [
@@ -165,7 +165,7 @@ class GroupReadRequest:
         ]
         by_id = {
             packet.servo_id: packet
-            for k, (packet, rank) in enumerate(zip(told, ranks, strict=True))
+            for k, (packet, rank) in enumerate(zip(packets_in_turn, ranks, strict=True))
             if rank and ranks.count(rank) == 1 and turns[k] not in turns[k + 1 :]
         }
         return by_id, len(packets) - len(by_id)
@@ -176,10 +176,10 @@ class GroupReadRequest:
         start = raw.rfind(self._fast_head)  # of two, the first is a repeated older one
         if start < 0:
             return self._partial(by_id, clean=not raw)
-        at = start + len(self._fast_head)
-        crc = crc16(raw[start:at])
+        offset = start + len(self._fast_head)
+        crc = crc16(raw[start:offset])
         for servo_id in self.ids:
-            share = raw[at : at + self.frame_bytes]
+            share = raw[offset : offset + self.frame_bytes]
             if len(share) < self.frame_bytes or share[1] != servo_id:
                 break
             crc = crc16(share[:-2], crc)
@@ -187,8 +187,8 @@ class GroupReadRequest:
                 break
             by_id[servo_id] = StatusPacket(servo_id, share[0], share[2:-2])
             crc = crc16(share[-2:], crc)
-            at += self.frame_bytes
-        return self._partial(by_id, clean=start == 0 and at == len(raw))
+            offset += self.frame_bytes
+        return self._partial(by_id, clean=start == 0 and offset == len(raw))
 
     def _partial(self, by_id: dict[int, StatusPacket], *, clean: bool) -> GroupReadReply:
         count = len(self.ids)

@@ -50,7 +50,7 @@ class Protocol1Block:
         address = register.address
         size = register.size
         self._requests = [
-            frame(each, Instruction1.READ, bytes((address, size))) for each in self._ids
+            frame(servo_id, Instruction1.READ, bytes((address, size))) for servo_id in self._ids
         ]
         self._latency_s = latency_s
         self._sent_at_s = port.clock.now_s()
@@ -65,8 +65,8 @@ class Protocol1Block:
         """Send values (N,) of the register to all servos."""
         size = self._register.size
         entries = b"".join(
-            bytes((each,)) + int(goal).to_bytes(size, "little")
-            for each, goal in zip(self._ids, goals, strict=True)
+            bytes((servo_id,)) + int(goal).to_bytes(size, "little")
+            for servo_id, goal in zip(self._ids, goals, strict=True)
         )
         params = bytes((self._register.address, size)) + entries
         self._port.write(frame(BROADCAST_ID, Instruction1.SYNC_WRITE, params))
@@ -110,7 +110,7 @@ class Protocol1Block:
         reply_bytes = _STATUS_BYTES + self._register.size
         wire_s = (len(self._requests[k]) + reply_bytes) * BITS_PER_BYTE / port.getBaudRate()
         raw = port.read_until(reply_bytes, port.clock.now_s() + wire_s + self._latency_s)
-        packets = [each for each in Reader1().feed(raw) if each.intact]
-        found = [each for each in packets if each.servo_id == self._ids[k]]
-        self._is_quiet = len(found) == 1
-        return found[0] if len(found) == 1 else None
+        packets = [packet for packet in Reader1().feed(raw) if packet.intact]
+        replies = [packet for packet in packets if packet.servo_id == self._ids[k]]
+        self._is_quiet = len(replies) == 1
+        return replies[0] if len(replies) == 1 else None

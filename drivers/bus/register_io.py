@@ -80,8 +80,8 @@ def check_accepted(servo_id: int, what: str, error: int) -> None:
     """Raise ``ServoError`` if the error byte has more than an alert."""
     code = error & ~ALERT
     if code:
-        known = code in ResultError._value2member_map_
-        name = ResultError(code).name.lower().replace("_", " ") if known else f"error {code}"
+        is_known = code in ResultError._value2member_map_
+        name = ResultError(code).name.lower().replace("_", " ") if is_known else f"error {code}"
         raise ServoError(f"servo {servo_id}: {what}: refused: {name}", error)
 
 
@@ -121,11 +121,11 @@ def _exchange(
         missing = max(1, expected - reader.pending)  # stuffing or noise made it longer
     if copies:
         line.note_copies(answered=False)
-    at = f"at {port.getBaudRate()} baud"
-    found = f"no answer {at}"
+    baud_text = f"at {port.getBaudRate()} baud"
+    reason = f"no answer {baud_text}"
     if reader.dropped_bytes or reader.pending:
-        found = f"damaged bytes {at}: noise on the line, or two servos with this ID"
-    raise NoAnswerError(f"servo {packet.servo_id}: {what}: {found}")
+        reason = f"damaged bytes {baud_text}: noise on the line, or two servos with this ID"
+    raise NoAnswerError(f"servo {packet.servo_id}: {what}: {reason}")
 
 
 def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:

@@ -69,11 +69,11 @@ class SegmentedBus:
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
         """Ping each servo; return those that replied."""
-        found: dict[int, PingReply] = {}
+        replies: dict[int, PingReply] = {}
         for servo_id in servo_ids:
             with self._with_port_name(servo_id) as bus:
-                found |= bus.find([servo_id])
-        return found
+                replies |= bus.find([servo_id])
+        return replies
 
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register; raises as ``DynamixelBus.read``."""
@@ -137,10 +137,10 @@ class SegmentedBus:
 
     def _places(self, servo_ids: Sequence[int]) -> dict[DynamixelBus, list[int]]:
         """Indices in ``servo_ids`` of the servos of each port."""
-        found: dict[DynamixelBus, list[int]] = {}
+        places_by_bus: dict[DynamixelBus, list[int]] = {}
         for place, servo_id in enumerate(servo_ids):
-            found.setdefault(self._bus_of[servo_id], []).append(place)
-        return found
+            places_by_bus.setdefault(self._bus_of[servo_id], []).append(place)
+        return places_by_bus
 
     def _cycles(
         self,
@@ -148,7 +148,9 @@ class SegmentedBus:
         make: Callable[[DynamixelBus, Sequence[int]], ControlCycle],
     ) -> "SegmentedCycle":
         places = self._places(servo_ids)
-        cycles = {bus: make(bus, [servo_ids[k] for k in at]) for bus, at in places.items()}
+        cycles = {
+            bus: make(bus, [servo_ids[k] for k in indices]) for bus, indices in places.items()
+        }
         spans = {
             (cycle.read_address, cycle.read_bytes)
             for bus, cycle in cycles.items()
@@ -168,9 +170,9 @@ class SegmentedBus:
     ) -> None:
         """Call ``do`` for each port, even if one is gone; then raise its error."""
         gone: list[PortError] = []
-        for bus, at in places.items():
+        for bus, indices in places.items():
             try:
-                do(bus, at)
+                do(bus, indices)
             except PortError as error:
                 self._lost[bus] = None
                 gone.append(error)
@@ -199,7 +201,7 @@ class SegmentedCycle:
         self,
         cycles: Mapping[DynamixelBus, ControlCycle],
         places: Mapping[DynamixelBus, list[int]],
-        each: Callable[
+        call_each: Callable[
             [Callable[[DynamixelBus, list[int]], None], Mapping[DynamixelBus, list[int]]], None
         ],
     ) -> None:
@@ -208,12 +210,12 @@ class SegmentedCycle:
         Args:
             cycles: of each port.
             places: indices of each port's servos in the common arrays.
-            each: ``SegmentedBus._each``.
+            call_each: ``SegmentedBus._each``.
 
         """
         self._cycles = cycles
         self._places = places
-        self._each = each
+        self._each = call_each
         self._count = sum(map(len, places.values()))
 
     @property
@@ -229,8 +231,8 @@ class SegmentedCycle:
     @property
     def counters(self) -> CycleCounters:
         """Irregular reads so far, of all ports."""
-        each = (astuple(cycle.counters) for cycle in self._cycles.values())
-        return CycleCounters(*map(sum, zip(*each, strict=True)))
+        counter_rows = (astuple(cycle.counters) for cycle in self._cycles.values())
+        return CycleCounters(*map(sum, zip(*counter_rows, strict=True)))
 
     @property
     def since_sent_s(self) -> float:
@@ -244,7 +246,7 @@ class SegmentedCycle:
             PortError: a port is gone; the other servos have their goals.
 
         """
-        self._each(lambda bus, at: self._cycles[bus].write_goals(goals[at]), self._places)
+        self._each(lambda bus, places: self._cycles[bus].write_goals(goals[places]), self._places)
 
     def read(self) -> GroupReadReply:
         """Read the block of all servos: ask on all ports, then receive.
@@ -256,11 +258,11 @@ class SegmentedCycle:
         asked: dict[DynamixelBus, list[int]] = {}
         replies: dict[DynamixelBus, GroupReadReply] = {}
 
-        def ask(bus: DynamixelBus, at: list[int]) -> None:
+        def ask(bus: DynamixelBus, places: list[int]) -> None:
             self._cycles[bus].begin_read()
-            asked[bus] = at
+            asked[bus] = places
 
-        def receive(bus: DynamixelBus, at: list[int]) -> None:
+        def receive(bus: DynamixelBus, places: list[int]) -> None:
             replies[bus] = self._cycles[bus].finish_read()
 
         try:
@@ -277,16 +279,20 @@ class SegmentedCycle:
         answered = np.zeros(self._count, np.bool_)
         error = np.zeros(self._count, np.uint8)
         for bus, reply in replies.items():
-            at = self._places[bus]
-            data[at, : reply.data.shape[1]] = reply.data
-            valid[at], answered[at], error[at] = reply.valid, reply.answered, reply.error
-        each = replies.values()
+            places = self._places[bus]
+            data[places, : reply.data.shape[1]] = reply.data
+            valid[places], answered[places], error[places] = (
+                reply.valid,
+                reply.answered,
+                reply.error,
+            )
+        bus_replies = replies.values()
         return GroupReadReply(
             data,
             valid,
             error,
             answered,
-            clean=all(r.clean for r in each),
-            whole=all(r.whole for r in each),
-            flawless=all(r.flawless for r in each),
+            clean=all(r.clean for r in bus_replies),
+            whole=all(r.whole for r in bus_replies),
+            flawless=all(r.flawless for r in bus_replies),
         )

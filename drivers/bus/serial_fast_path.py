@@ -120,17 +120,17 @@ def _receive(
     latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
     got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
     if got != len(reply):
-        found = -1 - int(got)
+        code = -1 - int(got)
     elif plan[FAST]:
         head = work[request_end:heads_end]
         ids = work[heads_end:ids_end]
-        found = int(read_fast(reply, head, ids, data, error))
+        code = int(read_fast(reply, head, ids, data, error))
     else:
         heads = work[request_end:heads_end].reshape(len(data), HEAD)
-        found = int(read_plain(reply, heads, data, error))
-    if found <= 0:
+        code = int(read_plain(reply, heads, data, error))
+    if code <= 0:
         plan[REMAINING_NS] = begun_ns + wait_ns - now_ns()
-    return found
+    return code
 
 
 class SerialFastPath:
@@ -225,12 +225,12 @@ class SerialFastPath:
             self._update_wire_times()
         data = np.empty(self._shape, np.uint8)
         reply = self._request.regular(FLAWLESS, data, self._error)
-        found = _receive(fd, self._work, data, with_goals, self._plan, self._free_s)
-        if found == FLAWLESS:
+        outcome = _receive(fd, self._work, data, with_goals, self._plan, self._free_s)
+        if outcome == FLAWLESS:
             return reply
-        if found > IRREGULAR:
-            return self._request.regular(found, data, self._error)
-        return self._room[: len(self._room) - 1 if found == IRREGULAR else -1 - found].tobytes()
+        if outcome > IRREGULAR:
+            return self._request.regular(outcome, data, self._error)
+        return self._room[: len(self._room) - 1 if outcome == IRREGULAR else -1 - outcome].tobytes()
 
     def _update_wire_times(self) -> None:
         self._baud = baud = self._port.getBaudRate()

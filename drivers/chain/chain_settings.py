@@ -117,7 +117,9 @@ def missing_watchdogs(robot: RobotConfig) -> list[str]:
     for model, facts in robot.records_by_model.items():
         if WATCHDOG in facts.registers:
             continue
-        joints = [joint for joint, each in enumerate(robot.servo_models) if each == model]
+        joints = [
+            joint for joint, servo_model in enumerate(robot.servo_models) if servo_model == model
+        ]
         which = ""
         if len(joints) < robot.joint_count:
             which = f" ({', '.join(robot.joint_names[joint] for joint in joints)})"

@@ -94,24 +94,27 @@ class FingerprintFile:
             ConfigError: the file is broken.
 
         """
-        known = self.read()
-        if known is not None:
-            faults = changes(robot, known, fingerprints)
+        stored_fingerprints = self.read()
+        if stored_fingerprints is not None:
+            faults = changes(robot, stored_fingerprints, fingerprints)
             if faults:
                 hint = f"snakewalk doctor --accept --robot {self._robot_file} accepts it"
                 raise ChainError(
                     [f"{self.path}: {line}; if it is meant, {hint}" for line in faults]
                 )
-        new = {**(known or {}), **{i: dict(each) for i, each in fingerprints.items()}}
-        if new == known:
+        new = {
+            **(stored_fingerprints or {}),
+            **{i: dict(fingerprint) for i, fingerprint in fingerprints.items()},
+        }
+        if new == stored_fingerprints:
             return []
         try:
             self.write(new)
         except OSError as error:
             return [f"{self.path}: cannot be written: {error}; no later start is compared"]
-        if known is None:
+        if stored_fingerprints is None:
             return [f"{self.path}: created with the settings of {len(new)} servos"]
-        missing = missing_registers(known, fingerprints)
+        missing = missing_registers(stored_fingerprints, fingerprints)
         if missing:
             return [f"{self.path}: had no {', '.join(missing)}; completed with the present values"]
         return [f"{self.path}: updated: servos were added, or limits follow the robot's file"]
@@ -138,14 +141,14 @@ def changes(
 
 
 def missing_registers(
-    known: Mapping[int, Fingerprint], found: Mapping[int, Fingerprint]
+    expected: Mapping[int, Fingerprint], reported: Mapping[int, Fingerprint]
 ) -> list[str]:
     """Registers that the file lacks for its servos."""
     missing = {
         name
-        for servo_id, values in found.items()
-        if servo_id in known
-        for name in values.keys() - known[servo_id].keys()
+        for servo_id, values in reported.items()
+        if servo_id in expected
+        for name in values.keys() - expected[servo_id].keys()
     }
     return [name for name in FINGERPRINT if name in missing]
 
@@ -155,12 +158,12 @@ _KEPT = ("Homing Offset", "Drive Mode", *PROTECTION)
 
 
 def _parse(text: str) -> dict[int, dict[str, int]]:
-    found: dict[int, dict[str, int]] = {}
+    fingerprints: dict[int, dict[str, int]] = {}
     for key, table in tomllib.loads(text).items():
         if not (key.isdigit() and isinstance(table, dict)):
             raise ValueError(f"{key}: a table for each servo ID is expected")
         for name, value in table.items():
             if name not in FINGERPRINT or type(value) is not int:
                 raise ValueError(f"{key}: {name}: a register with a number is expected")
-        found[int(key)] = dict(table)
-    return found
+        fingerprints[int(key)] = dict(table)
+    return fingerprints

@@ -70,7 +70,7 @@ class GoalCheck:
         """Whether the check should be repeated as soon as there is time."""
         if self._is_incomplete or self._watched > 0:
             return True
-        return any(each.write < self._writes for each in self._differences.values())
+        return any(difference.write < self._writes for difference in self._differences.values())
 
     def check(self, explain: Callable[[int], str | None]) -> None:
         """Read the goals back and compare them.
@@ -100,7 +100,9 @@ class GoalCheck:
                 self._differences.pop(joint, None)
             else:
                 self._note(joint, int(values[joint]))
-        over = [joint for joint, each in self._differences.items() if self._is_over(each)]
+        over = [
+            joint for joint, difference in self._differences.items() if self._is_over(difference)
+        ]
         if over:
             raise BusError(self._fault(sorted(over), sent, explain))
 
@@ -126,18 +128,18 @@ class GoalCheck:
         return f"Goal Position is {value}, not {sent[joint]}: {cause}"
 
     def _note(self, joint: int, value: int) -> None:
-        known = self._differences.get(joint)
+        earlier = self._differences.get(joint)
         lag = next((k for k, goals in enumerate(reversed(self._sent)) if goals[joint] == value), -1)
         is_foreign = lag < 0
-        if known is None:
+        if earlier is None:
             self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
-        elif known.write < self._writes:
-            known.count = known.count + 1
-            known.write = self._writes
-            known.is_constant &= value == known.value
-            known.is_foreign |= is_foreign
-            known.lag = lag if lag == known.lag else 0
-            known.value = value
+        elif earlier.write < self._writes:
+            earlier.count = earlier.count + 1
+            earlier.write = self._writes
+            earlier.is_constant &= value == earlier.value
+            earlier.is_foreign |= is_foreign
+            earlier.lag = lag if lag == earlier.lag else 0
+            earlier.value = value
         if is_foreign and (self._seen_at < self._writes or not self._watched):
             self._seen = self._seen + 1 if self._watched else 1
             self._seen_at = self._writes

@@ -35,7 +35,7 @@ class IdentifiedRead:
             table = bus.table_of(servo_id)
             names = (IDENTITY, _GOAL, _POSITION) if IDENTITY in table else (_GOAL, _POSITION)
             joints_of.setdefault(tuple(table.register(name) for name in names), []).append(joint)
-        self._blocks = [_Block.of(bus, robot, *each) for each in joints_of.items()]
+        self._blocks = [_Block.of(bus, robot, *bus_joints) for bus_joints in joints_of.items()]
 
     def positions_rad(self, reads: int, *, ask_again: bool = False) -> Floats:
         """(J,) angles; arguments and errors as ``positions_and_goals``."""
@@ -92,13 +92,14 @@ class _Block:
         """Values of the joints that replied and are ``missing`` (J,), by name."""
         reply = self.cycle.read()
         start = self.registers[0].address
-        found = {}
+        values_by_joint = {}
         for place in np.flatnonzero(reply.valid & missing[self.joints]).tolist():
             row = reply.data[place].tobytes()
-            found[self.joints[place]] = {
-                each.name: each.decode(row[each.address - start :]) for each in self.registers
+            values_by_joint[self.joints[place]] = {
+                register.name: register.decode(row[register.address - start :])
+                for register in self.registers
             }
-        return found
+        return values_by_joint
 
 
 def check_stillness(

@@ -182,10 +182,10 @@ class StateDecoder:
 
 
 @compiled(f"int64({_BLOCKS}, int64, int64, int64)", makes_arrays=False)
-def _signed(data: Bytes, row: int, at: int, size: int) -> int:
+def _signed(data: Bytes, row: int, offset: int, size: int) -> int:
     value = 0
     for k in range(size):
-        value |= int(data[row, at + k]) << (8 * k)
+        value |= int(data[row, offset + k]) << (8 * k)
     half = 1 << (8 * size - 1)
     return value - 2 * half if value >= half else value
 

@@ -240,7 +240,7 @@ class RegisterCheck:
             return {}, True
         values = self.rows.decode(reply.data)
         everybody = reply.valid_count == len(reply.valid)
-        found = {}
+        values_by_joint = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
             if reply.valid[place]:
                 got = int(values[place])
@@ -249,5 +249,5 @@ class RegisterCheck:
             else:
                 continue
             if got != expected:
-                found[joint] = got
-        return found, ask_again is not None or everybody
+                values_by_joint[joint] = got
+        return values_by_joint, ask_again is not None or everybody

@@ -114,7 +114,7 @@ def _compare(
         Whether a sensor was added.
 
     """
-    found = False
+    is_any_dead = False
     for k in range(motion.shape[1]):
         if not valid[k]:
             continue
@@ -149,6 +149,6 @@ def _compare(
                     is_dead[n, k] = reads >= SPEED_READS and abs(first - second) >= limit
                     if n == 1 and first == 0.0:  # both constant: the position is reported
                         is_dead[n, k] = False
-                found |= is_dead[n, k]
+                is_any_dead |= is_dead[n, k]
             last[n, k] = motion[n, k]
-    return found
+    return is_any_dead

@@ -82,9 +82,9 @@ def recheck(
         here_rad[joint] = units.position_rad(joint, servo.registers["Present Position"])
     moved = here_rad - believed_rad
     faults: list[ChainFault] = []
-    known = {s.servo_id: s for s in before.servos} if before is not None else {}
+    servo_by_id = {s.servo_id: s for s in before.servos} if before is not None else {}
     for joint, servo in enumerate(now.servos):
-        old = known.get(servo.servo_id, servo)
+        old = servo_by_id.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
             text = (
                 f"{robot.joint_label(joint)}: firmware {servo.firmware}, was {old.firmware}: "
@@ -108,11 +108,11 @@ def recheck(
     reset = []
     for joint, servo in enumerate(now.servos):
         values = configured.get(joint, {})
-        found = {register: servo.registers[register] for register in values}
-        other = identity_fault(robot, joint, found[IDENTITY]) if IDENTITY in found else None
+        registers = {register: servo.registers[register] for register in values}
+        other = identity_fault(robot, joint, registers[IDENTITY]) if IDENTITY in registers else None
         if other is not None:
             faults.append(ChainFault(FaultCause.EXCHANGED, other))
-        if not servo.torque_on or found != values:
+        if not servo.torque_on or registers != values:
             reset.append(joint)
     lost = {robot.servo_ids[joint] for joint in reset}
     unidentified = tuple(

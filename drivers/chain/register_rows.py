@@ -34,7 +34,7 @@ class RegisterRows:
             ControlTableError: a model lacks it.
 
         """
-        return cls([bus.table_of(each).register(name).kind for each in servo_ids])
+        return cls([bus.table_of(servo_id).register(name).kind for servo_id in servo_ids])
 
     def encode(self, values: ArrayLike) -> bytes:
         """Rows of ``values`` (N,), as in a group read."""

@@ -174,8 +174,11 @@ class ServoChain:
             self.on_event(line)
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
         if self._file is not None:
-            found = {self.robot.servo_ids[j]: each for j, each in self._fingerprints.items()}
-            for line in self._file.check(self.robot, found):
+            fingerprint_by_id = {
+                self.robot.servo_ids[j]: fingerprint
+                for j, fingerprint in self._fingerprints.items()
+            }
+            for line in self._file.check(self.robot, fingerprint_by_id):
                 self.on_event(line)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
@@ -200,27 +203,27 @@ class ServoChain:
             believed_rad,
         )
 
-    def resume(self, found: Recheck) -> JointState:
+    def resume(self, state_check: Recheck) -> JointState:
         """Continue after an interruption: torque that is on stays on, nothing moves.
 
         Servos that lost torque or settings are set up again. For the others the watchdog is
         cleared, and the goal becomes the present position.
 
         Raises:
-            ChainError: ``found`` has a fault, a joint has moved since, or a servo does not identify
-                itself.
+            ChainError: ``state_check`` has a fault, a joint has moved since, or a servo does not
+                identify itself.
             BusError: a servo does not follow an instruction; torque is off again.
             PortError: the port is gone.
 
         """
-        if found.faults:
-            raise ChainError([str(fault) for fault in found.faults])
-        self._note(configure(self._bus, self.robot, self._units, found.reset, self.on_event))
-        return self._begin(found.position_rad)
+        if state_check.faults:
+            raise ChainError([str(fault) for fault in state_check.faults])
+        self._note(configure(self._bus, self.robot, self._units, state_check.reset, self.on_event))
+        return self._begin(state_check.position_rad)
 
     def _note(self, settings: Mapping[int, ServoSettings]) -> None:
-        self._configured |= {joint: each.ram for joint, each in settings.items()}
-        self._fingerprints |= {joint: each.fingerprint for joint, each in settings.items()}
+        self._configured |= {joint: setting.ram for joint, setting in settings.items()}
+        self._fingerprints |= {joint: setting.fingerprint for joint, setting in settings.items()}
 
     def _begin(self, found_rad: Floats | None = None) -> JointState:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
@@ -280,12 +283,12 @@ class ServoChain:
             bus.sync_write(watched, WATCHDOG, self._watchdog_ticks)
             self._expect(WATCHDOG, self._watchdogs)
         # read last: meanwhile another program may have written goals, or exchanged IDs
-        now_rad, held = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
+        now_rad, reported_goals = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
         check_stillness(self.robot, now_rad, here_rad, STILL_RAD)
-        for joint in np.flatnonzero(held != goals).tolist():
+        for joint in np.flatnonzero(reported_goals != goals).tolist():
             raise BusError(
-                f"{self.robot.joint_label(joint)}: Goal Position is {held[joint]:.0f} after "
-                f"{goals[joint]} was written to all"
+                f"{self.robot.joint_label(joint)}: Goal Position is {reported_goals[joint]:.0f} "
+                f"after {goals[joint]} was written to all"
             )
         bus.sync_write(ids, "Torque Enable", 1)
         self._expect("Torque Enable", dict.fromkeys(range(len(ids)), 1))

@@ -35,18 +35,18 @@ def limit_currents(
     """
     raw: dict[int, int] = {}
     for joint in range(robot.joint_count):
-        own = configured.get(joint, {}).get(_GOAL_CURRENT)
-        if own is None:
+        limit_raw = configured.get(joint, {}).get(_GOAL_CURRENT)
+        if limit_raw is None:
             raise BusError(
                 f"{robot.joint_label(joint)}: has no Goal Current that could hold it; set "
                 'safety.on_trip = "off"'
             )
-        raw[joint] = min(own, max(1, units.current_raw(joint, float(current_a[joint]))))
+        raw[joint] = min(limit_raw, max(1, units.current_raw(joint, float(current_a[joint]))))
     check = RegisterCheck.of(bus, robot, _GOAL_CURRENT, raw, fast=False)
     differing = dict(raw)
     for _ in range(_TRIES):
         for value in sorted({*raw.values()}):
-            ids = [robot.servo_ids[joint] for joint, each in raw.items() if each == value]
+            ids = [robot.servo_ids[joint] for joint, raw_value in raw.items() if raw_value == value]
             bus.sync_write(ids, _GOAL_CURRENT, value)
         differing, is_complete = check.compare()
         if not differing and is_complete:

@@ -135,27 +135,29 @@ def inspect(
 
     """
     asked = robot.servo_ids if servo_ids is None else servo_ids
-    found = bus.find(asked) if replies is None else replies
+    replies_by_id = bus.find(asked) if replies is None else replies
     faults: list[ChainFault] = []
     for part in bus.parts:
         on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
-        missing = [str(i) for i in on_it if i in asked and i not in found]
+        missing = [str(i) for i in on_it if i in asked and i not in replies_by_id]
         if missing:
             port = part.port.name
             baud = part.port.getBaudRate()
-            whole = _ids_in_words(on_it)
-            text = f"{port}: no answer from servo {', '.join(missing)} of {whole} at {baud} baud: "
+            ids_text = _ids_in_words(on_it)
+            text = (
+                f"{port}: no answer from servo {', '.join(missing)} of {ids_text} at {baud} baud: "
+            )
             text += "power, cable, id or baud rate"
             if len(missing) == len(on_it) > 1:
                 text = (
-                    f"{port}: no answer from any of the servos {whole} at {baud} baud: power, "
+                    f"{port}: no answer from any of the servos {ids_text} at {baud} baud: power, "
                     f"cable, baud rate or another make; snakewalk bus scan --port {port} lists the "
                     "servos that reply"
                 )
             faults.append(ChainFault(FaultCause.NO_ANSWER, text))
     servos = []
     others = defaultdict[tuple[str, str], list[int]](list)
-    for servo_id, servo in found.items():
+    for servo_id, servo in replies_by_id.items():
         joint = robot.joint_label(robot.servo_ids.index(servo_id))
         table = bus.table_of(servo_id)
         if servo.model_number != table.model_number:
@@ -172,7 +174,7 @@ def inspect(
             faults.append(ChainFault(FaultCause.ALARM, text))
     for (name, model), ids in others.items():
         if len(ids) <= _FEW:
-            labels = (robot.joint_label(robot.servo_ids.index(each)) for each in ids)
+            labels = (robot.joint_label(robot.servo_ids.index(joint_id)) for joint_id in ids)
             texts = [f"{label}: is a {name}, not a {model}" for label in labels]
         else:
             texts = [f"servos {_ids_in_words(ids)}: are {name}, not {model}"]
@@ -196,8 +198,12 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
 
     """
     table = bus.table_of(servo_id)
-    own = FEETECH_SETTINGS if table.facts.is_feetech else ()
-    names = [each for each in (*_REPORTED, *_COMPARED, *own) if each in table]
+    feetech_names = FEETECH_SETTINGS if table.facts.is_feetech else ()
+    names = [
+        register_name
+        for register_name in (*_REPORTED, *_COMPARED, *feetech_names)
+        if register_name in table
+    ]
     values = bus.read_each(servo_id, names)
     return ServoReport(
         servo_id=servo_id,
@@ -249,19 +255,22 @@ def configure(
         return {}
     ids = [robot.servo_ids[joint] for joint in which]
     bus.sync_write(ids, "Torque Enable", 0)  # the EEPROM is locked while it is on
-    found: dict[int, dict[str, int]] = {}
+    settings_by_joint: dict[int, dict[str, int]] = {}
     for joint, servo_id in zip(which, ids, strict=True):
-        found[joint] = _read_settings(bus, servo_id)
-        if found[joint]["Torque Enable"]:  # the packet was lost
+        settings_by_joint[joint] = _read_settings(bus, servo_id)
+        if settings_by_joint[joint]["Torque Enable"]:  # the packet was lost
             bus.write_verified(servo_id, "Torque Enable", 0)
         # in its error state it rejects goals; clearing it with torque on would apply an old goal
-        if found[joint].get(WATCHDOG):
+        if settings_by_joint[joint].get(WATCHDOG):
             bus.write(servo_id, WATCHDOG, 0)
     none = ChainSetting("Secondary(Shadow) ID", NO_SECONDARY_ID, usual=False)
     for joint in which:  # all, before a packet that one of them might treat as its own
-        found[joint] = _apply(bus, robot, joint, (none,), found[joint], on_event)
+        settings_by_joint[joint] = _apply(
+            bus, robot, joint, (none,), settings_by_joint[joint], on_event
+        )
     return {
-        joint: _configure_joint(bus, robot, units, joint, found[joint], on_event) for joint in which
+        joint: _configure_joint(bus, robot, units, joint, settings_by_joint[joint], on_event)
+        for joint in which
     }
 
 
@@ -270,24 +279,24 @@ def _configure_joint(
     robot: RobotConfig,
     units: JointUnits,
     joint: int,
-    found: dict[str, int],
+    read_values: dict[str, int],
     on_event: Callable[[str], None],
 ) -> ServoSettings:
     name = robot.joint_label(joint)
-    pwm_limit = found["PWM Limit"]
+    pwm_limit = read_values["PWM Limit"]
     full = int(units.full_pwm[joint])
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
     settings = list(chain_settings(robot, units, joint, pwm_limit))
     if units.current_mode[joint]:
-        settings.append(_current_setting(robot, units, joint, found["Current Limit"]))
+        settings.append(_current_setting(robot, units, joint, read_values["Current Limit"]))
     settings.append(ChainSetting(IDENTITY, identity(joint)))
-    values = _apply(bus, robot, joint, settings, found, on_event)
+    values = _apply(bus, robot, joint, settings, read_values, on_event)
     if pwm_limit < full:
         on_event(f"{name}: PWM Limit is {pwm_limit} of {full}: weak and slow")
     if values.get("Drive Mode", 0) & REVERSE:
         on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
-    before = found.get(IDENTITY, 0)
+    before = read_values.get(IDENTITY, 0)
     if identity_fault(robot, joint, before) is not None:
         on_event(
             f"{name}: its servo was {robot.joint_label(before - 1)} in the run before: have IDs "
@@ -299,7 +308,11 @@ def _configure_joint(
         on_event(f"{name}: Homing Offset is {offset}: its zero is moved by {angle:+.2f} rad")
     set_here = {setting.register for setting in settings}
     kept = (*RAM_SETTINGS, *SHAPING_SETTINGS, *FEETECH_SETTINGS, IDENTITY)
-    ram = {each: values[each] for each in kept if each in set_here and each in values}
+    ram = {
+        register_name: values[register_name]
+        for register_name in kept
+        if register_name in set_here and register_name in values
+    }
     return ServoSettings(ram, fingerprint_of(values))
 
 
@@ -324,7 +337,7 @@ def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
     names: tuple[str, ...] = _SETTINGS
     if table.facts.is_feetech:
         names = (*_SETTINGS, *FEETECH_SETTINGS)
-    return bus.read_each(servo_id, [each for each in names if each in table], (STARTUP,))
+    return bus.read_each(servo_id, [name for name in names if name in table], (STARTUP,))
 
 
 def _apply(
@@ -332,7 +345,7 @@ def _apply(
     robot: RobotConfig,
     joint: int,
     settings: Iterable[ChainSetting],
-    found: dict[str, int],
+    read_values: dict[str, int],
     on_event: Callable[[str], None],
 ) -> dict[str, int]:
     """Write each setting that differs, then read all of them back.
@@ -346,9 +359,9 @@ def _apply(
     """
     servo_id = robot.servo_ids[joint]
     name = robot.joint_label(joint)
-    own = [setting for setting in settings if setting.register in found]
-    now = found
-    for setting in own:
+    present_settings = [setting for setting in settings if setting.register in read_values]
+    now = read_values
+    for setting in present_settings:
         value = setting.value_in(now)
         if value == now[setting.register]:
             continue
@@ -356,17 +369,17 @@ def _apply(
         # a new mode resets the gains
         renewed = setting.register == "Operating Mode"
         now = _read_settings(bus, servo_id) if renewed else {**now, setting.register: value}
-    if now is found:
-        return found
+    if now is read_values:
+        return read_values
     now = _read_settings(bus, servo_id)
-    for setting in own:
+    for setting in present_settings:
         register = setting.register
         got = now[setting.register]
         value = setting.value_in(now)
         if got != value:
             raise BusError(f"{name}: {register}: wrote {value}, reads back {got}")
-        if got != found[register] and not setting.usual:
-            on_event(f"{name}: {register} was {found[register]}, is {got} now")
+        if got != read_values[register] and not setting.usual:
+            on_event(f"{name}: {register} was {read_values[register]}, is {got} now")
     return now
 
 
@@ -384,9 +397,9 @@ def _current_setting(
         return ChainSetting("Goal Current", limit_raw)
     goal = max(1, units.current_raw(joint, current_a))
     if goal > limit_raw:
-        own = bool(robot.joints) and robot.joints[joint].current_limit_a is not None
+        is_joint_limit = bool(robot.joints) and robot.joints[joint].current_limit_a is not None
         raise ChainError(
-            f"{robot.joint_label(joint)}: {'' if own else 'pitch_'}current_limit_a = "
+            f"{robot.joint_label(joint)}: {'' if is_joint_limit else 'pitch_'}current_limit_a = "
             f"{current_a:g}: the servo's Current Limit is "
             f"{limit_raw * abs(units.a_per_current[joint]):.2f} A"
         )
@@ -399,15 +412,15 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     At level 0 a servo replies to pings only, at level 1 to pings and reads; a Feetech servo replies
     to all at level 1. Only servos of the robot's model are written to.
     """
-    found = bus.find(robot.servo_ids)
-    right = [i for i, s in found.items() if s.model_number == bus.table_of(i).model_number]
+    replies = bus.find(robot.servo_ids)
+    right = [i for i, s in replies.items() if s.model_number == bus.table_of(i).model_number]
     by_level: dict[int, list[int]] = {}
-    for each in right:
-        is_feetech = bus.table_of(each).facts.is_feetech
-        by_level.setdefault(1 if is_feetech else ALL_REPLY, []).append(each)
+    for servo_id in right:
+        is_feetech = bus.table_of(servo_id).facts.is_feetech
+        by_level.setdefault(1 if is_feetech else ALL_REPLY, []).append(servo_id)
     for level, ids in by_level.items():
         bus.sync_write(ids, "Status Return Level", level)
-    return found
+    return replies
 
 
 def _ids_in_words(ids: Sequence[int]) -> str:

@@ -61,9 +61,9 @@ class TorqueOff:
         """Raise the error of servos that are not off, if any; ``faults`` are of the lost ports."""
         names = ", ".join(map(self._robot.joint_label, silent))
         if faults:
-            ids = [each for part in faults for each in self._ids_of(self._joints_on(part))]
+            ids = [servo_id for part in faults for servo_id in self._ids_of(self._joints_on(part))]
             hold = "its servos hold their last goals"
-            if all(WATCHDOG in self._bus.table_of(each) for each in ids):
+            if all(WATCHDOG in self._bus.table_of(servo_id) for servo_id in ids):
                 hold = f"its servos hold after the bus watchdog ({self._watchdog_s:.3g} s)"
             gone = [*faults.values()]
             text = (
@@ -115,7 +115,7 @@ class TorqueOff:
         while silent and self._clock.now_s() < give_up_s:
             silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
-        if confirmed and all(WATCHDOG in bus.table_of(each) for each in confirmed):
+        if confirmed and all(WATCHDOG in bus.table_of(servo_id) for servo_id in confirmed):
             bus.sync_write(confirmed, WATCHDOG, 0)
             # the port may be closed next: a reply shows that the packet has arrived
             bus.block(confirmed, WATCHDOG, WATCHDOG, fast=False).read()

@@ -55,14 +55,14 @@ def holders_of(device: str) -> list[PortHolder]:
     """
     path = os.path.realpath(device)
     lockers = lockers_of(path)
-    found = []
+    holders = []
     for process in sorted(filter(str.isdigit, _listed(PROC)), key=int):
         files = tuple(open_files(process))
         if path in files or process in lockers:
             with suppress(OSError):  # just ended
                 user = _user_name(os.stat(f"{PROC}/{process}").st_uid)
-                found.append(PortHolder(int(process), _program(process), user, files))
-    return found
+                holders.append(PortHolder(int(process), _program(process), user, files))
+    return holders
 
 
 def lockers_of(path: str) -> set[str]:
@@ -93,9 +93,9 @@ def _listed(folder: str) -> list[str]:
 def open_files(process: str) -> Iterator[str]:
     """Yield the paths of a process's open files; none if it is hidden."""
     folder = f"{PROC}/{process}/fd"
-    for each in _listed(folder):
+    for entry in _listed(folder):
         with suppress(OSError):  # closed just now, like the listing's own
-            yield os.readlink(f"{folder}/{each}")
+            yield os.readlink(f"{folder}/{entry}")
 
 
 def _program(process: str) -> str:

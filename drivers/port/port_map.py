@@ -23,17 +23,19 @@ def parse_port_map(text: str) -> list[tuple[str, tuple[int, ...]]]:
         InputError: unreadable text, an ID outside 0 to 252, or a reversed range.
 
     """
-    found = []
-    at = 0
-    while at < len(text):
-        segment = _SEGMENT.match(text, at)
+    segments = []
+    end = 0
+    while end < len(text):
+        segment = _SEGMENT.match(text, end)
         if segment is None:
-            raise InputError(f"--port {text}: {text[at:]!r} names no IDs and port; {_EXAMPLE}")
+            raise InputError(f"--port {text}: {text[end:]!r} names no IDs and port; {_EXAMPLE}")
         pieces = segment["ids"].rstrip(", ").split(",")
-        ids = [each for piece in pieces for each in id_range(piece, f"--port {text}", _EXAMPLE)]
-        found.append((segment["port"].strip(), tuple(ids)))
-        at = segment.end()
-    return found
+        ids = [
+            servo_id for piece in pieces for servo_id in id_range(piece, f"--port {text}", _EXAMPLE)
+        ]
+        segments.append((segment["port"].strip(), tuple(ids)))
+        end = segment.end()
+    return segments
 
 
 def ports_in(text: str) -> list[str]:
@@ -66,7 +68,7 @@ def id_range(piece: str, source: str, example: str) -> range:
         raise InputError(f"{source}: {piece!r} is no ID; {example}") from None
     if high < low:
         raise InputError(f"{source}: {piece} runs backwards")
-    wrong = [each for each in (low, high) if not 0 <= each <= LAST_ID]
+    wrong = [value for value in (low, high) if not 0 <= value <= LAST_ID]
     if wrong:
         raise InputError(f"{source}: ID {wrong[0]}: a servo has 0 to {LAST_ID}")
     return range(low, high + 1)
@@ -74,9 +76,9 @@ def id_range(piece: str, source: str, example: str) -> range:
 
 def _ids_text(ids: Sequence[int]) -> str:
     runs: list[list[int]] = []
-    for each in ids:
-        if runs and each == runs[-1][-1] + 1:
-            runs[-1].append(each)
+    for servo_id in ids:
+        if runs and servo_id == runs[-1][-1] + 1:
+            runs[-1].append(servo_id)
         else:
-            runs.append([each])
+            runs.append([servo_id])
     return ",".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)

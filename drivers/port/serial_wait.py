@@ -106,7 +106,7 @@ def receive(  # noqa: C901  a compiled loop
     """
     time = np.empty(2, np.int64)  # struct timespec
     awaited = np.empty(1, np.int64)  # struct pollfd: descriptor, events, returned events
-    here = reply.ctypes.data
+    data_address = reply.ctypes.data
     count = len(reply) - 1
     got = 0
     if spin_ns > 0:
@@ -120,7 +120,7 @@ def receive(  # noqa: C901  a compiled loop
         in_time = sleep_ns > 0 and here_ns < expected_ns
         polled = False
         while not polled or here_ns < expected_ns + spin_ns:
-            more = int(_read(fd, here + got, count + 1 - got))
+            more = int(_read(fd, data_address + got, count + 1 - got))
             got += max(more, 0)
             if got >= count:
                 if polled:
@@ -144,12 +144,12 @@ def receive(  # noqa: C901  a compiled loop
         awaited[0] = fd | _POLLIN << 32
         if _ppoll(awaited.ctypes.data, 1, time.ctypes.data, 0) <= 0:
             return got  # the deadline, or a signal
-        more = int(_read(fd, here + got, count + 1 - got))
+        more = int(_read(fd, data_address + got, count + 1 - got))
         if more <= 0:
             return got  # the device is gone
         got += more
         while more == _PIECE and got < count:
-            more = int(_read(fd, here + got, count + 1 - got))
+            more = int(_read(fd, data_address + got, count + 1 - got))
             got += max(more, 0)
         if got >= count:
             if spin_ns > 0:

@@ -163,6 +163,9 @@ def _table(facts: ServoModel) -> ControlTable:
         for name, row in facts.registers.items()
     }
     for address, data, _ in facts.indirect[:1]:
-        for name, at, size in (("Indirect Address 1", address, 2), ("Indirect Data 1", data, 1)):
-            registers[name] = Register(name, at, size, signed=False)
+        for name, start_address, size in (
+            ("Indirect Address 1", address, 2),
+            ("Indirect Data 1", data, 1),
+        ):
+            registers[name] = Register(name, start_address, size, signed=False)
     return ControlTable(facts, MappingProxyType(registers))

@@ -77,7 +77,7 @@ ALARM_BITS: Final = sum(_ALARMS)
 
 def alarm_of(status: int) -> int:
     """``registers.Alarm`` bits of a servo status."""
-    return sum(bit for own, bit in _ALARMS.items() if status & own)
+    return sum(bit for feetech_bit, bit in _ALARMS.items() if status & feetech_bit)
 
 
 def shutdown_alarms(facts: ServoModel) -> int:
@@ -139,18 +139,18 @@ class BlockFormat:
     def convert(self, blocks: Bytes) -> Bytes:
         """Converted copy of blocks (N, length)."""
         out = blocks.copy()
-        for at in self._swapped:
-            out[:, at], out[:, at + 1] = blocks[:, at + 1], blocks[:, at]
-        for at, bit in self._signs:
+        for offset in self._swapped:
+            out[:, offset], out[:, offset + 1] = blocks[:, offset + 1], blocks[:, offset]
+        for index, bit in self._signs:
             raw: NDArray[np.int32] = (
-                out[:, at].astype(np.int32) | out[:, at + 1].astype(np.int32) << 8
+                out[:, index].astype(np.int32) | out[:, index + 1].astype(np.int32) << 8
             )
             magnitude = raw & (1 << bit) - 1
             value = np.where(raw >> bit & 1, -magnitude, magnitude)
-            out[:, at], out[:, at + 1] = value & 0xFF, value >> 8 & 0xFF
+            out[:, index], out[:, index + 1] = value & 0xFF, value >> 8 & 0xFF
         if self._status is not None:
             column = out[:, self._status]
-            column[:] = [alarm_of(int(each)) for each in column]
+            column[:] = [alarm_of(int(status)) for status in column]
         return out
 
 
@@ -173,13 +173,13 @@ class FeetechParser:
         packets: list[StatusPacket] = []
         buffer += data
         while True:
-            at = buffer.find(HEADER)
-            if at < 0:
-                at = len(buffer) - buffer.endswith(b"\xff")
-            while buffer[at + 2 : at + 3] == b"\xff":
-                at += 1  # an ID is never FF: the header begins one byte later
-            self.dropped_bytes += at
-            del buffer[:at]
+            start = buffer.find(HEADER)
+            if start < 0:
+                start = len(buffer) - buffer.endswith(b"\xff")
+            while buffer[start + 2 : start + 3] == b"\xff":
+                start += 1  # an ID is never FF: the header begins one byte later
+            self.dropped_bytes += start
+            del buffer[:start]
             if len(buffer) < 4 or (buffer[3] >= 2 and len(buffer) < 4 + buffer[3]):
                 return packets
             end = 4 + buffer[3]

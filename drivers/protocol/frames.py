@@ -60,23 +60,23 @@ def read_plain(raw: Bytes, heads: Bytes, data: Bytes, error: Bytes) -> int:
     size = length + HEAD + 3
     if len(raw) != count * size:
         return IRREGULAR
-    found = FLAWLESS
+    outcome = FLAWLESS
     for servo in range(count):
-        at = servo * size
-        end = at + size
+        offset = servo * size
+        end = offset + size
         for k in range(HEAD):
-            if raw[at + k] != heads[servo, k]:
+            if raw[offset + k] != heads[servo, k]:
                 return IRREGULAR
-        if crc_of(raw, at, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
+        if crc_of(raw, offset, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
             return IRREGULAR
-        if header_in(raw, at + HEAD, end):
+        if header_in(raw, offset + HEAD, end):
             return IRREGULAR
-        error[servo] = raw[at + HEAD]
+        error[servo] = raw[offset + HEAD]
         if error[servo]:
-            found = WITH_ERRORS
+            outcome = WITH_ERRORS
         for k in range(length):
-            data[servo, k] = raw[at + HEAD + 1 + k]
-    return found
+            data[servo, k] = raw[offset + HEAD + 1 + k]
+    return outcome
 
 
 @compiled(f"int64({_RAW}, {_ROW}, {_ROW}, {_ROWS}, {_ROW})", makes_arrays=False)
@@ -91,17 +91,17 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
             return IRREGULAR
     if crc_of(raw, 0, end - 2, 0) != int(raw[end - 2]) | int(raw[end - 1]) << 8:
         return IRREGULAR
-    found = FLAWLESS
+    outcome = FLAWLESS
     for servo in range(count):
-        at = HEAD + servo * (length + 4)
-        if raw[at + 1] != ids[servo]:
+        offset = HEAD + servo * (length + 4)
+        if raw[offset + 1] != ids[servo]:
             return IRREGULAR
-        error[servo] = raw[at]
+        error[servo] = raw[offset]
         if error[servo]:
-            found = WITH_ERRORS
+            outcome = WITH_ERRORS
         for k in range(length):
-            data[servo, k] = raw[at + 2 + k]
-    return found
+            data[servo, k] = raw[offset + 2 + k]
+    return outcome
 
 
 @compiled(f"boolean({_ROW}, int32[::1])", makes_arrays=False)

@@ -124,8 +124,8 @@ def _rotation(halves: bytes) -> Floats | None:
     square = float(vector @ vector)
     if not any(halves) or not square <= QUATERNION_NORM_MAX:  # NaN is rejected too
         return None
-    whole = [*vector, np.sqrt(max(0.0, 1.0 - square))]
-    return np.asarray(rotations().from_quat(whole).as_matrix())
+    quaternion = [*vector, np.sqrt(max(0.0, 1.0 - square))]
+    return np.asarray(rotations().from_quat(quaternion).as_matrix())
 
 
 def encode(imu: ImuConfig, rate_rad_s: Floats, force_m_s2: Floats, rotation: Floats) -> bytes:

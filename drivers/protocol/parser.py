@@ -49,48 +49,50 @@ class PacketParser:
         buffer = self._buffer
         buffer += data
         packets: list[Packet] = []
-        at = 0
+        position = 0
         while True:
-            found = self._next_header(at)
-            self.dropped_bytes += found - at
-            at = found
-            if len(buffer) - at < _FIXED + 3:
+            header_start = self._next_header(position)
+            self.dropped_bytes += header_start - position
+            position = header_start
+            if len(buffer) - position < _FIXED + 3:
                 break
-            servo_id = buffer[at + 4]
-            length = buffer[at + 5] | buffer[at + 6] << 8
-            shortest = 4 if buffer[at + 7] == STATUS else 3
+            servo_id = buffer[position + 4]
+            length = buffer[position + 5] | buffer[position + 6] << 8
+            shortest = 4 if buffer[position + 7] == STATUS else 3
             possible = servo_id <= MAX_ID or servo_id == BROADCAST_ID
             if not possible or not shortest <= length <= self.max_length:
-                at = self._skip(at)
+                position = self._skip(position)
                 continue
-            end = at + _FIXED + length
+            end = position + _FIXED + length
             if end > len(buffer):
                 break
-            if crc16(buffer[at : end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:
+            if crc16(buffer[position : end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:
                 self.crc_errors += 1
-                at = self._skip(at)
+                position = self._skip(position)
                 continue
-            packet = self._decode(servo_id, buffer[at + 7], bytes(buffer[at + 8 : end - 2]))
+            packet = self._decode(
+                servo_id, buffer[position + 7], bytes(buffer[position + 8 : end - 2])
+            )
             if packet is not None:
                 packets.append(packet)
             else:
                 self.stuffing_errors += 1
-                self.dropped_bytes += end - at
-            at = end
-        del buffer[:at]
+                self.dropped_bytes += end - position
+            position = end
+        del buffer[:position]
         return packets
 
-    def _skip(self, at: int) -> int:
+    def _skip(self, position: int) -> int:
         self.dropped_bytes += 1
-        return at + 1
+        return position + 1
 
-    def _next_header(self, at: int) -> int:
-        """Index of the next header from ``at``, or of a header cut off at the end."""
-        found = self._buffer.find(HEADER, at)
-        if found >= 0:
-            return found
+    def _next_header(self, position: int) -> int:
+        """Index of the next header from ``position``, or of a header cut off at the end."""
+        start = self._buffer.find(HEADER, position)
+        if start >= 0:
+            return start
         for kept in (3, 2, 1):
-            if len(self._buffer) - at >= kept and self._buffer.endswith(HEADER[:kept]):
+            if len(self._buffer) - position >= kept and self._buffer.endswith(HEADER[:kept]):
                 return len(self._buffer) - kept
         return len(self._buffer)
 

@@ -75,13 +75,13 @@ class Reader1:
         buffer = self._buffer
         buffer += data
         while True:
-            at = buffer.find(HEADER)
-            if at < 0:
+            start = buffer.find(HEADER)
+            if start < 0:
                 del buffer[: max(0, len(buffer) - 1)]
                 return
-            while at + 2 < len(buffer) and buffer[at + 2] == 0xFF:
-                at += 1  # an ID is never FF: the header begins one byte later
-            del buffer[:at]
+            while start + 2 < len(buffer) and buffer[start + 2] == 0xFF:
+                start += 1  # an ID is never FF: the header begins one byte later
+            del buffer[:start]
             if len(buffer) < 4 or len(buffer) < 4 + buffer[3]:
                 return
             if buffer[3] < 2:

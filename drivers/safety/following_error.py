@@ -240,7 +240,7 @@ def _steady_joint(
 
     """
     is_paused = time_s - last_s > LONGEST_STEP_S
-    found = -1
+    joint_index = -1
     for k in range(len(goal_rad)):
         full_a, limit_a = rules[3, k], rules[4, k]
         change_a = min(CHANGED_OUTPUT * full_a, CHANGED_LIMIT * limit_a)
@@ -267,10 +267,10 @@ def _steady_joint(
         if (1.0 - AT_LIMIT) * limit_a <= pushing_a <= (1.0 + AT_LIMIT) * limit_a:
             continue  # it pushes with all that it may, and friction holds it there
         if (
-            found < 0
+            joint_index < 0
             and share >= IDLE_OUTPUT
             and time_s - steady[0, k] >= IDLE_TIME_S
             and steady[4, k] - steady[3, k] >= change_a
         ):
-            found = k
-    return found
+            joint_index = k
+    return joint_index

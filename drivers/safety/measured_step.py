@@ -64,8 +64,8 @@ class MeasuredSteps:
         doubted &= state.valid
         self._remember(doubted, state)
         if not doubted.any():
-            held = ~state.valid & (position_rad != believed.position_rad)
-            return (_held(state, believed, held) if held.any() else state), None
+            is_held = ~state.valid & (position_rad != believed.position_rad)
+            return (_held(state, believed, is_held) if is_held.any() else state), None
         joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
         doubt = (
             f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
@@ -106,15 +106,15 @@ def _is_all_believable(
     return True
 
 
-def _held(state: JointState, believed: JointState, held: np.ndarray) -> JointState:
-    """State with the credible values of the joints in ``held`` (J,)."""
+def _held(state: JointState, believed: JointState, is_held: np.ndarray) -> JointState:
+    """State with the credible values of the joints in ``is_held`` (J,)."""
     age_s = believed.age_s + (state.time_s - believed.time_s)
     arrays = {
-        "position_rad": np.where(held, believed.position_rad, state.position_rad),
-        "velocity_rad_s": np.where(held, believed.velocity_rad_s, state.velocity_rad_s),
-        "current_a": np.where(held, believed.current_a, state.current_a),
-        "age_s": np.where(held, age_s, state.age_s),
-        "valid": state.valid & ~held,
+        "position_rad": np.where(is_held, believed.position_rad, state.position_rad),
+        "velocity_rad_s": np.where(is_held, believed.velocity_rad_s, state.velocity_rad_s),
+        "current_a": np.where(is_held, believed.current_a, state.current_a),
+        "age_s": np.where(is_held, age_s, state.age_s),
+        "valid": state.valid & ~is_held,
     }
     for array in arrays.values():
         array.setflags(write=False)

@@ -59,7 +59,7 @@ class RecoverableLink(Protocol[C]):
         """Compare the chain with its earlier state and its joints with credible positions."""
         ...
 
-    def resume(self, found: C) -> JointState:
+    def resume(self, state_check: C) -> JointState:
         """Continue from the present positions."""
         ...
 
@@ -159,22 +159,22 @@ class Recovery(Generic[C]):
         joint: int | None = None,
     ) -> JointState | None:
         self._on_event(event)
-        found = self._wait(believed_rad, stopped, joint)
-        if found is None:
+        checked = self._wait(believed_rad, stopped, joint)
+        if checked is None:
             return None
-        self._on_event(f"verified: {found}")
-        doubt = found.doubt if joint is None else None  # a rebooted servo is known
+        self._on_event(f"verified: {checked}")
+        doubt = checked.doubt if joint is None else None  # a rebooted servo is known
         if doubt is not None and self._confirm is None:
             raise ChainError(f"{doubt}; check that it is the same robot, then start again")
         is_asked = self._policy == "confirm" or doubt is not None
-        if is_asked and not (self._confirm and self._confirm(str(found))):
+        if is_asked and not (self._confirm and self._confirm(str(checked))):
             self._give_up("not confirmed" if self._confirm else "not confirmed: nobody to ask")
             return None
         why = stopped()
         if why is not None:
             self._give_up(f"given up: {why}", why)
             return None
-        state = self._chain.resume(found)
+        state = self._chain.resume(checked)
         self._on_event("going on from where it stands")
         return state
 
@@ -186,21 +186,21 @@ class Recovery(Generic[C]):
         The servo of ``joint`` is rebooted; a later alarm ends the wait.
         """
         give_up_s = self._clock.now_s() + self._patience_s
-        held = False
+        is_holding = False
         to_reboot = joint
         while True:
             try:
-                if not held:
+                if not is_holding:
                     self._chain.hold()
-                    held = True
+                    is_holding = True
                 if to_reboot is not None:
                     self._chain.reboot(to_reboot)
                     to_reboot = None
-                found = self._chain.recheck(believed_rad)
-                last = str(found)
-                if not found.faults:
-                    return found
-                if joint is not None and any(f.cause is FaultCause.ALARM for f in found.faults):
+                checked = self._chain.recheck(believed_rad)
+                last = str(checked)
+                if not checked.faults:
+                    return checked
+                if joint is not None and any(f.cause is FaultCause.ALARM for f in checked.faults):
                     give_up_s = -math.inf
             except PortError as error:
                 last = self._try_reopen() or str(error)

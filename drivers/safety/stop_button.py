@@ -85,7 +85,7 @@ class StopButton:
         # locked and filled before it gets its final name; Windows cannot rename an open file
         kind = "" if _HAS_LOCKS else BUTTON_SUFFIX
         try:
-            self._file, made = _new_file(place, kind)
+            self._file, path = _new_file(place, kind)
             # written, not truncated to its size: on a full disk a sparse map kills the program
             os.write(self._file, bytes(_BYTES))
         except OSError as error:
@@ -95,10 +95,10 @@ class StopButton:
         self._calls = 0
         self._map = mmap.mmap(self._file, _BYTES)
         _write_text(self._map, _RUN, json.dumps(asdict(self.run)))
-        self.path = made.with_suffix(BUTTON_SUFFIX)
+        self.path = path.with_suffix(BUTTON_SUFFIX)
         """Path of the file, for programs that may press it."""
         if not kind:
-            os.replace(made, self.path)
+            os.replace(path, self.path)
 
     def __enter__(self) -> Self:
         return self
@@ -110,8 +110,8 @@ class StopButton:
         trace: TracebackType | None,
     ) -> None:
         notes = notes_of(error)
-        told = [str(error)] if isinstance(error, Exception) else []  # else a signal, or the exit
-        self.end("; ".join([*told, *notes]) or (str(error) if error is not None else ""))
+        reasons = [str(error)] if isinstance(error, Exception) else []  # else a signal, or the exit
+        self.end("; ".join([*reasons, *notes]) or (str(error) if error is not None else ""))
 
     def pressed(self) -> str | None:
         """Reason to stop, for ``SafeLink(stop_requested=...)``; None while not pressed."""
@@ -180,8 +180,8 @@ class PressedButton:
                     f"{path}: is not a stop button of this user; name a run of this user"
                 )
             self._map = mmap.mmap(self._file, _BYTES)
-            known = _parsed(_read_text(self._map, _RUN))
-            self.run = StoppableRun(**known | {"ports": tuple(known["ports"])})
+            run_facts = _parsed(_read_text(self._map, _RUN))
+            self.run = StoppableRun(**run_facts | {"ports": tuple(run_facts["ports"])})
             self.since_s = info.st_mtime
             """Time of day at which it was made, s."""
         except BaseException:
@@ -284,7 +284,7 @@ def stoppable_runs() -> Iterator[PressedButton]:
 
     Files of killed programs are deleted.
     """
-    found = []
+    buttons = []
     for folder in button_folders():
         if not _is_private(folder):
             continue
@@ -292,11 +292,11 @@ def stoppable_runs() -> Iterator[PressedButton]:
             with suppress(OSError, ValueError, TypeError, KeyError):  # just removed, or no button
                 button = PressedButton(path)
                 if button.is_held:
-                    found.append(button)
+                    buttons.append(button)
                 else:
                     path.unlink(missing_ok=True)
                     button.close()
-    yield from sorted(found, key=lambda button: button.since_s, reverse=True)
+    yield from sorted(buttons, key=lambda button: button.since_s, reverse=True)
 
 
 def _is_private(folder: Path) -> bool:
@@ -323,12 +323,12 @@ def _parsed(text: str) -> dict[str, Any]:
 
     """
     try:
-        known = json.loads(text)
+        facts = json.loads(text)
     except RecursionError:
         raise ValueError("too many brackets") from None
-    if not isinstance(known, dict):
+    if not isinstance(facts, dict):
         raise ValueError("no description of a run")
-    return known
+    return facts
 
 
 def _refuse_used_urls(ports: Iterable[str]) -> None:

@@ -198,11 +198,11 @@ def parse_stop_output(text: str) -> StopOutput:
     """
     if "\0" in text:
         raise ValueError(f"{text!r}: has a NUL character; leave it out")
-    kind, found, rest = text.partition(":")
+    kind, separator, rest = text.partition(":")
     line = kind.removeprefix("-")
-    if found and rest and line in _LINES:
+    if separator and rest and line in _LINES:
         return StopLine(rest, line, is_inverted=kind != line)
-    if found and kind == "command":
+    if separator and kind == "command":
         try:
             words = tuple(shlex.split(rest))
         except ValueError as error:

@@ -50,8 +50,10 @@ class SafetyMemory(NamedTuple):
     @staticmethod
     def at_rest(state: JointState) -> "SafetyMemory":
         """Memory of joints that hold the pose in ``state``."""
-        held = np.array(state.position_rad, float)
-        return SafetyMemory(state.time_s, held, _never(len(held)), _never(len(held)))
+        position_rad = np.array(state.position_rad, float)
+        return SafetyMemory(
+            state.time_s, position_rad, _never(len(position_rad)), _never(len(position_rad))
+        )
 
 
 class Verdict(NamedTuple):
