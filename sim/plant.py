@@ -58,8 +58,12 @@ class ServoDrive:
         joints = len(self.torque_on)
         for output in ("current_a", "torque_n_m", "pwm", *_ENERGIES):
             object.__setattr__(self, output, np.zeros(joints))
-        for each in self.columns():
-            if each.dtype != np.float64 or each.shape != (joints,) or not each.flags.c_contiguous:
+        for column in self.columns():
+            if (
+                column.dtype != np.float64
+                or column.shape != (joints,)
+                or not column.flags.c_contiguous
+            ):
                 raise TypeError(f"a drive holds contiguous float64 arrays of {joints} joints")
 
     def columns(self) -> tuple[Floats, ...]:

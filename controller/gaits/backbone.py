@@ -64,8 +64,8 @@ class SpaceCurve:
             )
         count = int(np.ceil(run[-1] / robot.mean_link_length_m * SAMPLES_A_LINK)) + 1
         self.run_m = np.linspace(0.0, run[-1], count)
-        at = np.interp(self.run_m, run, fine)
-        self.points_m: Floats = np.asarray(spline(at))
+        fine_parameter = np.interp(self.run_m, run, fine)
+        self.points_m: Floats = np.asarray(spline(fine_parameter))
         self._by_run = CubicSpline(self.run_m, self.points_m)
         tangents = self._by_run(self.run_m, 1)
         self.tangents: Floats = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
@@ -184,14 +184,14 @@ def _seed(robot: "RobotConfig", curve: SpaceCurve, roll_rad: float) -> tuple[Flo
             first = up
     joints = np.zeros(robot.joint_count)
     joint_ends = np.array(robot.link_ends)
-    for column, own in ((0, robot.yaw_joints), (1, robot.pitch_joints)):
-        if not own:
+    for column, axis_joints in ((0, robot.yaw_joints), (1, robot.pitch_joints)):
+        if not axis_joints:
             continue
-        at = joint_ends[np.array(own) + 1]
-        apart = float(at[-1] - at[0]) / max(len(own) - 1, 1) or 1.0
-        reach = at[:, None] + 0.5 * apart * np.array([-1.0, 1.0])
+        places_m = joint_ends[np.array(axis_joints) + 1]
+        spacing_m = float(places_m[-1] - places_m[0]) / max(len(axis_joints) - 1, 1) or 1.0
+        reach = places_m[:, None] + 0.5 * spacing_m * np.array([-1.0, 1.0])
         ends = np.interp(reach * robot.mean_link_length_m, curve.run_m, bend[:, column])
-        joints[list(own)] = ends[:, 1] - ends[:, 0]
+        joints[list(axis_joints)] = ends[:, 1] - ends[:, 0]
     start = forward[: round(SAMPLES_A_LINK * joint_ends[1]) + 1].mean(axis=0)
     start /= np.linalg.norm(start)
     top = first - (first @ start) * start

@@ -42,11 +42,11 @@ class Concertina(Gait):
         p = self.params
         yaw = robot.yaw_joints
         joints = np.zeros((len(phase_rad), robot.joint_count))
-        at = group_places(robot, yaw)
+        group_position = group_places(robot, yaw)
         half = 0.5 * p.share
         turn = np.mod(phase_rad, TURN) / TURN
         centre = (1.0 + half - turn * (1.0 + p.share))[:, None]
-        edge = np.clip((1.0 - np.abs(at - centre) / half) / EDGE, 0.0, 1.0)
-        headings = p.winding_rad * cubic(edge) * np.sin(TURN * p.folds * at)
+        edge = np.clip((1.0 - np.abs(group_position - centre) / half) / EDGE, 0.0, 1.0)
+        headings = p.winding_rad * cubic(edge) * np.sin(TURN * p.folds * group_position)
         joints[:, yaw] = bends_rad(robot, yaw, headings)
         return joints

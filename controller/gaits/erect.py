@@ -51,12 +51,14 @@ class ErectGait(LegGait):
                 continue
             joints[:, first + k] = -p.stance_rad
             left = (joint.side == "left") != p.mirror
-            at = (phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]) % 1.0
+            cycle_share = (
+                phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]
+            ) % 1.0
             shorter = max(p.turn if left else -p.turn, 0.0)
             upper_m, lower_m = pair.segments_m[1:]
             leg_m = upper_m + lower_m
-            forward_m = leg_m * (1.0 - shorter) * p.stride * swing(at, self.duty)
-            down_m = leg_m * (p.reach - p.lift * lift(at, self.duty))
+            forward_m = leg_m * (1.0 - shorter) * p.stride * swing(cycle_share, self.duty)
+            down_m = leg_m * (p.reach - p.lift * lift(cycle_share, self.duty))
             hip, knee = hip_and_knee_rad(forward_m, down_m, upper_m, lower_m)
             joints[:, first + k + 1], joints[:, first + k + 2] = hip, knee
         return joints

@@ -43,11 +43,11 @@ class Needs:
             InputError: the joints are missing.
 
         """
-        for wanted, have, axis in (
+        for is_needed, have, axis in (
             (self.yaw, robot.yaw_joints, "yaw"),
             (self.pitch, robot.pitch_joints, "pitch"),
         ):
-            if wanted and not have:
+            if is_needed and not have:
                 raise InputError(
                     f"{what} needs {axis} joints; robot {robot.name} has none "
                     f"(joint_axes {robot.joint_axes})"
@@ -67,10 +67,10 @@ class Needs:
 
 def fitting_robot(needs: Iterable[Needs]) -> str:
     """Name of a shipped robot that has the joints of all given motions."""
-    wanted = list(needs)
-    if any(each.legs for each in wanted):
-        return "quadruped" if any(each.leg_axes for each in wanted) else "salamander"
-    return "alternating16" if any(each.pitch for each in wanted) else "yaw16"
+    all_needs = list(needs)
+    if any(need.legs for need in all_needs):
+        return "quadruped" if any(need.leg_axes for need in all_needs) else "salamander"
+    return "alternating16" if any(need.pitch for need in all_needs) else "yaw16"
 
 
 Frequency = Annotated[float, Field(ge=0.0, le=2.0, description="cycles a second")]
@@ -183,15 +183,15 @@ class Range:
 
 def ranges(model: type[GaitParameters]) -> dict[str, Range]:
     """Ranges by parameter, in the order of the model; 0 to 1 for a switch."""
-    found: dict[str, Range] = {}
+    ranges_by_name: dict[str, Range] = {}
     kinds: dict[object, type] = {int: int, bool: bool}
     for name, field in model.model_fields.items():
         bounds = {"gt": 0.0, "lt": 1.0} | bounds_of(field)
-        found[name] = Range(
+        ranges_by_name[name] = Range(
             kind=kinds.get(field.annotation, float),
             default=float(field.default),
             low=float(bounds.get("ge", bounds["gt"])),
             high=float(bounds.get("le", bounds["lt"])),
             description=description_of(field),
         )
-    return found
+    return ranges_by_name

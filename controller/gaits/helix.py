@@ -46,15 +46,17 @@ def helix_joints_rad(
     curvature = math.cos(rise_rad) ** 2 / radius_m
     torsion = hand * math.sin(rise_rad) * math.cos(rise_rad) / radius_m
     joints = np.zeros((len(phase_rad), robot.joint_count))
-    for own, lead in ((robot.yaw_joints, 0.0), (robot.pitch_joints, -0.5 * np.pi)):
-        if not own:
+    for axis_joints, lead in ((robot.yaw_joints, 0.0), (robot.pitch_joints, -0.5 * np.pi)):
+        if not axis_joints:
             continue
         ends = robot.link_ends
-        apart = (ends[own[-1] + 1] - ends[own[0] + 1]) / max(len(own) - 1, 1)
-        stretch_m = robot.mean_link_length_m * (apart or 1.0)
+        spacing_m = (ends[axis_joints[-1] + 1] - ends[axis_joints[0] + 1]) / max(
+            len(axis_joints) - 1, 1
+        )
+        stretch_m = robot.mean_link_length_m * (spacing_m or 1.0)
         bend = curvature * stretch_m * np.sinc(0.5 * torsion * stretch_m / np.pi)
-        angle = lead - torsion * robot.length_m * places(robot, own)
-        joints[:, own] = bend * np.cos(phase_rad[:, None] + angle)
+        angle = lead - torsion * robot.length_m * places(robot, axis_joints)
+        joints[:, axis_joints] = bend * np.cos(phase_rad[:, None] + angle)
     return joints
 
 

@@ -36,10 +36,10 @@ BROKEN: Final[dict[str, str]] = {}
 
 def gaits_by_name() -> dict[str, type[Gait]]:
     """Return the gaits by name; ``docs/how-to/add-a-gait.md`` describes how to add one."""
-    found: dict[str, type[Gait]] = {}
+    by_name: dict[str, type[Gait]] = {}
     for gait in (*_gaits(), *_foreign_gaits()):
-        found.setdefault(gait.name, gait)
-    return found
+        by_name.setdefault(gait.name, gait)
+    return by_name
 
 
 def _foreign_gaits() -> Iterator[type[Gait]]:
@@ -58,18 +58,20 @@ def _foreign_gaits() -> Iterator[type[Gait]]:
 
 def _gaits() -> Iterator[type[Gait]]:
     """Yield the gaits of each module in the order of their definition."""
-    found = {each.name for each in iter_modules(gaits.__path__) if not each.ispkg}
-    for name in [*_FIRST, *sorted(found - {*_FIRST, *_WITHOUT_GAITS})]:
+    modules = {
+        module_info.name for module_info in iter_modules(gaits.__path__) if not module_info.ispkg
+    }
+    for name in [*_FIRST, *sorted(modules - {*_FIRST, *_WITHOUT_GAITS})]:
         module = import_module(f"{gaits.__name__}.{name}")
-        for each in vars(module).values():
+        for value in vars(module).values():
             if (
-                isinstance(each, type)
-                and issubclass(each, Gait)
-                and each.__module__ == module.__name__
-                and not inspect.isabstract(each)
-                and hasattr(each, "name")
+                isinstance(value, type)
+                and issubclass(value, Gait)
+                and value.__module__ == module.__name__
+                and not inspect.isabstract(value)
+                and hasattr(value, "name")
             ):
-                yield each
+                yield value
 
 
 GAITS: Final = gaits_by_name()

@@ -32,9 +32,9 @@ class Rolling(Gait):
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         joints = np.zeros((len(phase_rad), robot.joint_count))
-        for own, wave in (
+        for joints_of_axis, wave in (
             (robot.yaw_joints, np.cos(phase_rad)),
             (robot.pitch_joints, np.sin(phase_rad)),
         ):
-            joints[:, own] = self.params.bend_rad / len(own) * wave[:, None]
+            joints[:, joints_of_axis] = self.params.bend_rad / len(joints_of_axis) * wave[:, None]
         return joints

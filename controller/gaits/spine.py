@@ -95,10 +95,10 @@ class SpineGait(Gait):
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params
-        own = robot.pitch_joints if self.vertical else robot.yaw_joints
-        edges = np.concatenate([[0.0], places(robot, own), [1.0]])
+        bent_joints = robot.pitch_joints if self.vertical else robot.yaw_joints
+        edges = np.concatenate([[0.0], places(robot, bent_joints), [1.0]])
         joints = np.zeros((len(phase_rad), robot.joint_count))
-        joints[:, own] = spine_bends_rad(phase_rad, len(own), p, edges)
+        joints[:, bent_joints] = spine_bends_rad(phase_rad, len(bent_joints), p, edges)
         if robot.yaw_joints:
             joints[:, robot.yaw_joints] += p.turn_rad / len(robot.yaw_joints)
         for k, joint in enumerate(robot.limb_joints):

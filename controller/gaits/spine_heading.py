@@ -25,13 +25,13 @@ def write_headings(
         back = u[0]
         left = side[0]
         for k in range(len(shares)):
-            at = shares[k] * run[-1]
-            while i < len(u) - 2 and run[i + 1] < at:
+            target_m = shares[k] * run[-1]
+            while i < len(u) - 2 and run[i + 1] < target_m:
                 i += 1
-            part = (at - run[i]) / (run[i + 1] - run[i])
-            here = u[i] + part * (u[i + 1] - u[i])
+            part = (target_m - run[i]) / (run[i + 1] - run[i])
+            coordinate = u[i] + part * (u[i + 1] - u[i])
             aside = side[i] + part * (side[i + 1] - side[i])
             if k > 0:
-                headings[t, k - 1] = np.arctan2(left - aside, here - back)
-            back = here
+                headings[t, k - 1] = np.arctan2(left - aside, coordinate - back)
+            back = coordinate
             left = aside

@@ -61,13 +61,17 @@ class LegGait(Gait, ABC):
         first = robot.link_count - 1
         for k, joint in enumerate(robot.limb_joints):
             left = (joint.side == "left") != p.mirror
-            at = (phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]) % 1.0
+            cycle_share = (
+                phase_rad / TURN - self.offsets[2 * joint.pair + (0 if left else 1)]
+            ) % 1.0
             axis = robot.limbs[joint.pair].joint_axes[joint.place]
             if axis == "y":
                 shorter = max(p.turn if left else -p.turn, 0.0)
-                joints[:, first + k] = (1.0 - shorter) * p.stride_rad * swing(at, self.duty)
+                joints[:, first + k] = (
+                    (1.0 - shorter) * p.stride_rad * swing(cycle_share, self.duty)
+                )
             elif joint.place == _first_roll(robot.limbs[joint.pair].joint_axes):
-                joints[:, first + k] = -p.stance_rad + p.lift_rad * lift(at, self.duty)
+                joints[:, first + k] = -p.stance_rad + p.lift_rad * lift(cycle_share, self.duty)
         return joints
 
     def _bend(self, robot: "RobotConfig", phase_rad: Floats, joints: Floats) -> None:

@@ -40,16 +40,16 @@ def joint_amplitude_rad(
     """
     ends = robot.link_ends
     reach = ends[joints[-1] + 1] - ends[joints[0] + 1]
-    apart = reach / max(len(joints) - 1, 1) / robot.link_count
-    return 2.0 * winding_rad * float(np.sin(np.pi * min(waves * apart, 0.5)))
+    spacing = reach / max(len(joints) - 1, 1) / robot.link_count
+    return 2.0 * winding_rad * float(np.sin(np.pi * min(waves * spacing, 0.5)))
 
 
 def travelling(
     robot: "RobotConfig", joints: tuple[int, ...], phase_rad: Floats, waves: float, lead_rad: float
 ) -> Floats:
     """(T, n) ``sin(phase + lead - 2 pi waves s)``: runs from head to tail as the phase grows."""
-    at = TURN * waves * places(robot, joints)
-    return np.asarray(np.sin(phase_rad[:, None] + lead_rad - at))
+    phase_by_place = TURN * waves * places(robot, joints)
+    return np.asarray(np.sin(phase_rad[:, None] + lead_rad - phase_by_place))
 
 
 def bends_rad(robot: "RobotConfig", joints: tuple[int, ...], headings_rad: Floats) -> Floats:

@@ -16,7 +16,7 @@ def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Flo
         joint_rad: (J,) angles of all joints, spine first.
 
     """
-    found = np.empty((len(robot.limb_joints), 2, 3))
+    segments_m = np.empty((len(robot.limb_joints), 2, 3))
     turn = np.eye(3)
     end_m = np.zeros(3)
     for k, (joint, angle) in enumerate(
@@ -32,7 +32,7 @@ def leg_segments_m(robot: RobotConfig, body: BodyView, joint_rad: Floats) -> Flo
             turn = turn @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         else:  # positive lifts
             turn = turn @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-        found[k, 0] = end_m
+        segments_m[k, 0] = end_m
         end_m = end_m + side * pair.segments_m[joint.place] * turn[:, 1]
-        found[k, 1] = end_m
-    return found
+        segments_m[k, 1] = end_m
+    return segments_m

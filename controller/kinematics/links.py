@@ -178,12 +178,12 @@ def _forward(
         for j in range(3):  # numba compiles the assignment of a row for four seconds
             rotation[0, i, j] = head_rotation[i, j]
     x, y, z = head_m[0], head_m[1], head_m[2]
-    whole = weight[0]
-    sum_x, sum_y, sum_z = whole * x, whole * y, whole * z
+    total_weight = weight[0]
+    sum_x, sum_y, sum_z = total_weight * x, total_weight * y, total_weight * z
     centres[0, 0], centres[0, 1], centres[0, 2] = x, y, z
     for k in range(1, links):
         before = rotation[k - 1]
-        here = rotation[k]
+        frame = rotation[k]
         half = half_m[k - 1]
         x -= half * before[0, 0]
         y -= half * before[1, 0]
@@ -192,19 +192,23 @@ def _forward(
         turned, kept = (1, 2) if yaws[k - 1] else (2, 1)
         for i in range(3):
             forward, side = before[i, 0], before[i, turned]
-            here[i, 0] = c * forward - s * side
-            here[i, turned] = s * forward + c * side
-            here[i, kept] = before[i, kept]
+            frame[i, 0] = c * forward - s * side
+            frame[i, turned] = s * forward + c * side
+            frame[i, kept] = before[i, kept]
         half = half_m[k]
-        x -= half * here[0, 0]
-        y -= half * here[1, 0]
-        z -= half * here[2, 0]
+        x -= half * frame[0, 0]
+        y -= half * frame[1, 0]
+        z -= half * frame[2, 0]
         centres[k, 0], centres[k, 1], centres[k, 2] = x, y, z
-        own = weight[k]
-        sum_x, sum_y, sum_z = sum_x + own * x, sum_y + own * y, sum_z + own * z
-        whole += own
-    centres[links, 0], centres[links, 1] = sum_x / whole, sum_y / whole
-    centres[links, 2] = sum_z / whole
+        link_weight = weight[k]
+        sum_x, sum_y, sum_z = (
+            sum_x + link_weight * x,
+            sum_y + link_weight * y,
+            sum_z + link_weight * z,
+        )
+        total_weight += link_weight
+    centres[links, 0], centres[links, 1] = sum_x / total_weight, sum_y / total_weight
+    centres[links, 2] = sum_z / total_weight
 
 
 def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:

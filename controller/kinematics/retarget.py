@@ -73,17 +73,17 @@ def _mean_angles(rows_rad: Floats, edges: Floats, means: Floats) -> None:
     for row in range(len(rows_rad)):
         area = 0.0
         before = 0.0
-        at = 0
+        column = 0
         for g in range(len(edges)):
             low = min(int(edges[g]), points - 1)
-            while at < low:
-                area += rows_rad[row, at]
-                at += 1
+            while column < low:
+                area += rows_rad[row, column]
+                column += 1
             part = edges[g] - low
-            here = area * (1.0 - part) + (area + rows_rad[row, low]) * part
+            area_here = area * (1.0 - part) + (area + rows_rad[row, low]) * part
             if g > 0:
-                means[row, g - 1] = (here - before) / (edges[g] - edges[g - 1])
-            before = here
+                means[row, g - 1] = (area_here - before) / (edges[g] - edges[g - 1])
+            before = area_here
 
 
 def _ends(angles_rad: Floats, step_m: Floats | float) -> Floats:

@@ -39,9 +39,9 @@ class RollCompensation:
             self._measured_rad -= turns
             self._roll_rad -= turns
         measured = self._measured_rad
-        wanted = measured - min(max(measured, -_LEFT_IN_RAD), _LEFT_IN_RAD)
+        change_rad = measured - min(max(measured, -_LEFT_IN_RAD), _LEFT_IN_RAD)
         most = _RATE_RAD_S * dt_s
-        self._roll_rad += min(max(wanted - self._roll_rad, -most), most)
+        self._roll_rad += min(max(change_rad - self._roll_rad, -most), most)
         if self._roll_rad == 0.0:
             return goal_rad
         joints = np.arange(len(goal_rad))

@@ -102,12 +102,12 @@ def _fill_slide(
     """
     fastest = 0.0
     for k in range(len(before_m)):
-        at = k // LANES * OTHERS + k % LANES
+        base = k // LANES * OTHERS + k % LANES
         u = (after_m[k, 0] - before_m[k, 0]) / step_s
         v = (after_m[k, 1] - before_m[k, 1]) / step_s
-        table[at + POINT_X], table[at + POINT_Y] = before_m[k, 0], before_m[k, 1]
-        table[at + FORWARD_X], table[at + FORWARD_Y] = cosine[k], sine[k]
-        table[at + SHAPE_X], table[at + SHAPE_Y] = u, v
-        table[at + NORMAL] = normal[k]
+        table[base + POINT_X], table[base + POINT_Y] = before_m[k, 0], before_m[k, 1]
+        table[base + FORWARD_X], table[base + FORWARD_Y] = cosine[k], sine[k]
+        table[base + SHAPE_X], table[base + SHAPE_Y] = u, v
+        table[base + NORMAL] = normal[k]
         fastest = max(fastest, abs(u), abs(v))
     return fastest

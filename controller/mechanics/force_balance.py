@@ -106,14 +106,14 @@ def _forces(
             missing[i] += quadratic[i, j] * w[j]
             power += 0.5 * quadratic[i, j] * w[i] * w[j]
     for k in range(links):
-        at = k // LANES * rows + k % LANES
-        c, s = table[at + FORWARD_X], table[at + FORWARD_Y]
-        px, py = table[at + POINT_X], table[at + POINT_Y]
-        u, v = table[at + SHAPE_X] + x - turn * py, table[at + SHAPE_Y] + y + turn * px
+        base = k // LANES * rows + k % LANES
+        c, s = table[base + FORWARD_X], table[base + FORWARD_Y]
+        px, py = table[base + POINT_X], table[base + POINT_Y]
+        u, v = table[base + SHAPE_X] + x - turn * py, table[base + SHAPE_Y] + y + turn * px
         ahead = c * u + s * v
         aside = c * v - s * u
         a2, b2 = s * px - c * py, c * px + s * py
-        normal = table[at + NORMAL]
+        normal = table[base + NORMAL]
         rub, pull_a, pull_c, aa, ac, ca, cc = _of_link(
             law, forward if ahead >= 0.0 else back, across, ahead, aside, still
         )

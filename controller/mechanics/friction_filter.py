@@ -43,8 +43,8 @@ class _Square(NamedTuple):
 
     @property
     def inverse(self) -> "_Square":
-        whole = self.uu * self.vv - self.uv * self.uv
-        return _Square(self.vv / whole, -self.uv / whole, self.uu / whole)
+        determinant = self.uu * self.vv - self.uv * self.uv
+        return _Square(self.vv / determinant, -self.uv / determinant, self.uu / determinant)
 
     def plus(self, other: "_Square", times: float = 1.0) -> "_Square":
         """Return the sum with ``times`` another matrix."""
@@ -127,7 +127,7 @@ class FrictionFilter:
         """
         self._file = file
         self._doubt = doubt
-        self._weights = [1.0 / each**2 for each in sigma]
+        self._weights = [1.0 / sigma_value**2 for sigma_value in sigma]
         self._prior = _Square(prior**2, 0.0, prior**2)
         self._u = self._v = 0.0
         self._covariance = self._prior
@@ -149,13 +149,13 @@ class FrictionFilter:
 
         """
         rows = [measured.tolist(), *predicted.tolist()]
-        is_finite = all(math.isfinite(each) for row in rows for each in row)
+        is_finite = all(math.isfinite(reading) for row in rows for reading in row)
         return self.absorb(self._evidence(*rows) if is_finite else None, span_s)
 
     def absorb(self, evidence: SlideEvidence | None, span_s: float) -> FoundFriction:
         """Process the evidence of a span of motion; None: no evidence."""
         kept = math.exp(-span_s / _MEMORY_S)
-        before = _Square(*(kept**2 * each for each in self._covariance))
+        before = _Square(*(kept**2 * entry for entry in self._covariance))
         self._covariance = before.plus(self._prior, 1.0 - kept**2)
         if evidence is not None:
             self._correct(evidence)
@@ -166,23 +166,23 @@ class FrictionFilter:
         return self.found
 
     def _evidence(
-        self, measured: list[float], here: list[float], by_u: list[float], by_v: list[float]
+        self, measured: list[float], predicted: list[float], by_u: list[float], by_v: list[float]
     ) -> SlideEvidence:
         """Return the evidence of the difference between motion and prediction."""
-        gap = [m - h for m, h in zip(measured, here, strict=True)]
+        gap = [m - h for m, h in zip(measured, predicted, strict=True)]
         gap[2] = math.remainder(gap[2], 2.0 * math.pi)
         slopes = [
-            ((a - h) / STEP, (b - h) / STEP) for a, b, h in zip(by_u, by_v, here, strict=True)
+            ((a - h) / STEP, (b - h) / STEP) for a, b, h in zip(by_u, by_v, predicted, strict=True)
         ]
-        whole = 0.0
+        misfit = 0.0
         information = _Square(0.0, 0.0, 0.0)
         pull_u = 0.0
         pull_v = 0.0
         for weight, g, (u, v) in zip(self._weights, gap, slopes, strict=True):
-            whole += weight * g * g
+            misfit += weight * g * g
             information = information.plus(_Square(u * u, u * v, v * v), weight)
             pull_u, pull_v = pull_u + weight * u * g, pull_v + weight * v * g
-        return SlideEvidence(information, pull_u, pull_v, whole, len(gap))
+        return SlideEvidence(information, pull_u, pull_v, misfit, len(gap))
 
     def _correct(self, evidence: SlideEvidence) -> None:
         information, pull_u, pull_v, square, rows = evidence

@@ -80,7 +80,7 @@ class GroundStep:
         known_m: ArrayLike,
         segment_m: ArrayLike,
         half_height_m: ArrayLike,
-        known: Known = "tail",
+        from_end: Known = "tail",
     ) -> GroundedSkeleton:
         """Place one skeleton, or a sequence of them.
 
@@ -89,7 +89,7 @@ class GroundStep:
             known_m: (2,) or (T, 2) position of the known end in plan.
             segment_m: r, (N,) or scalar; 0 puts two points in one place.
             half_height_m: (N + 1,) or scalar, half the body's height at each point.
-            known: the end at ``known_m``.
+            from_end: the end at ``known_m``.
 
         """
         angles = np.atleast_2d(angles_rad)
@@ -107,7 +107,7 @@ class GroundStep:
             start,
             each_m,
             half,
-            known == "tail",
+            from_end == "tail",
             points,
             pitch,
             gap,
@@ -176,25 +176,25 @@ def _place(
     frames, segments = cosines.shape
     sign, step = (1.0, -1) if from_tail else (-1.0, 1)
     for t in range(frames):
-        here = segments if from_tail else 0
+        anchor = segments if from_tail else 0
         x, y = known_m[t, 0], known_m[t, 1]
         ground, gx, gy = plane(z_m, x0, y0, spacing, x, y)
-        z = ground + half_m[here]
-        points[t, here, 0], points[t, here, 1], points[t, here, 2] = x, y, z
+        z = ground + half_m[anchor]
+        points[t, anchor, 0], points[t, anchor, 1], points[t, anchor, 2] = x, y, z
         miss = last = 0.0
-        gap[t, here] = 0.0
+        gap[t, anchor] = 0.0
         for _ in range(segments):
-            there = here + step
-            segment = min(here, there)
+            there = anchor + step
+            segment = min(anchor, there)
             r = segment_m[segment]
             if r == 0.0:  # two axes at one place
-                points[t, there], gap[t, there] = points[t, here], gap[t, here]
+                points[t, there], gap[t, there] = points[t, anchor], gap[t, anchor]
                 pitch[t, segment] = sign * last
-                here = there
+                anchor = there
                 continue
             dx, dy = sign * r * cosines[t, segment], sign * r * sines[t, segment]
             level = z - half_m[there]
-            over = miss + half_m[here] - half_m[there]
+            over = miss + half_m[anchor] - half_m[there]
             low, high = -0.5 * pi, 0.5 * pi
             reachable = abs(over) < r
             rise = gx * dx + gy * dy
@@ -219,4 +219,4 @@ def _place(
             pitch[t, segment] = sign * tilt
             last = tilt
             gap[t, there] = miss
-            here = there
+            anchor = there

@@ -71,15 +71,17 @@ class PitchFitter:
         """
         forward = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
         tip = np.asarray(head_in_world_m, float)[:2] + 0.5 * self._lengths_m[0] * forward[0]
-        skeleton = self._step.place(heading_rad, tip, self._lengths_m, self._half_m, known="head")
+        skeleton = self._step.place(
+            heading_rad, tip, self._lengths_m, self._half_m, from_end="head"
+        )
         height = 0.5 * (skeleton.points_m[1:, 2] + skeleton.points_m[:-1, 2])
 
         ends = np.zeros((self._joints + 2, 2))
         ends[1:] = -np.cumsum(self._lengths_m[:, None] * forward, axis=0)
         centres = 0.5 * (ends[1:] + ends[:-1])
-        at = ends[self._pitch + 1]
+        joint_ends = ends[self._pitch + 1]
         along = forward[self._pitch]
-        ahead = (at - centres[:, None]) * along
+        ahead = (joint_ends - centres[:, None]) * along
         lever = self._behind * (ahead[..., 0] + ahead[..., 1])
         rise = np.column_stack([centres - centres.mean(axis=0), lever])
 

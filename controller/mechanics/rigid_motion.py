@@ -174,10 +174,10 @@ def add_inertia(
     mass = 1.0 / (GRAVITY_M_S2 * step_s)
     quadratic[:] = 0.0
     for k in range(links):
-        at = k // LANES * rows + k % LANES
-        x, y = table[at + POINT_X], table[at + POINT_Y]
-        px = mass * (table[at + MOVING_X] - table[at + SHAPE_X])
-        py = mass * (table[at + MOVING_Y] - table[at + SHAPE_Y])
+        base = k // LANES * rows + k % LANES
+        x, y = table[base + POINT_X], table[base + POINT_Y]
+        px = mass * (table[base + MOVING_X] - table[base + SHAPE_X])
+        py = mass * (table[base + MOVING_Y] - table[base + SHAPE_Y])
         linear[0] += px
         linear[1] += py
         linear[2] += x * py - y * px
@@ -421,10 +421,10 @@ def planar_slide(
 @compiled("void(float64[::1], int64, float64[::1])", makes_arrays=False)
 def _note_movement(table: Floats, links: int, velocity: Floats) -> None:
     for k in range(links):
-        at = k // LANES * OTHERS + k % LANES
-        x, y = table[at + POINT_X], table[at + POINT_Y]
-        table[at + MOVING_X] = table[at + SHAPE_X] + velocity[0] - velocity[2] * y
-        table[at + MOVING_Y] = table[at + SHAPE_Y] + velocity[1] + velocity[2] * x
+        base = k // LANES * OTHERS + k % LANES
+        x, y = table[base + POINT_X], table[base + POINT_Y]
+        table[base + MOVING_X] = table[base + SHAPE_X] + velocity[0] - velocity[2] * y
+        table[base + MOVING_Y] = table[base + SHAPE_Y] + velocity[1] + velocity[2] * x
 
 
 @compiled(
@@ -452,17 +452,17 @@ def _slide_through(
         dt, c, s = step_s[n], np.cos(heading), np.sin(heading)
         linear[:] = 0.0
         for k in range(links):
-            at = k // LANES * OTHERS + k % LANES
-            here, there = points[n, k], points[n + 1, k]
-            x, y = 0.5 * (here[0] + there[0]), 0.5 * (here[1] + there[1])
+            base = k // LANES * OTHERS + k % LANES
+            point, there = points[n, k], points[n + 1, k]
+            x, y = 0.5 * (point[0] + there[0]), 0.5 * (point[1] + there[1])
             east, north = c * x - s * y, s * x + c * y
-            table[at + POINT_X], table[at + POINT_Y] = east, north
-            x, y = (there[0] - here[0]) / dt, (there[1] - here[1]) / dt
-            table[at + SHAPE_X], table[at + SHAPE_Y] = c * x - s * y, s * x + c * y
+            table[base + POINT_X], table[base + POINT_Y] = east, north
+            x, y = (there[0] - point[0]) / dt, (there[1] - point[1]) / dt
+            table[base + SHAPE_X], table[base + SHAPE_Y] = c * x - s * y, s * x + c * y
             angle = heading + 0.5 * (headings[n, k] + headings[n + 1, k])
-            table[at + FORWARD_X], table[at + FORWARD_Y] = np.cos(angle), np.sin(angle)
+            table[base + FORWARD_X], table[base + FORWARD_Y] = np.cos(angle), np.sin(angle)
             pull = load[n, k]
-            table[at + NORMAL] = pull[2]
+            table[base + NORMAL] = pull[2]
             linear[0] += pull[0]
             linear[1] += pull[1]
             linear[2] += east * pull[1] - north * pull[0]

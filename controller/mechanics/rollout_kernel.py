@@ -69,10 +69,10 @@ def _sine_cosine(x: float) -> tuple[float, float]:
 
 
 @compiled("float64(float64[::1], float64[::1], float64)", makes_arrays=False)
-def _area(total: Floats, track: Floats, at: float) -> float:
-    """Integral of the track's angles from its start to ``at``."""
-    k = min(max(int(at), 0), len(track) - 1)
-    return float(total[k] + (at - k) * track[k])
+def _area(total: Floats, track: Floats, position: float) -> float:
+    """Integral of the track's angles from its start to ``position``."""
+    k = min(max(int(position), 0), len(track) - 1)
+    return float(total[k] + (position - k) * track[k])
 
 
 @compiled(
@@ -106,19 +106,19 @@ def _lay(
         for j in range(LANES):
             sine, cosine = _sine_cosine(link[_NEXT + j])
             link[_COS + j], link[_SIN + j] = link[HALF + j] * cosine, link[HALF + j] * sine
-    x = y = sum_x = sum_y = whole = 0.0
+    x = y = sum_x = sum_y = total_mass = 0.0
     for i in range(links):
-        at = i // LANES * ROWS + i % LANES
-        c = table[at + _COS]
-        s = table[at + _SIN]
-        weight = table[at + WEIGHT]
+        base = i // LANES * ROWS + i % LANES
+        c = table[base + _COS]
+        s = table[base + _SIN]
+        weight = table[base + WEIGHT]
         x, y = x - c, y - s
-        table[at + _NEXT_X], table[at + _NEXT_Y] = x, y
+        table[base + _NEXT_X], table[base + _NEXT_Y] = x, y
         sum_x = sum_x + weight * x
         sum_y = sum_y + weight * y
-        whole = whole + weight
+        total_mass = total_mass + weight
         x, y = x - c, y - s
-    centre_x, centre_y = sum_x / whole, sum_y / whole
+    centre_x, centre_y = sum_x / total_mass, sum_y / total_mass
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(LANES):
@@ -148,12 +148,12 @@ def _stand_there(table: Floats) -> None:
 
 
 @compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
-def _nearest(path: Floats, at: int, x: float, y: float) -> tuple[float, float]:
-    """Index on the path near ``at``, and the signed distance, positive to its left."""
+def _nearest(path: Floats, start_index: int, x: float, y: float) -> tuple[float, float]:
+    """Index on the path near ``start_index``, and the signed distance, positive to its left."""
     last = len(path) - 2
-    best = at
+    best = start_index
     least = np.inf
-    for k in range(max(at - _BACK, 0), min(at + _FORTH, last) + 1):
+    for k in range(max(start_index - _BACK, 0), min(start_index + _FORTH, last) + 1):
         dx, dy = x - path[k, 0], y - path[k, 1]
         square = dx * dx + dy * dy
         if square < least:
@@ -201,8 +201,8 @@ def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> floa
             link[FORWARD_X + j], link[FORWARD_Y + j] = cosine, sine
     mean = 0.0
     for i in range(links):
-        at = i // LANES * ROWS + i % LANES
-        mean += table[at + _HERE] + table[at + _NEXT]
+        base = i // LANES * ROWS + i % LANES
+        mean += table[base + _HERE] + table[base + _NEXT]
     return float(offset_rad + 0.5 * mean / links)
 
 
@@ -233,12 +233,12 @@ def _pull(
 ) -> None:
     """Write each link's load; add the slope's force and moment on all, in mean link weights."""
     for i in range(links):
-        at = i // LANES * ROWS + i % LANES
-        px, py = table[at + POINT_X], table[at + POINT_Y]
+        base = i // LANES * ROWS + i % LANES
+        px, py = table[base + POINT_X], table[base + POINT_Y]
         _, gx, gy = plane(z_m, x0, y0, spacing, x + px, y + py)
-        normal = table[at + WEIGHT] / np.sqrt(1.0 + gx * gx + gy * gy)
+        normal = table[base + WEIGHT] / np.sqrt(1.0 + gx * gx + gy * gy)
         fx, fy = -gx * normal, -gy * normal
-        table[at + NORMAL] = normal
+        table[base + NORMAL] = normal
         linear[0] += fx
         linear[1] += fy
         linear[2] += px * fy - py * fx
@@ -396,12 +396,12 @@ def roll_pieces(
         out: results.
 
     """
-    known = len(samples)
+    history = len(samples)
     new = pieces.shape[1]
     links = len(group)
     steps = states.shape[1] - 1
-    track = np.empty(known + new)
-    total = np.zeros(known + new + 1)
+    track = np.empty(history + new)
+    total = np.zeros(history + new + 1)
     here_g, next_g = np.empty(len(edges) - 1), np.empty(len(edges) - 1)
     velocity = np.empty(3)
     linear = np.empty(3)
@@ -410,12 +410,12 @@ def roll_pieces(
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(LANES):
             link[NORMAL + j] = link[WEIGHT + j]
-    track[:known] = samples
+    track[:history] = samples
     for c in range(before, len(pieces)):
-        track[known:] = pieces[c]
-        for k in range(known + new):
+        track[history:] = pieces[c]
+        for k in range(history + new):
             total[k + 1] = total[k] + track[k]
-        at = head
+        first_step = head
         begin = 0
         like, same = _alike(pieces, c)
         if like < 0:
@@ -423,8 +423,8 @@ def roll_pieces(
             states[c, 0, 10] = np.inf
             movings[c, 0] = 0.0
         else:
-            while begin < steps and at + step <= known + same:
-                at = at + step
+            while begin < steps and first_step + step <= history + same:
+                first_step = first_step + step
                 begin = begin + 1
             states[c, begin], movings[c, begin] = states[like, begin], movings[like, begin]
         state = states[c, begin]
@@ -433,11 +433,11 @@ def roll_pieces(
         phi = state[2]
         velocity[:] = state[7:10]
         _keep(table, movings[c, begin], False)
-        _lay(total, track, at, edges, group, here_g, table)
+        _lay(total, track, first_step, edges, group, here_g, table)
         _stand_there(table)
         for n in range(begin, steps):
-            at += step
-            _lay(total, track, at, edges, group, next_g, table)
+            first_step += step
+            _lay(total, track, first_step, edges, group, next_g, table)
             dt = step / _pulse_rate(here_g, next_g, step, cruise, body[4])
             mean = _turned(table, links, phi, dt)
             linear[:] = 0.0

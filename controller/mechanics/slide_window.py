@@ -82,14 +82,14 @@ class SlideWindow:
         knots = self.knots
         rows = [self.start]
         for begin, end in pairwise(knots):
-            at = np.array([*range(begin, end, STRIDE), end])
+            knot_indices = np.array([*range(begin, end, STRIDE), end])
             x, y, heading = planar_slide(
-                self.headings_rad[at],
-                self.points_m[at],
-                np.diff(self.time_s[at]),
+                self.headings_rad[knot_indices],
+                self.points_m[knot_indices],
+                np.diff(self.time_s[knot_indices]),
                 float(rows[-1][2]),
                 friction,
-                None if self.load is None else self.load[at],
+                None if self.load is None else self.load[knot_indices],
             )
             rows.append(np.array([rows[-1][0] + x, rows[-1][1] + y, heading]))
         return np.array(rows)
@@ -97,7 +97,7 @@ class SlideWindow:
     def heads(self, track: Floats, time_s: Floats) -> Floats:
         """Return x, y and heading (N, 3) of the head link at times, for a track of the body."""
         knots_s = self.time_s[self.knots]
-        x, y, heading = (np.interp(time_s, knots_s, each) for each in track.T)
+        x, y, heading = (np.interp(time_s, knots_s, column) for column in track.T)
         ahead, left = (np.interp(time_s, self.time_s, self.points_m[:, 0, k]) for k in (0, 1))
         c, s = np.cos(heading), np.sin(heading)
         bend = np.interp(time_s, self.time_s, self.headings_rad[:, 0])
@@ -120,21 +120,24 @@ class SlideWindow:
         counts = np.bincount(bins, minlength=len(knots_s) - 1)
         kept = np.flatnonzero(counts)
         tracks = [by_ratio] if by_both is None else [by_both, by_ratio]
-        if len(kept) < FEWEST or not all(np.isfinite(each).all() for each in (track, *tracks)):
+        if len(kept) < FEWEST or not all(
+            np.isfinite(head_track).all() for head_track in (track, *tracks)
+        ):
             return None
 
         def averages(values: Floats) -> Floats:
             sums = [np.bincount(bins, column, len(counts))[kept] for column in values.T]
             return np.column_stack(sums) / counts[kept, None]
 
-        here = self.heads(track, readings.time_s)
-        off = readings.place - here
+        current = self.heads(track, readings.time_s)
+        off = readings.place - current
         off[:, 2] = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
         independent = np.minimum(counts[kept], BIN_S / NOISE_S)
         noise = averages(readings.variance) / independent[:, None]
-        covariance = _model_covariance(averages(here), track[:-1], kept) + np.diag(noise.ravel())
+        covariance = _model_covariance(averages(current), track[:-1], kept) + np.diag(noise.ravel())
         slopes = [
-            averages((self.heads(each, readings.time_s) - here) / STEP).ravel() for each in tracks
+            averages((self.heads(head_track, readings.time_s) - current) / STEP).ravel()
+            for head_track in tracks
         ]
         columns = np.column_stack([averages(off).ravel(), *slopes])
         products = columns.T @ np.linalg.solve(covariance, columns)

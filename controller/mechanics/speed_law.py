@@ -94,20 +94,20 @@ def identify(
         raise ValueError(f"{len(v)} moving samples are too few for the speed law")
     columns = [-np.ones_like(v), k, -turn]
     if acceleration_m_s2 is None:
-        wanted = viscous_1_s * v
+        viscous_part = viscous_1_s * v
     else:
         columns = [-v, *columns]
-        wanted = acceleration_m_s2[moving]
-    start = lsq_linear(np.column_stack(columns), wanted, bounds=(0.0, np.inf)).x
+        viscous_part = acceleration_m_s2[moving]
+    start = lsq_linear(np.column_stack(columns), viscous_part, bounds=(0.0, np.inf)).x
 
-    def missing(at: Floats) -> Floats:
-        c2, c3, c4 = at[-3:]
-        drag = 0.0 if steady else at[0] * v
-        return np.asarray(np.maximum(c3 * k - c4 * turn, 0.0) - c2 - drag - wanted)
+    def missing(coefficients: Floats) -> Floats:
+        c2, c3, c4 = coefficients[-3:]
+        drag = 0.0 if steady else coefficients[0] * v
+        return np.asarray(np.maximum(c3 * k - c4 * turn, 0.0) - c2 - drag - viscous_part)
 
-    found = least_squares(missing, start, bounds=(0.0, np.inf))
-    c2, c3, c4 = (float(value) for value in found.x[-3:])
-    c1 = viscous_1_s if steady else max(float(found.x[0]), 1e-9)
-    rms = float(np.sqrt(np.mean(found.fun**2)))
-    explained = 1.0 - rms**2 / max(float(np.var(wanted)), 1e-30)
+    fit = least_squares(missing, start, bounds=(0.0, np.inf))
+    c2, c3, c4 = (float(value) for value in fit.x[-3:])
+    c1 = viscous_1_s if steady else max(float(fit.x[0]), 1e-9)
+    rms = float(np.sqrt(np.mean(fit.fun**2)))
+    explained = 1.0 - rms**2 / max(float(np.var(viscous_part)), 1e-30)
     return Identified(SpeedLaw(c1, c2, c3, c4), rms, explained, len(v))

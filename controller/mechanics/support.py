@@ -45,9 +45,9 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
     lever_m = axes[pitch, None, 0] * arm_m[..., 1] - axes[pitch, None, 1] * arm_m[..., 0]
     lever_m = np.where(np.arange(links) > pitch[:, None], lever_m, 0.0)
     middle_m = body.link_m - body.centre_m
-    whole = np.stack([np.full(links, robot.mean_link_length_m), middle_m[:, 0], middle_m[:, 1]])
+    profile = np.stack([np.full(links, robot.mean_link_length_m), middle_m[:, 0], middle_m[:, 1]])
     even = np.eye(links) * (TORQUE_NOISE_N_M / weight_n)
-    rows = np.concatenate([lever_m, whole, even])
+    rows = np.concatenate([lever_m, profile, even])
     target = (rows * share).sum(axis=1) * weight_n
     target[: len(pitch)] -= torque_n_m[pitch]
     return np.asarray(scipy.optimize.nnls(rows, target)[0])

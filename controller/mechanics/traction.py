@@ -31,9 +31,9 @@ def quasi_static_gain(
     """
     shapes = np.atleast_2d(skeleton_rad)
     points = shapes.shape[-1]
-    at = np.clip((np.arange(links) + 0.5) * points / links - 0.5, 0.0, points - 1.0)
-    left = np.minimum(at.astype(int), points - 2)
-    right_share = at - left
+    position = np.clip((np.arange(links) + 0.5) * points / links - 0.5, 0.0, points - 1.0)
+    left = np.minimum(position.astype(int), points - 2)
+    right_share = position - left
 
     def at_links(values: Floats) -> Floats:
         near = np.take(values, left, axis=1)  # in C order, on which the bits of sums depend

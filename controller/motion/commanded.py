@@ -174,8 +174,8 @@ class Commanded:
     def start_at(self, joint_rad: Floats) -> None:
         """Start from joints at these angles (J,), clipped to their limits."""
         most = self._limits.angle_rad
-        held = np.clip(joint_rad, -most, most)
-        self._mode = _Follow(JointsNow(held, np.zeros(len(held))), self._limits)
+        held_rad = np.clip(joint_rad, -most, most)
+        self._mode = _Follow(JointsNow(held_rad, np.zeros(len(held_rad))), self._limits)
 
     def goal_rad(self) -> Floats:
         """(J,) present joint targets."""

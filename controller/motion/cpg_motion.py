@@ -92,10 +92,10 @@ def _evaluate(
         step_s = max(SAMPLE_S, part.time_s / MOST_SAMPLES)
         part.begin(cpg)
         times_s = np.arange(0.0, part.time_s, step_s)
-        one, speed, change = cpg.peak_share(
+        share, speed, change = cpg.peak_share(
             times_s, limit.speed_rad_s, limit.acceleration_rad_s2, enough
         )
-        over = max(over, one)
+        over = max(over, share)
         fast = np.maximum(fast, speed)
         hard = np.maximum(hard, change)
         if over > enough:

@@ -95,8 +95,8 @@ class HeadSteering(MotionWrapper):
             self._swing_rad_s += share * (turn / dt_s - self._swing_rad_s)
         self._last_rad = shoulders
         heading = float(wrap(self.target.heading_from(view.link_m[0]) - shoulders))
-        each = (heading - LEAD_S * self._swing_rad_s) / len(self._neck)
-        angles = self._limiter.step(dt_s, np.clip(each, -self._reach, self._reach))
+        angle_rad = (heading - LEAD_S * self._swing_rad_s) / len(self._neck)
+        angles = self._limiter.step(dt_s, np.clip(angle_rad, -self._reach, self._reach))
         return self._with_neck(goal, angles)
 
     def _with_neck(self, joints: Floats, neck: Floats) -> Floats:

@@ -124,12 +124,14 @@ def joint_motion(
         raise InputError(f"{path}: joint {twice[0]} is there twice; names must differ")
     if joint_rad.size > MOST_CELLS:
         raise InputError(f"{path}: holds {joint_rad.size} angles; at most {MOST_CELLS} are read")
-    whole = np.isfinite(joint_rad).all(axis=1) & np.isfinite(time_s)
+    is_complete = np.isfinite(joint_rad).all(axis=1) & np.isfinite(time_s)
     lines = list(notes)
-    if not whole.all():
-        lines.append(f"{int((~whole).sum())} of {len(whole)} rows lack a value and are left out")
-    time_s = time_s[whole]
-    joint_rad = joint_rad[whole]
+    if not is_complete.all():
+        lines.append(
+            f"{int((~is_complete).sum())} of {len(is_complete)} rows lack a value and are left out"
+        )
+    time_s = time_s[is_complete]
+    joint_rad = joint_rad[is_complete]
     if len(time_s) < 2:
         raise InputError(f"{path}: {len(time_s)} whole rows of joint angles; a motion needs 2")
     step_s = np.diff(time_s)
@@ -162,7 +164,7 @@ def _in_order(names: Sequence[str], where: str) -> tuple[list[str], str]:
         by_number = sorted(zip([number for _, number in numbered], names, strict=True))
         return [name for _, name in by_number], "number"
     for stem in stems:
-        numbers = [number for each, number in numbered if each == stem]
+        numbers = [number for name, number in numbered if name == stem]
         if numbers != sorted(numbers):
             raise InputError(
                 f"{where}: its joints {', '.join(names)} are in the order of the alphabet, which "
@@ -191,37 +193,37 @@ def onto_robot(
             in the names.
 
     """
-    wanted = robot.joint_names
-    found = motion.names
+    joint_names = robot.joint_names
+    names = motion.names
     for ours, theirs in asked.items():
-        if ours not in wanted:
-            raise InputError(f"--joint {ours}={theirs}: {robot.name} has {', '.join(wanted)}")
-        if theirs not in (*found, REST):
-            raise InputError(f"--joint {ours}={theirs}: {where} has {', '.join(found)}")
-    pairs = {name: asked.get(name, name) for name in wanted}
-    lost = [name for name, theirs in pairs.items() if theirs not in (*found, REST)]
+        if ours not in joint_names:
+            raise InputError(f"--joint {ours}={theirs}: {robot.name} has {', '.join(joint_names)}")
+        if theirs not in (*names, REST):
+            raise InputError(f"--joint {ours}={theirs}: {where} has {', '.join(names)}")
+    pairs = {name: asked.get(name, name) for name in joint_names}
+    lost = [name for name, theirs in pairs.items() if theirs not in (*names, REST)]
     source = "name"
-    if lost and not asked and len(lost) == len(wanted) == len(found):
-        ordered, source = _in_order(found, where)
-        pairs = dict(zip(wanted, ordered, strict=True))
+    if lost and not asked and len(lost) == len(joint_names) == len(names):
+        ordered, source = _in_order(names, where)
+        pairs = dict(zip(joint_names, ordered, strict=True))
         lost = []
     if lost:
         raise InputError(
             f"{where}: the file has no joint for {', '.join(lost)} of {robot.name}, but "
-            f"{', '.join(found)}; add --joint {lost[0]}=NAME for each; {REST} as NAME keeps a "
+            f"{', '.join(names)}; add --joint {lost[0]}=NAME for each; {REST} as NAME keeps a "
             "joint at 0"
         )
     zeros = np.zeros(len(motion.time_s))
     columns = [
-        zeros if theirs == REST else motion.joint_rad[:, found.index(theirs)]
-        for theirs in (pairs[name] for name in wanted)
+        zeros if theirs == REST else motion.joint_rad[:, names.index(theirs)]
+        for theirs in (pairs[name] for name in joint_names)
     ]
     listed = ", ".join(f"{ours} = {theirs}" for ours, theirs in pairs.items())
     lines = [f"joints by {source}: {listed}"]
-    unused = [name for name in found if name not in pairs.values()]
+    unused = [name for name in names if name not in pairs.values()]
     if unused:
         moved = np.ptp(motion.joint_rad, axis=0) > _STILL_RAD
-        moving = [name for name in unused if moved[found.index(name)]]
+        moving = [name for name in unused if moved[names.index(name)]]
         lines.append(
             f"{len(unused)} joints of the file are not used, {len(moving)} of them move: "
             f"{', '.join(unused)}"

@@ -48,7 +48,7 @@ class Operator(MotionWrapper):
         robot: RobotConfig,
         keys: Callable[[], Iterable[str | Refused]],
         on_event: Callable[[str, str], None],
-        held: Callable[[], bool] = lambda: True,
+        is_enabled: Callable[[], bool] = lambda: True,
     ) -> None:
         """Let ``keys`` control ``motion``.
 
@@ -59,8 +59,8 @@ class Operator(MotionWrapper):
                 ``gait=NAME``, and reasons for dropped ones; others are ignored, also ``t``, which
                 the owner of the torque handles.
             on_event: called with ("operator", text) for an action that was done or refused.
-            held: whether the dead man's button is held; otherwise the body stands in its shape,
-                whatever else is pressed.
+            is_enabled: whether the dead man's button is held; otherwise the body keeps its
+                shape, whatever else is pressed.
 
         """
         super().__init__(motion)
@@ -72,7 +72,7 @@ class Operator(MotionWrapper):
         self._halted = False
         self._refusals = Refusals(lambda why: on_event("operator", f"refused: {why}"))
         self._time_s = 0.0
-        self._held = held
+        self._held = is_enabled
         self._was_held = True
         self._rate = 1.0
 
@@ -100,12 +100,12 @@ class Operator(MotionWrapper):
         self._refusals.step(self._time_s)
         change = dt_s / HALT_S
         before = self._rate
-        held = self._held()
-        if held != self._was_held:
-            self._was_held = held
-            self._report("held: it moves" if held else "let go: it stands in its shape")
+        is_enabled_now = self._held()
+        if is_enabled_now != self._was_held:
+            self._was_held = is_enabled_now
+            self._report("held: it moves" if is_enabled_now else "let go: it stands in its shape")
         halted = self._halted and not self.motion.stopping
-        target = 0.0 if halted or not held else 1.0
+        target = 0.0 if halted or not is_enabled_now else 1.0
         self._rate += min(max(target - self._rate, -change), change)
         return self.motion.step(0.5 * (before + self._rate) * dt_s, view)
 
@@ -167,9 +167,9 @@ class Operator(MotionWrapper):
 
     def _other(self, step: int) -> None:
         names = list(GAITS)
-        at = names.index(self.motion.gait.name) if self.motion.gait.name in names else 0
+        index = names.index(self.motion.gait.name) if self.motion.gait.name in names else 0
         for away in range(1, len(names)):
-            if self._become(names[(at + step * away) % len(names)], quietly=True):
+            if self._become(names[(index + step * away) % len(names)], quietly=True):
                 return
         self._refuse("no other gait suits this robot")
 
@@ -184,9 +184,10 @@ class Operator(MotionWrapper):
         self._chosen = 0
         after = self.motion.gait.params
         lost = [
-            each
-            for each in _DIRECTIONS
-            if getattr(before, each, 0) and getattr(after, each, 0) != getattr(before, each)
+            direction
+            for direction in _DIRECTIONS
+            if getattr(before, direction, 0)
+            and getattr(after, direction, 0) != getattr(before, direction)
         ]
         self._report(f"gait {name}")
         if lost:

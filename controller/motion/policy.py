@@ -62,14 +62,14 @@ class PolicyWave(Strict):
     @classmethod
     def of(cls, values: Floats) -> Self:
         """Return the wave of values (P,), clipped to their ranges and rounded as in a file."""
-        held = np.clip(values, *WAVE_ENDS)
-        at = 0
+        clipped = np.clip(values, *WAVE_ENDS)
+        start = 0
         fields = {}
         for key, value in cls().model_dump().items():
             size = np.size(value)
-            part = [_rounded(each) for each in held[at : at + size]]
+            part = [_rounded(part_value) for part_value in clipped[start : start + size]]
             fields[key] = part if isinstance(value, tuple) else part[0]
-            at += size
+            start += size
         return cls.model_validate(fields)
 
 

@@ -44,7 +44,7 @@ class PolicyMotion:
         place = places(robot, robot.yaw_joints)
         self._start = policy.wave.vector()
         self._wave = self._start.copy()
-        self._layers = [(np.array(each.weights), np.array(each.bias)) for each in policy.network]
+        self._layers = [(np.array(layer.weights), np.array(layer.bias)) for layer in policy.network]
         thirds = np.clip(place - np.arange(3)[:, None] / 3.0, 0.0, 1.0 / 3.0)
         along = np.zeros((3, len(WAVE_SPAN), len(place)))
         along[0, 1:5], along[1, 5:8], along[2, 10:13] = (
@@ -110,9 +110,9 @@ class PolicyMotion:
         """Measure the body; return a network's observation, as ``observation_names``."""
         self._measured_rad = chain_angles_rad(self._robot, view)[self._yaw]
         self._heading_rad = view.heading_rad
-        told = [cos(self._phase_rad), sin(self._phase_rad)]
-        told += [cos(self._heading_rad), sin(self._heading_rad)]
-        return np.concatenate([told, self._measured_rad, self._limiter.angle_rad])
+        observation = [cos(self._phase_rad), sin(self._phase_rad)]
+        observation += [cos(self._heading_rad), sin(self._heading_rad)]
+        return np.concatenate([observation, self._measured_rad, self._limiter.angle_rad])
 
     def act(self, action: Floats, dt_s: float) -> Floats:
         """Change the wave by an action (P,), -1 to 1, and advance by ``dt_s``; return targets (J,).
@@ -129,12 +129,14 @@ class PolicyMotion:
         self._phase_rad = float((self._phase_rad + dt_s * TURN * frequency_hz) % TURN)
         heading_rad = self._mean_heading(dt_s * frequency_hz)
         amplitude_rad, lag_rad, gain = wave @ self._along
-        at = self._phase_rad - lag_rad
-        swing = np.sin(at) + sine * np.sin(3.0 * at) + cosine * np.cos(3.0 * at)
-        off = np.zeros(len(at) + 2)
+        phase_rad = self._phase_rad - lag_rad
+        swing = (
+            np.sin(phase_rad) + sine * np.sin(3.0 * phase_rad) + cosine * np.cos(3.0 * phase_rad)
+        )
+        off = np.zeros(len(phase_rad) + 2)
         off[1:-1] = self._measured_rad - self._limiter.angle_rad
         reflex = wave[13] * off[1:-1] + wave[14] * off[:-2] + wave[15] * off[2:]
-        goal = amplitude_rad * swing - heading_rad / len(at) * gain + reflex
+        goal = amplitude_rad * swing - heading_rad / len(phase_rad) * gain + reflex
         self._limiter.step(dt_s, np.clip(goal, -self._most_rad, self._most_rad))
         return self.goal_rad()
 

@@ -122,12 +122,12 @@ class Recorded:
         done_s = self._ramp_s * quintic_sum(x[:, 0]) / self.slowed
         rate = quintic(x) / self.slowed
         growth = quintic_slope(x) / self._ramp_s / self.slowed
-        found = []
+        ramps = []
         for places_s, sign in (
             (self._start_s + done_s, 1.0),
             (self._start_s + self._length_s - done_s, -1.0),
         ):
             bend = self._spline(places_s, 2)
             speed = self._spline(places_s, 1)
-            found.append(np.abs(bend * rate**2 + sign * speed * growth))
-        return np.asarray(np.concatenate(found).max(axis=0))
+            ramps.append(np.abs(bend * rate**2 + sign * speed * growth))
+        return np.asarray(np.concatenate(ramps).max(axis=0))

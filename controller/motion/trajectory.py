@@ -129,7 +129,7 @@ def _checked(given: JointTrajectory) -> JointTrajectory:
     time_s = np.asarray(given.time_s, dtype=float)
     values = [None if v is None else np.asarray(v, dtype=float) for v in given[2:]]
     shape = (len(time_s), len(given.joints))
-    if any(each is not None and each.shape != shape for each in values):
+    if any(value is not None and value.shape != shape for value in values):
         raise InputError(
             f"trajectory: each of its {shape[0]} points needs {shape[1]} positions, and as many "
             "velocities and accelerations, or none at all"
@@ -168,10 +168,10 @@ def _spline(given: JointTrajectory, joints: JointNumbers, now: JointsNow) -> PPo
     still = np.zeros(len(now.angle_rad))
 
     def rows(first: Floats, values: Floats, others: Floats) -> Floats:
-        whole = np.tile(others, (len(knots_s), 1))
-        whole[0] = first
-        whole[1:, joints] = values
-        return whole
+        tile = np.tile(others, (len(knots_s), 1))
+        tile[0] = first
+        tile[1:, joints] = values
+        return tile
 
     angles = rows(now.angle_rad, given.position_rad, now.angle_rad)
     if given.velocity_rad_s is None:
@@ -200,7 +200,7 @@ def _quintics(h_s: Floats, q: Floats, v: Floats, a: Floats) -> Floats:
         v0,
         q0,
     ]
-    return np.array([each / h_s ** (5 - power) for power, each in enumerate(unit)])
+    return np.array([coefficient / h_s ** (5 - power) for power, coefficient in enumerate(unit)])
 
 
 def _most(spline: PPoly, order: int) -> Floats:

@@ -45,8 +45,8 @@ class StateLibrary:
     def counts(self) -> dict[str, int]:
         """Return the counts for the log and the report."""
         refused = {f"rejected: {reason}": n for reason, n in self.rejected.items()}
-        made = {"recorded": self.recorded, "random": len(self.shapes_rad) - self.recorded}
-        return made | refused
+        counts_by_kind = {"recorded": self.recorded, "random": len(self.shapes_rad) - self.recorded}
+        return counts_by_kind | refused
 
 
 def build_library(
@@ -76,21 +76,23 @@ def build_library(
     states = curvature * states
     rejected = dict.fromkeys(filters, 0)
     recorded = np.empty((0, points))
-    made = [np.empty((0, points))]
+    parts = [np.empty((0, points))]
     frame: Ints = np.empty(0, dtype=np.int64)
-    for wanted, band in _counts(random_count, waves):
+    for band_count, band in _counts(random_count, waves):
         got = 0
         for _ in range(_ROUNDS):
-            if got >= wanted:
+            if got >= band_count:
                 break
-            drawn = random_states(states, max(wanted - got, 20), rng)
+            drawn = random_states(states, max(band_count - got, 20), rng)
             if waves is not None and band is not None:
                 drawn = limit_to_waves(drawn, *band, waves.energy_share)
-            made.append(_passing(to_angles(drawn, points), filters, rejected)[0][: wanted - got])
-            got += len(made[-1])
+            parts.append(
+                _passing(to_angles(drawn, points), filters, rejected)[0][: band_count - got]
+            )
+            got += len(parts[-1])
         if band is None:
             recorded, frame = _passing(to_angles(states, points), filters, rejected)
-    fresh = np.concatenate(made)
+    fresh = np.concatenate(parts)
     if len(fresh) < random_count or len(recorded) + len(fresh) < 2:
         reasons = ", ".join(f"{name}: {count}" for name, count in rejected.items())
         raise InputError(

@@ -176,11 +176,11 @@ class _WalkState:
         The cost is the number of short returns, then of steps; ties go by Warnsdorff's rule.
         """
         soon = SHORT_RETURN * len(self.near)
-        here = self.path[-1]
+        current = self.path[-1]
         now = self.step
-        came_from = {here: here}
-        cost = {here: (0, 0)}
-        queue = [(0, 0, 0, 0, here)]
+        came_from = {current: current}
+        cost = {current: (0, 0)}
+        queue = [(0, 0, 0, 0, current)]
         while True:  # the graph is connected, so a path exists
             returns, steps, _, _, q = heappop(queue)
             if not self.selected[q]:
@@ -193,10 +193,10 @@ class _WalkState:
                 if n not in cost or after < cost[n]:
                     cost[n], came_from[n] = after, q
                     heappush(queue, (*after, self.unvisited_near[n], self.degree[n], n))
-        way = [came_from[q]]
-        while came_from[way[-1]] != here:
-            way.append(came_from[way[-1]])
-        return way
+        states = [came_from[q]]
+        while came_from[states[-1]] != current:
+            states.append(came_from[states[-1]])
+        return states
 
     def stack_top(self, near: list[int]) -> int:
         """Depth first: the unvisited neighbour of highest degree, else backtrack."""

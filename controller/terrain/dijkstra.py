@@ -64,16 +64,16 @@ def _settle(
         n -= 1
         key = keys[n]
         moved = nodes[n]
-        at = 0
-        while 2 * at + 1 < n:  # sift the last entry down from the top
-            child = 2 * at + 1
+        slot = 0
+        while 2 * slot + 1 < n:  # sift the last entry down from the top
+            child = 2 * slot + 1
             if child + 1 < n and keys[child + 1] < keys[child]:
                 child += 1
             if keys[child] >= key:
                 break
-            keys[at], nodes[at] = keys[child], nodes[child]
-            at = child
-        keys[at], nodes[at] = key, moved
+            keys[slot], nodes[slot] = keys[child], nodes[child]
+            slot = child
+        keys[slot], nodes[slot] = key, moved
         if settled[node]:
             continue
         settled[node] = True
@@ -83,10 +83,10 @@ def _settle(
             length = distance[node] + weights[arc]
             if length < distance[end]:
                 distance[end], before[end] = length, node
-                at = n
+                slot = n
                 n += 1
-                while at > 0 and keys[(at - 1) // 2] > length:
-                    keys[at], nodes[at] = keys[(at - 1) // 2], nodes[(at - 1) // 2]
-                    at = (at - 1) // 2
-                keys[at], nodes[at] = length, end
+                while slot > 0 and keys[(slot - 1) // 2] > length:
+                    keys[slot], nodes[slot] = keys[(slot - 1) // 2], nodes[(slot - 1) // 2]
+                    slot = (slot - 1) // 2
+                keys[slot], nodes[slot] = length, end
     size[0] = n

@@ -119,17 +119,17 @@ def dubins_curves(
     for kind, (first, middle, last) in enumerate(_TURNS):
         c0 = z0 + 1j * first * radius_m * np.exp(1j * h0)
         c1 = z1 + 1j * last * radius_m * np.exp(1j * h1)
-        apart = np.abs(c1 - c0)
+        gap_m = np.abs(c1 - c0)
         towards = np.angle(c1 - c0)
         if middle == 0.0:
             aside = (first - last) * radius_m
-            there = apart >= abs(aside)
-            between = np.sqrt(np.maximum(apart**2 - aside**2, 0.0))
+            there = gap_m >= abs(aside)
+            between = np.sqrt(np.maximum(gap_m**2 - aside**2, 0.0))
             leave = meet = towards + np.arctan2(aside, between)
         else:
-            there = apart <= 4.0 * radius_m
+            there = gap_m <= 4.0 * radius_m
             side = 1.0 if kind < len(_TURNS) - 2 else -1.0
-            off = side * np.arccos(np.minimum(apart / (4.0 * radius_m), 1.0))
+            off = side * np.arccos(np.minimum(gap_m / (4.0 * radius_m), 1.0))
             leave = towards + off + first * np.pi / 2.0
             meet = towards + np.pi - off + first * np.pi / 2.0
             between = radius_m * _turn(middle * (meet - leave))
@@ -247,9 +247,9 @@ class PathTurns:
                 chosen = int(exist[k])
         goal, kind = divmod(chosen, len(_TURNS))
         turn_m = self._length_m[chosen]
-        at = np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M)))
+        turned_m = np.linspace(0.0, turn_m, max(2, round(turn_m / _STEP_M)))
         join_m = float(self._s_m[goal % len(self._s_m)])
-        return Turn(curves.position(goal, kind, at), join_m, best)
+        return Turn(curves.position(goal, kind, turned_m), join_m, best)
 
     def onto(self, turn: Turn) -> SplinePath:
         """Return the path that begins with a turn."""

@@ -63,9 +63,9 @@ class ElevationMap:
         cells, first, count = np.unique(cell, return_index=True, return_counts=True)
         chosen = first + _QUANTILE[height] * (count - 1)
         lower, upper = np.floor(chosen).astype(np.int64), np.ceil(chosen).astype(np.int64)
-        held = np.full(rows * columns, np.nan)
-        held[cells] = np.where(count >= least, 0.5 * (z_m[lower] + z_m[upper]), np.nan)
-        return cls(held.reshape(rows, columns), spacing_m, float(low[0]), float(low[1]))
+        heights_m = np.full(rows * columns, np.nan)
+        heights_m[cells] = np.where(count >= least, 0.5 * (z_m[lower] + z_m[upper]), np.nan)
+        return cls(heights_m.reshape(rows, columns), spacing_m, float(low[0]), float(low[1]))
 
     @classmethod
     def of_triangles(
@@ -86,9 +86,9 @@ class ElevationMap:
         """
         columns, rows = _shape(high_m - low_m, spacing_m)
         z_m = np.full((rows, columns), -np.inf)
-        at = np.array(vertices_m, dtype=float)
-        at[:, :2] = (at[:, :2] - low_m) / spacing_m
-        _rasterise(at, np.ascontiguousarray(faces, dtype=np.int64), z_m)
+        points = np.array(vertices_m, dtype=float)
+        points[:, :2] = (points[:, :2] - low_m) / spacing_m
+        _rasterise(points, np.ascontiguousarray(faces, dtype=np.int64), z_m)
         z_m[np.isinf(z_m)] = np.nan
         return cls(z_m, spacing_m, float(low_m[0]), float(low_m[1]))
 
@@ -109,28 +109,28 @@ class ElevationMap:
             InputError: nothing is known, or the map's samples are too many or too few.
 
         """
-        known = np.isfinite(z_m)
-        if not known.any():
+        is_known = np.isfinite(z_m)
+        if not is_known.any():
             raise InputError("map: no cell holds a height")
         if math.isclose(dx_m, dy_m) and math.isclose(dx_m, spacing_m):
             return cls(z_m, spacing_m, 0.0, 0.0)
         if spacing_m > max(dx_m, dy_m):
-            row, column = np.nonzero(known)
-            points = np.stack([column * dx_m, row * dy_m, z_m[known]], axis=-1)
+            row, column = np.nonzero(is_known)
+            points = np.stack([column * dx_m, row * dy_m, z_m[is_known]], axis=-1)
             return cls.of_points(points, spacing_m)
         rows, columns = z_m.shape
         size = ((columns - 1) * dx_m, (rows - 1) * dy_m)
         wide, high = _shape(np.array(size), spacing_m, floor=True)
         x = np.arange(wide) * spacing_m / dx_m
         y = np.arange(high) * spacing_m / dy_m
-        whole = z_m if known.all() else filled(z_m, ~known)
+        filled_m = z_m if is_known.all() else filled(z_m, ~is_known)
         order = min(3, rows - 1), min(3, columns - 1)
         spline = scipy.interpolate.RectBivariateSpline(
-            np.arange(rows), np.arange(columns), whole, kx=order[0], ky=order[1]
+            np.arange(rows), np.arange(columns), filled_m, kx=order[0], ky=order[1]
         )
         fine = np.asarray(spline(y, x), dtype=float)
-        at = np.stack(np.meshgrid(y, x, indexing="ij"))
-        share = map_coordinates(known.astype(float), at, order=1, mode="nearest")
+        places = np.stack(np.meshgrid(y, x, indexing="ij"))
+        share = map_coordinates(is_known.astype(float), places, order=1, mode="nearest")
         return cls(np.where(share > 1.0 - 1e-9, fine, np.nan), spacing_m, 0.0, 0.0)
 
     @property
@@ -154,13 +154,13 @@ class ElevationMap:
             InputError: nothing is known.
 
         """
-        known = self.known
-        if not known.any():
+        is_known = self.known
+        if not is_known.any():
             raise InputError("map: no cell holds a height")
-        z_m = self.z_m if known.all() else filled(self.z_m, ~known)
-        trusted = known
+        z_m = self.z_m if is_known.all() else filled(self.z_m, ~is_known)
+        trusted = is_known
         if fill_m > 0.0:
-            trusted = known | ~opened(~known, 0.5 * fill_m / self.spacing_m)
+            trusted = is_known | ~opened(~is_known, 0.5 * fill_m / self.spacing_m)
         return HeightField(z_m - z_m.min(), self.spacing_m, self.x0_m, self.y0_m, trusted)
 
 
@@ -187,11 +187,11 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
             np.moveaxis(index, axis, 0)[part] for part in (slice(None, -1), slice(1, None))
         )
         low, high = (np.moveaxis(out, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
-        for here, there, value in ((below, above, high), (above, below, low)):
-            inside = here >= 0
-            np.add.at(weight, here[inside], 1.0)
+        for cells, there, value in ((below, above, high), (above, below, low)):
+            inside = cells >= 0
+            np.add.at(weight, cells[inside], 1.0)
             edge = inside & (there < 0)
-            np.add.at(right, here[edge], value[edge])
+            np.add.at(right, cells[edge], value[edge])
         both = (below >= 0) & (above >= 0)
         pairs.append(np.stack([below[both], above[both]]))
     low, high = np.concatenate(pairs, axis=1)
@@ -204,9 +204,9 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
         shape=(count, count),
     ).tocsr()
     solved, _ = cg(laplace, right, x0=out[holes], rtol=1e-6, maxiter=_ROUNDS)
-    whole = np.array(z_m, dtype=float)
-    whole[holes] = solved + base
-    return whole
+    filled_m = np.array(z_m, dtype=float)
+    filled_m[holes] = solved + base
+    return filled_m
 
 
 def opened(holes: Bools, radius: float) -> Bools:

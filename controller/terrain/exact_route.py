@@ -58,8 +58,8 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
         return None
     edges = _edges(cells)
     width = len(cells.x_m)
-    at = np.arange(cells.safe.size)
-    nodes_m = np.stack([cells.x_m[at % width], cells.y_m[at // width]], axis=-1)
+    index = np.arange(cells.safe.size)
+    nodes_m = np.stack([cells.x_m[index % width], cells.y_m[index // width]], axis=-1)
     start, end = cells.ends
     score, towards = _tree(nodes_m, edges, graph, end)
     lead = [start_m]
@@ -72,15 +72,15 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
         (int(a), int(b)): float(x)
         for a, b, x in zip(*(part[~np.isnan(edges.saddle_x_m)] for part in edges), strict=True)
     }
-    here = start
+    current = start
     corners = [*lead, nodes_m[start]]
-    while here != end:
-        onward = int(towards[here])
-        x = saddles.get((here, onward), saddles.get((onward, here)))
+    while current != end:
+        onward = int(towards[current])
+        x = saddles.get((current, onward), saddles.get((onward, current)))
         if x is not None:
-            corners += [np.array([x, nodes_m[node][1]]) for node in (here, onward)]
+            corners += [np.array([x, nodes_m[node][1]]) for node in (current, onward)]
         corners.append(nodes_m[onward])
-        here = onward
+        current = onward
     return _distinct(np.array(corners))
 
 
@@ -173,5 +173,5 @@ def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tupl
 
 
 def _distinct(points: Floats) -> Floats:
-    apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-9])
-    return np.asarray(points[apart])
+    is_distinct = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-9])
+    return np.asarray(points[is_distinct])

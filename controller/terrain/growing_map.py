@@ -113,14 +113,14 @@ class GrowingMap:
 
         The filled surface is coarser far from seen samples.
         """
-        known = self.known
-        if not known.any():
+        is_known_now = self.known
+        if not is_known_now.any():
             return None
-        z_m = np.where(known, self.z_m, self._touched_m)
+        z_m = np.where(is_known_now, self.z_m, self._touched_m)
         holes = np.isnan(z_m)
         far_m = np.asarray(distance_transform_edt(holes, sampling=self.spacing_m))
         z_m[holes] = _coarsely_filled(z_m)[holes]
-        trusted = known | ~opened(~known, 0.5 * _SMALL_HOLE_M / self.spacing_m)
+        trusted = is_known_now | ~opened(~is_known_now, 0.5 * _SMALL_HOLE_M / self.spacing_m)
         smooth = holes & (far_m <= _SMOOTH_M)
         return HeightField(filled(z_m, smooth), self.spacing_m, self.x0_m, self.y0_m, trusted)
 
@@ -175,10 +175,10 @@ def _coarsely_filled(z_m: Floats) -> Floats:
     more = -rows % _COARSE, -columns % _COARSE
     squares = np.pad(z_m, ((0, more[0]), (0, more[1])), constant_values=np.nan)
     squares = squares.reshape(-(-rows // _COARSE), _COARSE, -1, _COARSE)
-    held = np.isfinite(squares)
-    count = held.sum(axis=(1, 3))
-    mean_m = np.where(held, squares, 0.0).sum(axis=(1, 3)) / np.maximum(count, 1)
+    is_filled = np.isfinite(squares)
+    count = is_filled.sum(axis=(1, 3))
+    mean_m = np.where(is_filled, squares, 0.0).sum(axis=(1, 3)) / np.maximum(count, 1)
     coarse_m = filled(mean_m, count == 0) if (count == 0).any() else mean_m
-    at = [(np.arange(n) - 0.5 * (_COARSE - 1)) / _COARSE for n in (rows, columns)]
-    places = np.meshgrid(*at, indexing="ij")
+    axes_cells = [(np.arange(n) - 0.5 * (_COARSE - 1)) / _COARSE for n in (rows, columns)]
+    places = np.meshgrid(*axes_cells, indexing="ij")
     return np.asarray(map_coordinates(coarse_m, places, order=1, mode="nearest"))

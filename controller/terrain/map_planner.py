@@ -73,15 +73,15 @@ class MapPlanner:
     ) -> Steps[SplinePath]:
         """Plan as a call does, in steps, on the map at the first step."""
         points = np.asarray(points_m, float)
-        known = self._on
-        if known is None:
+        knowledge = self._on
+        if knowledge is None:
             planner = TerrainPlanner(None, self._config)
             return (yield from planner.in_steps(points, heading_rad, avoid_m=avoid_m))
         faults: tuple[str, ...] = ()
         for within_m in _WITHIN_M:
             yield 10000
-            corners = known.corners(points, within_m)
-            plan = known.cautious.in_steps(corners, heading_rad, avoid_m=avoid_m, number=number)
+            corners = knowledge.corners(points, within_m)
+            plan = knowledge.cautious.in_steps(corners, heading_rad, avoid_m=avoid_m, number=number)
             try:
                 return (yield from plan)
             except InputError as error:  # no smooth path: try a shorter one
@@ -133,31 +133,31 @@ class _Knowledge:
         if graph is None or relief is None or not len(graph.nodes_m):
             return points  # the planner reports this
         near = np.hypot(*(graph.nodes_m - points[0]).T) <= within_m
-        found = [points[0]]
+        reached = [points[0]]
         reach_m = _REACH_M
         for point in points[1:]:
-            costs = np.where(near, graph.costs_from(found[-1], reach_m), np.inf)
+            costs = np.where(near, graph.costs_from(reached[-1], reach_m), np.inf)
             node = graph.nearest(point)
             if node is None or not np.isfinite(costs[node]) or not relief.safe(*point):
                 if np.isfinite(costs).any():
-                    found.append(self._farthest(graph, costs, found[-1], point))
+                    reached.append(self._farthest(graph, costs, reached[-1], point))
                 break
-            found.append(point)
+            reached.append(point)
             reach_m = 0.0
-        return np.array(found) if len(found) > 1 else points
+        return np.array(reached) if len(reached) > 1 else points
 
     def _farthest(self, graph: SafeGraph, costs: Floats, start: Floats, goal: Floats) -> Floats:
         """(2,) node at which the best path to a goal leaves known safe ground."""
         to_go = _UNSEEN * graph.length_weight * np.hypot(*(graph.nodes_m - goal).T)
         target = self._open_graph.nearest(goal)
         if target is not None:
-            at = np.searchsorted(self._open_graph.place, graph.place)
-            open_to_go = self._open_graph.costs_to(target)[at]
+            index = np.searchsorted(self._open_graph.place, graph.place)
+            open_to_go = self._open_graph.costs_to(target)[index]
             if (np.isfinite(costs) & np.isfinite(open_to_go)).any():
                 to_go = open_to_go
         # Along the best path all sums are equal; choose the farthest of its nodes.
-        whole = (1.0 - _TIES) * costs + to_go
+        total_cost = (1.0 - _TIES) * costs + to_go
         far = np.hypot(*(graph.nodes_m - start).T) >= _LEAST_M
-        if np.isfinite(whole[far]).any():
-            whole = np.where(far, whole, np.inf)
-        return np.asarray(graph.nodes_m[int(np.argmin(whole))])
+        if np.isfinite(total_cost[far]).any():
+            total_cost = np.where(far, total_cost, np.inf)
+        return np.asarray(graph.nodes_m[int(np.argmin(total_cost))])

@@ -25,8 +25,8 @@ class SplinePath:
 
     def __init__(self, points_m: ArrayLike) -> None:
         points = np.asarray(points_m, dtype=float)
-        apart = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
-        points = points[apart]
+        is_distinct = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        points = points[is_distinct]
         if len(points) < 2:
             raise InputError("a path needs two different points: the start and a waypoint")
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -103,12 +103,12 @@ class SplinePath:
 
     def passes(self, points_m: ArrayLike) -> list[float]:
         """Arc lengths of the first closest approaches to points (n, 2), in their order."""
-        found = list[float]()
+        passes_m = list[float]()
         at_m = 0.0
         for point in np.asarray(points_m, dtype=float):
             at_m = self.first_pass(point, at_m)
-            found.append(at_m)
-        return found
+            passes_m.append(at_m)
+        return passes_m
 
 
 @compiled(

@@ -152,7 +152,7 @@ class TerrainPlanner:
             shown = [_shortened(leg, graph) if shorten else leg for leg in legs]
             corners = np.vstack([shown[0], *(leg[1:] for leg in shown[1:])])
             free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
-            path = rounded(corners, free, lambda at: relief.safe(*at.T))
+            path = rounded(corners, free, lambda places: relief.safe(*places.T))
             if not len(self._unsafe(path, points[0], relief)):
                 return path
         raise InputError(fault)
@@ -224,13 +224,15 @@ class TerrainPlanner:
             anchors.append(graph.nearest(point))
         pieces = [points[:1]]
         for k in range(1, len(points)):
-            here, there = anchors[k - 1], anchors[k]
+            nearest, there = anchors[k - 1], anchors[k]
             if there is not None and graph is not self.graph:
                 yield from graph.tree_in_steps(there)
             yield 300
             if k == 1 and there is not None:  # the nearest node may be on an island of safe nodes
-                here = graph.nearest(points[0], graph.can_reach(there))
-            nodes = None if here is None or there is None else graph.cheapest_path(here, there)
+                nearest = graph.nearest(points[0], graph.can_reach(there))
+            nodes = (
+                None if nearest is None or there is None else graph.cheapest_path(nearest, there)
+            )
             if nodes is None:
                 raise InputError(self._blocked(k, points))
             nodes = np.vstack([points[k - 1], nodes, points[k]])
@@ -262,7 +264,7 @@ class TerrainPlanner:
             corners = _denser(corners, path, bad)
         points = path.position(bad)
         worst = points[int(np.argmax(relief.risk(*points.T)))]
-        x, y = (round(float(at), 2) + 0.0 for at in worst)  # avoids -0.00
+        x, y = (round(float(coordinate), 2) + 0.0 for coordinate in worst)  # avoids -0.00
         raise InputError(
             f"path: no smooth way over safe ground: ({x:.2f}, {y:.2f}) "
             f"{_unsafe_because(relief, worst)}; move a waypoint"
@@ -325,11 +327,13 @@ def _is_close(points: Floats, j: int, k: int) -> bool:
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
     """Halve the sides of the polygon at unsafe places of the spline, and their neighbours."""
-    at = 0.0
+    nearest = 0.0
     ends = [0.0]
     for before, point in pairwise(points):
-        at = path.nearest(point, at, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1)
-        ends.append(at)
+        nearest = path.nearest(
+            point, nearest, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1
+        )
+        ends.append(nearest)
     worst = np.unique(np.clip(np.searchsorted(ends, bad_s_m) - 1, 0, len(points) - 2))
     split = {int(piece) + step for piece in worst for step in (-1, 0, 1)}
     out = [points[0]]

@@ -189,6 +189,6 @@ def _summed(values: Floats, weight: Floats) -> Floats:
     """
     sizes = zip(values.shape, weight.shape, strict=True)
     shape = [next_fast_len(n + m - 1, True) for n, m in sizes]
-    whole = irfft2(rfft2(values, shape) * rfft2(weight[::-1, ::-1], shape), shape)
+    sums = irfft2(rfft2(values, shape) * rfft2(weight[::-1, ::-1], shape), shape)
     (rows, columns), (up, left) = values.shape, ((m - 1) // 2 for m in weight.shape)
-    return np.asarray(whole[up : up + rows, left : left + columns])
+    return np.asarray(sums[up : up + rows, left : left + columns])

@@ -71,10 +71,10 @@ class SafeGraph:
         """Return this graph with an extra cost within a footprint of places (k, 2)."""
         if len(places_m) == 0:
             return self
-        found = copy(self)
+        graph = copy(self)
         edges = self._edges
-        found._avoid_m = np.asarray(places_m, float)
-        found._trees = {}
+        graph._avoid_m = np.asarray(places_m, float)
+        graph._trees = {}
         yield 500
         rows = np.repeat(np.arange(len(self.nodes_m)), np.diff(edges.indptr))
         weights = edges.data.copy()
@@ -83,10 +83,10 @@ class SafeGraph:
             some = slice(k, k + _EDGES_IN_STEP)
             from_m, to_m = self.nodes_m[edges.indices[some]], self.nodes_m[rows[some]]
             length = np.hypot(*(to_m - from_m).T)
-            weights[some] += self.length_weight * length * found._avoided(0.5 * (from_m + to_m))
+            weights[some] += self.length_weight * length * graph._avoided(0.5 * (from_m + to_m))
         yield 300
-        found._edges = csr_array((weights, edges.indices, edges.indptr), shape=edges.shape)
-        return found
+        graph._edges = csr_array((weights, edges.indices, edges.indptr), shape=edges.shape)
+        return graph
 
     def _avoided(self, points_m: Floats) -> Floats:
         """Extra metres (...) per metre of path at points (..., 2) near avoided places."""
@@ -114,10 +114,10 @@ class SafeGraph:
         if target in self._trees:
             return
         edges = self._edges
-        found = yield from shortest_tree(
+        tree = yield from shortest_tree(
             edges.indptr.astype(np.int64), edges.indices.astype(np.int64), edges.data, target
         )
-        self._trees[target] = found
+        self._trees[target] = tree
 
     def costs_to(self, target: int) -> Floats:
         """(n,) cost of the cheapest path to ``target``; infinite without a path."""
@@ -145,10 +145,10 @@ class SafeGraph:
         score, towards = self._tree(target)
         if not np.isfinite(score[start]):
             return None
-        at = [start]
-        while at[-1] != target:
-            at.append(int(towards[at[-1]]))
-        return self.nodes_m[at]
+        nodes = [start]
+        while nodes[-1] != target:
+            nodes.append(int(towards[nodes[-1]]))
+        return self.nodes_m[nodes]
 
     def edge_cost(
         self, from_m: Floats, to_m: Floats, least_longest_m: float = 0.0
@@ -161,12 +161,14 @@ class SafeGraph:
         longest_m = float(length.max(initial=least_longest_m))
         count = max(2, int(np.ceil(longest_m / SAMPLE_M)) + 1)
         part = np.linspace(0.0, 1.0, count)
-        at = np.empty((len(from_m), count, 2))
+        samples_m = np.empty((len(from_m), count, 2))
         for axis in range(2):  # numpy is slow with an innermost axis of two values
             step = np.multiply.outer(to_m[:, axis] - from_m[:, axis], part)
-            np.add(from_m[:, axis, None], step, out=at[..., axis])
+            np.add(from_m[:, axis, None], step, out=samples_m[..., axis])
         direction = (to_m - from_m) / np.maximum(length, 1e-12)[:, None]
-        there, back, risk = self._cost_per_m(at, np.repeat(direction[:, None], count, axis=1))
+        there, back, risk = self._cost_per_m(
+            samples_m, np.repeat(direction[:, None], count, axis=1)
+        )
         safe = (risk <= RISK_LIMIT).all(axis=-1)
         return length * there.mean(axis=-1), length * back.mean(axis=-1), np.asarray(safe)
 
@@ -225,10 +227,10 @@ class SafeGraph:
         height, width = index.shape
         pairs = []
         for up, right in _STEPS:
-            here = index[: height - up, max(0, -right) : width - max(0, right)]
-            beside = index[up:, max(0, right) : width + min(0, right)]
-            both = (here >= 0) & (beside >= 0)
-            pairs.append(np.stack([here[both], beside[both]]))
+            first_nodes = index[: height - up, max(0, -right) : width - max(0, right)]
+            second_nodes = index[up:, max(0, right) : width + min(0, right)]
+            both = (first_nodes >= 0) & (second_nodes >= 0)
+            pairs.append(np.stack([first_nodes[both], second_nodes[both]]))
         a, b = np.concatenate(pairs, axis=1)
         there, back, safe = self.edge_cost(self.nodes_m[a], self.nodes_m[b])
         n = len(self.nodes_m)

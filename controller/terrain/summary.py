@@ -50,10 +50,10 @@ class PathRelief:
 
 def slopes_rad(planner: TerrainPlanner, path: SplinePath) -> Floats:
     """(n,) windowed slope every two centimetres along a path; zeros on a flat floor."""
-    at = path.position(_samples(path))
+    points = path.position(_samples(path))
     if planner.relief is None:
-        return np.zeros(len(at))
-    return planner.relief.slope_rad(*at.T)
+        return np.zeros(len(points))
+    return planner.relief.slope_rad(*points.T)
 
 
 def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
@@ -64,14 +64,14 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
     share = 1.0
     if planner.relief is not None and planner.graph is not None:
         ground = planner.relief.ground
-        at = path.position(_samples(path))
-        surface = ground.slope_rad(*at.T)
-        z = ground.elevation_m(*at.T)
-        variance = planner.relief.variance_m2(*at.T)
-        strip = ground.slope_rad(*(at[:, None] + _disc_m(planner.relief.config.footprint_m)).T)
-        ahead = np.gradient(at, axis=0)
+        points = path.position(_samples(path))
+        surface = ground.slope_rad(*points.T)
+        z = ground.elevation_m(*points.T)
+        variance = planner.relief.variance_m2(*points.T)
+        strip = ground.slope_rad(*(points[:, None] + _disc_m(planner.relief.config.footprint_m)).T)
+        ahead = np.gradient(points, axis=0)
         ahead = ahead / np.hypot(*ahead.T)[:, None]
-        steepest = np.arctan(planner.graph.footprint.slopes(at, ahead).max(axis=-1))
+        steepest = np.arctan(planner.graph.footprint.slopes(points, ahead).max(axis=-1))
         world = planner.relief.slope_rad(*np.meshgrid(*ground.axes_m))
         share = planner.graph.safe_share
     return PathRelief(
@@ -98,7 +98,7 @@ def path_warnings(
     if planner.relief is None or planner.graph is None:
         return ()
     slopes = planner.graph.footprint.slope_rad(np.asarray(waypoints_m, float).reshape(-1, 2))
-    found = [
+    warnings = [
         f"waypoint {k} ({x:.2f}, {y:.2f}) is on a slope of {np.degrees(slope):.1f} deg; "
         f"over {np.degrees(WAYPOINT_SLOPE_RAD):.0f} deg a body may slide past it"
         for k, ((x, y), slope) in enumerate(zip(waypoints_m, slopes, strict=True), start=1)
@@ -107,12 +107,12 @@ def path_warnings(
     limit_rad = planner.relief.config.climb_limit_rad
     limit = f"the world's climb limit is {np.degrees(limit_rad):.1f} deg"
     if relief.max_up_slope_rad > limit_rad:
-        found.append(f"the path climbs {np.degrees(relief.max_up_slope_rad):.1f} deg; {limit}")
+        warnings.append(f"the path climbs {np.degrees(relief.max_up_slope_rad):.1f} deg; {limit}")
     if relief.max_side_slope_rad > limit_rad:
-        found.append(
+        warnings.append(
             f"the path leads across {np.degrees(relief.max_side_slope_rad):.1f} deg; {limit}"
         )
-    return tuple(found)
+    return tuple(warnings)
 
 
 def _disc_m(width_m: float) -> Floats:

@@ -87,11 +87,11 @@ class WaypointTurns:
             if self._is_sharp(legs, k):
                 to_m = legs[k - 1] if k > 0 else None
                 from_m = legs[k] if k < len(legs) else None
-                found = yield from self._turned(
+                legs_now = yield from self._turned(
                     to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD
                 )
-                if found is not None:
-                    legs[max(k - 1, 0) : k + 1], turned = found, True
+                if legs_now is not None:
+                    legs[max(k - 1, 0) : k + 1], turned = legs_now, True
         if not turned:
             return path
         yield 200
@@ -109,8 +109,8 @@ class WaypointTurns:
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
         to_m = leg.piece_m(0.0, leg.length_m)
         backs = np.array([back])
-        found = yield from self._turned(to_m, None, backs, backs - np.pi)
-        return None if found is None else SplinePath.tabulated(np.vstack([*found, onward_m[1:]]))
+        legs = yield from self._turned(to_m, None, backs, backs - np.pi)
+        return None if legs is None else SplinePath.tabulated(np.vstack([*legs, onward_m[1:]]))
 
     def _turned(
         self, to_m: Floats | None, from_m: Floats | None, backs_rad: Floats, headings_rad: Floats
@@ -130,8 +130,8 @@ class WaypointTurns:
             turns = yield from self._cheapest(sides)
             if turns:
                 yield 400
-                found = [side.onto(turn) for side, turn in zip(sides, turns, strict=True)]
-                points = [leg.piece_m(0.0, leg.length_m) for leg in found]
+                legs = [side.onto(turn) for side, turn in zip(sides, turns, strict=True)]
+                points = [leg.piece_m(0.0, leg.length_m) for leg in legs]
                 return points if to_m is None else [points[0][::-1], *points[1:]]
         return None
 

@@ -98,11 +98,11 @@ class Ax12Alarms:
         tenths = np.rint(drive.supply_v * 10.0)
         low, high = self._register("Min Voltage Limit"), self._register("Max Voltage Limit")
         hot = np.rint(self.temperature_c) > self._register("Temperature Limit")
-        found = Error1.VOLTAGE * ((tenths < low) | (tenths > high))
+        status_bits = Error1.VOLTAGE * ((tenths < low) | (tenths > high))
         overload = self._blocked_s >= self._overload_s()
-        found |= Error1.OVERLOAD * overload | Error1.OVERHEATING * hot
-        self._latched |= found.astype(np.uint8) & self._register("Shutdown").astype(np.uint8)
-        self.shown[:] = self._latched | found
+        status_bits |= Error1.OVERLOAD * overload | Error1.OVERHEATING * hot
+        self._latched |= status_bits.astype(np.uint8) & self._register("Shutdown").astype(np.uint8)
+        self.shown[:] = self._latched | status_bits
         self._shut_down()
 
     def _full_output(self) -> Floats:

@@ -66,14 +66,14 @@ class Ax12Servos(SimulatedServos):
 
     def check(self, row: int, address: int, data: bytes) -> int:
         """Error bits of the reply to a write of ``data``; writes nothing."""
-        at = address
-        while at < address + len(data):
-            name = self._starts.get(at)
+        position = address
+        while position < address + len(data):
+            name = self._starts.get(position)
             if name is None:
                 return Error1.INSTRUCTION
             cell = self.facts.registers[name]
-            raw = data[at - address : at - address + cell.size]
-            locked = at < self.facts.ram_from and self["Lock"][row]
+            raw = data[position - address : position - address + cell.size]
+            locked = position < self.facts.ram_from and self["Lock"][row]
             if len(raw) < cell.size or locked or cell.range is None:
                 return Error1.INSTRUCTION
             value = int.from_bytes(raw, "little")
@@ -84,7 +84,7 @@ class Ax12Servos(SimulatedServos):
                 low, high = int(self["CW Angle Limit"][row]), int(self["CCW Angle Limit"][row])
                 if not low <= value <= high:
                     return Error1.ANGLE_LIMIT
-            at += cell.size
+            position += cell.size
         return 0
 
     def write(self, row: int, address: int, data: bytes) -> int:

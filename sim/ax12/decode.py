@@ -72,8 +72,10 @@ class Decoder1:
         self._asked_s = time_s
         code = packet.instruction
         params = packet.params
-        known = code in self.instructions.__members__.values()
-        name = self.instructions(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
+        is_known = code in self.instructions.__members__.values()
+        name = (
+            self.instructions(code).name.lower().replace("_", " ") if is_known else f"0x{code:02X}"
+        )
         values: dict[str, object] = {}
         if code == Instruction1.READ and len(params) == 2:
             values = dict.fromkeys(self._values(params[0], bytes(params[1])), "?")
@@ -82,9 +84,9 @@ class Decoder1:
         elif code == Instruction1.SYNC_WRITE and len(params) > 1:
             address = params[0]
             size = params[1]
-            for at in range(2, len(params) - size, size + 1):
-                part = self._values(address, params[at + 1 : at + 1 + size])
-                values |= {f"{params[at]}: {key}": value for key, value in part.items()}
+            for start in range(2, len(params) - size, size + 1):
+                part = self._values(address, params[start + 1 : start + 1 + size])
+                values |= {f"{params[start]}: {key}": value for key, value in part.items()}
         return DecodedPacket(time_s, "question", packet.servo_id, name, values, raw)
 
     def _answer(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:
@@ -99,7 +101,9 @@ class Decoder1:
         )
 
     def _outcome(self, error: int) -> str:
-        alarms = [str(each.name).lower().replace("_", " ") for each in self.errors if error & each]
+        alarms = [
+            str(alarm.name).lower().replace("_", " ") for alarm in self.errors if error & alarm
+        ]
         return ", ".join(alarms) or "ok"
 
     def _decode(self, cell: RegisterRow, data: bytes) -> int:
@@ -107,9 +111,9 @@ class Decoder1:
 
     def _values(self, address: int, data: bytes) -> dict[str, object]:
         end = address + len(data)
-        found: dict[str, object] = {
+        texts: dict[str, object] = {
             name: self._decode(cell, data[cell.address - address :])
             for name, cell in self._registers.items()
             if address <= cell.address and cell.address + cell.size <= end
         }
-        return found or {f"{address}+{len(data)}": data.hex(" ")}
+        return texts or {f"{address}+{len(data)}": data.hex(" ")}

@@ -56,7 +56,7 @@ class Ax12Line(Wire):
 
     def ids(self) -> list[int]:
         """The ID of each row."""
-        return [int(each) for each in self.servos["ID"]]
+        return [int(servo_id) for servo_id in self.servos["ID"]]
 
     def senders(self, reply: bytes) -> Collection[int]:
         """ID of the servo that sent a reply."""
@@ -109,14 +109,14 @@ class Ax12Line(Wire):
 
     def _split(self, data: bytes) -> Sequence[bytes]:
         frames = []
-        at = 0
-        while data.startswith(HEADER, at) and at + 4 <= len(data):
-            end = at + 4 + data[at + 3]
+        start = 0
+        while data.startswith(HEADER, start) and start + 4 <= len(data):
+            end = start + 4 + data[start + 3]
             if end >= len(data):
                 break
-            frames.append(data[at:end])
-            at = end
-        return [*frames, data[at:]]
+            frames.append(data[start:end])
+            start = end
+        return [*frames, data[start:]]
 
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         return [
@@ -144,7 +144,7 @@ class Ax12Line(Wire):
             return self._sync_write(packet)
         replies = []
         for row in self._addressed(packet.servo_id):
-            own = int(self.servos["ID"][row])
+            servo_id = int(self.servos["ID"][row])
             delay_s = self._delay_s(row)
             replies_to = self._replies_to(row, code)
             error = Error1.CHECKSUM.value
@@ -155,11 +155,11 @@ class Ax12Line(Wire):
                 continue
             if replies_to and not self._muted[row]:
                 shown = error | int(self.servos.protection.shown[row])
-                replies.append((own, Reply(delay_s, frame(own, shown, data))))
+                replies.append((servo_id, Reply(delay_s, frame(servo_id, shown, data))))
         replies.sort(key=lambda reply: reply[0])  # IDs reply in turn to a broadcast ping
         return [
-            self._respond([reply for _, reply in each])
-            for _, each in groupby(replies, lambda reply: reply[0])
+            self._respond([reply for _, reply in group])
+            for _, group in groupby(replies, lambda reply: reply[0])
         ]
 
     def _delay_s(self, row: int) -> float:
@@ -204,9 +204,9 @@ class Ax12Line(Wire):
         if packet.intact and packet.servo_id == BROADCAST_ID and len(params) >= 2:
             address = params[0]
             size = params[1]
-            for at in range(2, len(params) - size, size + 1):
-                for row in self._obeying(params[at]):
+            for start in range(2, len(params) - size, size + 1):
+                for row in self._obeying(params[start]):
                     if self._deaf[row]:
                         continue
-                    self.servos.write(row, address, params[at + 1 : at + 1 + size])
+                    self.servos.write(row, address, params[start + 1 : start + 1 + size])
         return []

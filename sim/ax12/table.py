@@ -15,5 +15,5 @@ def end_of(registers: Mapping[str, RegisterRow]) -> int:
 
 def initial_value(facts: ServoModel, name: str) -> int:
     """Value of a register of a new servo."""
-    known = {"Model Number": facts.model_number, "Firmware Version": facts.firmware}
-    return known.get(name, facts.registers[name].initial)
+    values_by_name = {"Model Number": facts.model_number, "Firmware Version": facts.firmware}
+    return values_by_name.get(name, facts.registers[name].initial)

@@ -96,7 +96,7 @@ def _device(name: str | None) -> Any:
     try:
         return warp.get_device(name)
     except ValueError as error:
-        valid = ", ".join(str(each) for each in warp.get_devices())
+        valid = ", ".join(str(device) for device in warp.get_devices())
         raise InputError(f"device {name}: {error}; valid: {valid}") from None
 
 
@@ -217,15 +217,18 @@ class _DeviceState:
             ],
         )
         contacts = d.contact
-        found = d.contact.dist.shape[0]
+        contact_count = d.contact.dist.shape[0]
         which = [d.nacon, contacts.worldid, contacts.geom]
         about = [self.roles, self.bodies]
         launch(
-            kernels.add_depths, found, inputs=[*which, contacts.dist, *about], outputs=[self.depth]
+            kernels.add_depths,
+            contact_count,
+            inputs=[*which, contacts.dist, *about],
+            outputs=[self.depth],
         )
         launch(
             kernels.rub,
-            found,
+            contact_count,
             inputs=[
                 *which,
                 contacts.dist,
@@ -261,7 +264,7 @@ class _DeviceState:
         self.load.zero_()
         launch(
             kernels.weigh,
-            found,
+            contact_count,
             inputs=[*which, contacts.efc_address, d.efc.force, *about],
             outputs=[self.load],
         )

@@ -170,7 +170,7 @@ class FaultPlayer:
     def add(self, faults: plan.FaultPlan, source: str = "faults") -> None:
         """Add faults with times from now; raises as the constructor."""
         since_s = self._line.clock.now_s() - self._start_s
-        later = [each.model_copy(update={"at_s": each.at_s + since_s}) for each in faults.fault]
+        later = [fault.model_copy(update={"at_s": fault.at_s + since_s}) for fault in faults.fault]
         self._add(faults.model_copy(update={"fault": tuple(later)}), source)
 
     def _add(self, faults: plan.FaultPlan, source: str) -> None:
@@ -201,9 +201,9 @@ class FaultPlayer:
             named = list(getattr(fault, "ids", ()))
             named += [getattr(fault, key) for key in _ID_KEYS if hasattr(fault, key)]
             wrong += [
-                f"{where}: no servo has ID {each}; the bus has {there}"
-                for each in named
-                if each not in self._rows
+                f"{where}: no servo has ID {servo_id}; the bus has {there}"
+                for servo_id in named
+                if servo_id not in self._rows
             ]
             if isinstance(fault, plan.WriteFault | plan.ReadingFault):
                 wrong += self._unwritable(fault, where)
@@ -217,27 +217,27 @@ class FaultPlayer:
     def _unwritable(self, fault: plan.WriteFault | plan.ReadingFault, where: str) -> list[str]:
         """Messages about a register that a servo lacks, or a value that does not fit."""
         wrong = []
-        for each in self._rows.keys() & set(fault.ids):
+        for servo_id in self._rows.keys() & set(fault.ids):
             name = fault.register_name
             value = fault.value
-            kind = self._line.register_type(self._rows[each], name)
+            kind = self._line.register_type(self._rows[servo_id], name)
             if kind is None:
-                wrong.append(f"{where}: servo {each} has no register {name}")
+                wrong.append(f"{where}: servo {servo_id} has no register {name}")
             elif value is not None and not np.iinfo(kind).min <= value <= np.iinfo(kind).max:
                 span = f"{np.iinfo(kind).min} to {np.iinfo(kind).max}"
-                wrong.append(f"{where}: {name} of servo {each} holds {span}, not {value}")
+                wrong.append(f"{where}: {name} of servo {servo_id} holds {span}, not {value}")
         return wrong
 
     def _undetectable(self, fault: plan.TripFault, where: str) -> list[str]:
         """Messages about an error that a servo cannot detect."""
-        known = {
-            each: self._servos.protection.alarms(self._rows[each])
-            for each in fault.ids
-            if each in self._rows
+        alarms_by_id = {
+            servo_id: self._servos.protection.alarms(self._rows[servo_id])
+            for servo_id in fault.ids
+            if servo_id in self._rows
         }
         return [
-            f"{where}: servo {each} detects {', '.join(alarms)} only"
-            for each, alarms in known.items()
+            f"{where}: servo {servo_id} detects {', '.join(alarms)} only"
+            for servo_id, alarms in alarms_by_id.items()
             if fault.kind not in alarms
         ]
 
@@ -262,7 +262,7 @@ class FaultPlayer:
     def _actions(self, fault: plan.ScheduledFault) -> _Actions:
         line = self._line
         protection = self._servos.protection
-        rows = np.array([self._rows[each] for each in getattr(fault, "ids", ())], np.intp)
+        rows = np.array([self._rows[servo_id] for servo_id in getattr(fault, "ids", ())], np.intp)
         match fault:
             case plan.PortFault():
                 return line.disconnect, line.reconnect

@@ -46,7 +46,7 @@ class FeetechDecoder(Decoder1):
         address, length = packet.params[:_SPAN_BYTES]
         self._turns = list(packet.params[_SPAN_BYTES:])
         names = ", ".join(self._values(address, bytes(length)))
-        values: dict[str, object] = {str(each): names for each in self._turns}
+        values: dict[str, object] = {str(turn): names for turn in self._turns}
         return DecodedPacket(time_s, line.kind, line.servo_id, line.name, values, raw)
 
     def _answer(self, time_s: float, packet: Packet1, raw: str) -> DecodedPacket:

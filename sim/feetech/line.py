@@ -53,10 +53,10 @@ class FeetechLine(Ax12Line):
     def register_type(self, row: int, name: str) -> np.dtype[np.integer] | None:
         """Type of a register's numbers; None if a servo lacks it."""
         del row
-        each = self.servos.facts.registers.get(name)
-        if each is None:
+        register = self.servos.facts.registers.get(name)
+        if register is None:
             return None
-        return np.dtype(f"{'i' if each.sign_bit is not None else 'u'}{each.size}")
+        return np.dtype(f"{'i' if register.sign_bit is not None else 'u'}{register.size}")
 
     def _reply_with_faults(self, data: bytes, now_s: float) -> Sequence[tuple[float, bytes]]:
         if self.tamper is not None:

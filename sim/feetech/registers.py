@@ -39,15 +39,18 @@ class FeetechRegisters:
 
     def initial(self, name: str) -> int:
         """Value of a register of a new servo."""
-        known = {"Model Number": self.facts.model_number, "Firmware Version": self.facts.firmware}
-        return known.get(name, self._rows[name].initial)
+        values_by_name = {
+            "Model Number": self.facts.model_number,
+            "Firmware Version": self.facts.firmware,
+        }
+        return values_by_name.get(name, self._rows[name].initial)
 
     def read(self, row: int, address: int, length: int) -> bytes:
         """Bytes of a block of one servo."""
         data = bytearray(TABLE_END)
-        for name, each in self._inside(address - 1, address + length + 1):
-            raw = encode_word(int(self.values[name][row]), each, self.facts, name)
-            data[each.address : each.address + each.size] = raw
+        for name, register in self._inside(address - 1, address + length + 1):
+            raw = encode_word(int(self.values[name][row]), register, self.facts, name)
+            data[register.address : register.address + register.size] = raw
         return bytes(data[address : address + length])
 
     def write(self, row: int, address: int, data: bytes) -> list[str]:
@@ -56,11 +59,11 @@ class FeetechRegisters:
         Read-only registers and values out of range are ignored (ours).
         """
         accepted = []
-        for name, each in self._inside(address, address + len(data)):
-            if each.range is None:
+        for name, register in self._inside(address, address + len(data)):
+            if register.range is None:
                 continue
-            value = decode_word(data[each.address - address :], each, self.facts)
-            if each.range[0] <= value <= each.range[1]:
+            value = decode_word(data[register.address - address :], register, self.facts)
+            if register.range[0] <= value <= register.range[1]:
                 self.put(row, name, value)
                 accepted.append(name)
         return accepted
@@ -100,7 +103,7 @@ class FeetechRegisters:
 
     def _inside(self, start: int, end: int) -> Iterable[tuple[str, RegisterRow]]:
         return [
-            (name, each)
-            for name, each in self._rows.items()
-            if start <= each.address and each.address + each.size <= end
+            (name, row)
+            for name, row in self._rows.items()
+            if start <= row.address and row.address + row.size <= end
         ]

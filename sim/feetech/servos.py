@@ -142,9 +142,9 @@ class FeetechServos(SimulatedServos):
             if name == "Torque Enable" and self["Torque Enable"][row] and not self._was_on[row]:
                 self.protection.reset(row)
             if name == "Goal Position" and self._mode()[row] == STEP and self._has_steps():
-                here = self._step_goal[row]
-                here = self._ticks()[row] if np.isnan(here) else here
-                self._step_goal[row] = here + int(self["Goal Position"][row])
+                from_ticks = self._step_goal[row]
+                from_ticks = self._ticks()[row] if np.isnan(from_ticks) else from_ticks
+                self._step_goal[row] = from_ticks + int(self["Goal Position"][row])
         return 0
 
     def register_write(self, row: int, address: int, data: bytes) -> int:
@@ -302,11 +302,11 @@ class FeetechServos(SimulatedServos):
         many_turns = (low == 0) & (high == 0)
         goal = np.where(many_turns, goal, np.clip(goal, low, high))
         ticks = goal + self._offset() + self._turns * facts.units.positions_per_turn
-        wanted = (ticks - facts.units.zero_position) / facts.positions_per_rad
+        goal_rad = (ticks - facts.units.zero_position) / facts.positions_per_rad
         if self._has_steps():
             steps = self._mode() == STEP
             goal = (self._step_goal - facts.units.zero_position) / facts.positions_per_rad
-            wanted = np.where(steps, np.where(np.isnan(goal), path.goal, goal), wanted)
+            goal_rad = np.where(steps, np.where(np.isnan(goal), path.goal, goal), goal_rad)
         velocity = np.abs(registers["Goal Velocity"]).astype(np.float64)
         timed = np.zeros(len(self), bool)
         if "Goal Time" in facts.registers:
@@ -315,7 +315,7 @@ class FeetechServos(SimulatedServos):
         ramp = np.zeros(len(self))
         if "Acceleration" in facts.registers:
             ramp = registers["Acceleration"].astype(np.float64)
-        path.set_goals(np.where(positions, wanted, path.goal), velocity, ramp, timed)
+        path.set_goals(np.where(positions, goal_rad, path.goal), velocity, ramp, timed)
         path.advance(seconds, positions)
         speed = registers["Goal Velocity"] * facts.rad_s_per_velocity
         ahead = path.position + speed * seconds

@@ -22,8 +22,8 @@ def bus_contention(replies: Sequence[Reply], byte_s: float) -> tuple[Reply, bool
         return first, False
     mixed = bytearray()
     for delay_s, data in replies:
-        at = round((delay_s - first.delay_s) / byte_s)
-        mixed += b"\xff" * (at + len(data) - len(mixed))
-        for k, byte in enumerate(data, at):
+        offset = round((delay_s - first.delay_s) / byte_s)
+        mixed += b"\xff" * (offset + len(data) - len(mixed))
+        for k, byte in enumerate(data, offset):
             mixed[k] &= byte
     return Reply(first.delay_s, bytes(mixed)), True

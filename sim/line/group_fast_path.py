@@ -52,10 +52,10 @@ class GroupRead(ABC):
         self._share = frames.shape[1]
         self._shape = np.array([len(head), self._share, error_at, data_at])
 
-    def replies(self, table: Bytes, whole: bool) -> list[Reply]:
+    def replies(self, table: Bytes, gapless: bool) -> list[Reply]:
         """Replies with the table's present bytes."""
         fill_replies(self._packet, self._shape, table, self._rows, self._block)
-        return self._cut(self._packet.tobytes(), whole)
+        return self._cut(self._packet.tobytes(), gapless)
 
     def decoded(self, table: Bytes, request: GroupReadRequest, data: Bytes, error: Bytes) -> int:
         """Return the result of ``drivers.protocol.frames`` for these replies.
@@ -68,7 +68,7 @@ class GroupRead(ABC):
         return int(answer(*replies, request.heads, request.id_bytes, data, error))
 
     @abstractmethod
-    def _cut(self, raw: bytes, whole: bool) -> list[Reply]: ...
+    def _cut(self, raw: bytes, gapless: bool) -> list[Reply]: ...
 
     @abstractmethod
     def _template(self, ids: Bytes, length: int) -> tuple[bytes, Bytes, int, int]:
@@ -85,14 +85,14 @@ class PlainRead(GroupRead):
         frames[:, 4] = ids
         return b"", frames, 8, 9
 
-    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
+    def _cut(self, raw: bytes, gapless: bool) -> list[Reply]:
         size = self._share
-        frames = [raw[at : at + size] for at in range(0, len(raw), size)]
+        frames = [raw[start : start + size] for start in range(0, len(raw), size)]
         if raw.count(HEADER[:3]) > len(frames):  # some data look like a header
             frames = [self._stuffed(frame) for frame in frames]
-        elif whole and self._gapless:
+        elif gapless and self._gapless:
             return [Reply(self._delays_s[0], raw)]
-        return [Reply(*each) for each in zip(self._delays_s, frames, strict=True)]
+        return [Reply(*reply_facts) for reply_facts in zip(self._delays_s, frames, strict=True)]
 
     @staticmethod
     def _stuffed(frame: bytes) -> bytes:
@@ -109,7 +109,7 @@ class FastRead(GroupRead):
         frames[:, 1] = ids
         return fast_head(frames.size), frames, 0, 2
 
-    def _cut(self, raw: bytes, whole: bool) -> list[Reply]:
+    def _cut(self, raw: bytes, gapless: bool) -> list[Reply]:
         return [Reply(self._delays_s[0], raw)]
 
 
@@ -133,10 +133,10 @@ class GroupFastPath:
         self._reads: dict[bytes, GroupRead] = {}
         self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
 
-    def execute(self, raw: bytes, now_s: float, whole: bool) -> list[Reply] | None:
+    def execute(self, raw: bytes, now_s: float, gapless: bool) -> list[Reply] | None:
         """Execute ``raw`` if it is plain, else return None and change nothing.
 
-        ``whole`` joins packets without gaps.
+        ``gapless`` joins packets without gaps.
         """
         if raw[7:12] == _GOALS:
             return self._write_goals(raw, now_s)
@@ -144,7 +144,7 @@ class GroupFastPath:
         if read is None:
             return None
         self.measure(read, now_s)
-        return read.replies(self._bank.table, whole)
+        return read.replies(self._bank.table, gapless)
 
     def read_of(self, raw: bytes) -> GroupRead | None:
         """The plain group read in ``raw``, or None."""
@@ -174,8 +174,8 @@ class GroupFastPath:
         self._forget_what_changed()
         head = raw[:12]
         ids = raw[12:-2:5]
-        known = self._goals
-        if known is None or known[0] != head or known[1] != ids:
+        goals = self._goals
+        if goals is None or goals[0] != head or goals[1] != ids:
             if len(raw) < _SHORTEST or raw[:5] != _PREFIX:
                 return None
             rows = self._handler.directory.rows[np.frombuffer(ids, np.uint8)]
@@ -183,12 +183,12 @@ class GroupFastPath:
                 return None
             if self._handler.directory.deaf[rows].any():
                 return None
-            known = self._goals = (head, ids, rows)
+            goals = self._goals = (head, ids, rows)
         packet = np.frombuffer(raw, np.uint8)
         if not is_intact(packet):
             return None
         self._firmware.on_instruction(now_s)
-        self._firmware.write_goals(known[2], packet, 12)
+        self._firmware.write_goals(goals[2], packet, 12)
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:

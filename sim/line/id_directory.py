@@ -42,16 +42,16 @@ class IdDirectory:
         for row in bank.tuned_to(baud):
             if not powered[row]:
                 continue
-            own = int(bank["ID"][row])
+            servo_id = int(bank["ID"][row])
             shared = int(bank["Secondary(Shadow) ID"][row])
-            first[own].append(int(row))
-            if shared < _SECONDARY_OFF and shared != own:
+            first[servo_id].append(int(row))
+            if shared < _SECONDARY_OFF and shared != servo_id:
                 second[shared].append(int(row))
         self._first, self._second = dict(first), dict(second)
         self.rows[:] = NOBODY
-        for each, rows in first.items():
-            plain = len(rows) == 1 and each not in second and not self.mute[rows[0]]
-            self.rows[each] = rows[0] if plain else SPECIAL
+        for bus_id, rows in first.items():
+            plain = len(rows) == 1 and bus_id not in second and not self.mute[rows[0]]
+            self.rows[bus_id] = rows[0] if plain else SPECIAL
         for each in second:
             self.rows[each] = SPECIAL
 

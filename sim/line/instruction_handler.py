@@ -139,17 +139,17 @@ class InstructionHandler:
         sent = []
         others = () if self._imu is None else (self._imu.config.id,)
         everyone = sorted({*self.directory.ids(), *others})
-        for each in everyone if servo_id == BROADCAST_ID else (servo_id,):
+        for replying_id in everyone if servo_id == BROADCAST_ID else (servo_id,):
             replies = []
-            imu = self._imu_at(each)
+            imu = self._imu_at(replying_id)
             if imu is not None:
                 data = imu.model_number.to_bytes(2, "little") + b"\x01"
-                replies.append(Reply(0.0, encode_status(StatusPacket(each, 0, data))))
-            for row in self.directory.replying(each):
+                replies.append(Reply(0.0, encode_status(StatusPacket(replying_id, 0, data))))
+            for row in self.directory.replying(replying_id):
                 model = self.bank["Model Number"][row]
                 firmware = self.bank["Firmware Version"][row]
                 data = int(model).to_bytes(2, "little") + bytes((int(firmware),))
-                replies.append(Reply(self.delay_s(row), self._status(row, each, 0, data)))
+                replies.append(Reply(self.delay_s(row), self._status(row, replying_id, 0, data)))
             sent += self._respond(replies)
         return sent
 
@@ -190,13 +190,13 @@ class InstructionHandler:
         return self._respond([_reply(servo_id, block) for block in blocks])
 
     def _sync_read(self, params: bytes, *, fast: bool) -> list[Reply]:
-        asked = [(each, word(params, 0), word(params, 2)) for each in params[4:]]
+        asked = [(param, word(params, 0), word(params, 2)) for param in params[4:]]
         return self._group_read(asked, fast)
 
     def _bulk_read(self, params: bytes, *, fast: bool) -> list[Reply]:
         asked = [
-            (params[at], word(params, at + 1), word(params, at + 3))
-            for at in range(0, len(params) - 4, 5)
+            (params[start], word(params, start + 1), word(params, start + 3))
+            for start in range(0, len(params) - 4, 5)
         ]
         return self._group_read(asked, fast)
 
@@ -225,8 +225,8 @@ class InstructionHandler:
             else:
                 sent += self._respond([_reply(servo_id, block) for block in blocks])
         if parts:
-            whole = sum(length + 4 for _, _, length in asked)
-            data = encode_fast(parts, whole)
+            total = sum(length + 4 for _, _, length in asked)
+            data = encode_fast(parts, total)
             self.collisions += garbled
             sent.append(Reply(first_s, data[:-2] + b"\0\0" if garbled else data))
         return sent
@@ -234,19 +234,21 @@ class InstructionHandler:
     def _sync_write(self, params: bytes) -> list[Reply]:
         address = word(params, 0)
         length = word(params, 2)
-        for at in range(4, len(params) - length, length + 1):
-            self._write(params[at], address, params[at + 1 : at + 1 + length], by_sync=True)
+        for start in range(4, len(params) - length, length + 1):
+            self._write(
+                params[start], address, params[start + 1 : start + 1 + length], by_sync=True
+            )
         self._written()
         return []
 
     def _bulk_write(self, params: bytes) -> list[Reply]:
-        at = 0
-        while at + 5 <= len(params):
-            length = word(params, at + 3)
-            data = params[at + 5 : at + 5 + length]
+        start = 0
+        while start + 5 <= len(params):
+            length = word(params, start + 3)
+            data = params[start + 5 : start + 5 + length]
             if len(data) == length:
-                self._write(params[at], word(params, at + 1), data)
-            at += 5 + length
+                self._write(params[start], word(params, start + 1), data)
+            start += 5 + length
         self._written()
         return []
 

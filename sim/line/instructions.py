@@ -94,6 +94,6 @@ class Instructions:
         return error
 
 
-def word(params: bytes, at: int) -> int:
+def word(params: bytes, offset: int) -> int:
     """Two bytes, little-endian."""
-    return int.from_bytes(params[at : at + 2], "little")
+    return int.from_bytes(params[offset : offset + 2], "little")

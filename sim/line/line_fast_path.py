@@ -87,5 +87,5 @@ class LineFastPath:
     def finish(self) -> GroupReadReply | bytes:
         """Receive the reply to the request of ``begin``; empty if ``read_until`` must read it."""
         data = np.empty(self._shape, np.uint8)
-        found = self._wire.finish(self._request, data, self._error, self._limit_s)
-        return b"" if found == IRREGULAR else self._request.regular(found, data, self._error)
+        outcome = self._wire.finish(self._request, data, self._error, self._limit_s)
+        return b"" if outcome == IRREGULAR else self._request.regular(outcome, data, self._error)

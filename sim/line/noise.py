@@ -69,9 +69,16 @@ class Noise:
             case "drop":
                 return []
             case "corrupt":
-                at = self._random.randrange(len(data))
+                position = self._random.randrange(len(data))
                 bit = self._random.randrange(8)
-                return [(slow_s, data[:at] + bytes((data[at] ^ 1 << bit,)) + data[at + 1 :])]
+                return [
+                    (
+                        slow_s,
+                        data[:position]
+                        + bytes((data[position] ^ 1 << bit,))
+                        + data[position + 1 :],
+                    )
+                ]
             case "truncate":
                 return [(slow_s, data[: self._random.randrange(1, max(2, len(data)))])]
             case "duplicate":

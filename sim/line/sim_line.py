@@ -77,7 +77,7 @@ class SimLine(Wire):
 
     def ids(self) -> list[int]:
         """The ID of each row."""
-        return [int(each) for each in self.bank["ID"]]
+        return [int(servo_id) for servo_id in self.bank["ID"]]
 
     def senders(self, reply: bytes) -> Collection[int]:
         """IDs of the servos that sent a reply: one, or all of a fast read."""
@@ -136,8 +136,8 @@ class SimLine(Wire):
         latency_s: float,
     ) -> LineFastPath | None:
         """``drivers.bus.fast_path.FastPathPort``; None if a test has replaced the port's calls."""
-        own = self.write, self.read_until, self.clearPort
-        if [getattr(each, "__func__", None) for each in own] != _CALLS:
+        calls = self.write, self.read_until, self.clearPort
+        if [getattr(call, "__func__", None) for call in calls] != _CALLS:
             return None
         return LineFastPath(self, goals, request, line, latency_s=latency_s)
 
@@ -163,17 +163,17 @@ class SimLine(Wire):
             return IRREGULAR
         sent.popleft()
         self._arrive(end_s, len(request.packet))
-        found = IRREGULAR
+        outcome = IRREGULAR
         if self._group.read_of(request.packet) is read:  # the servos have not changed
             self._group.measure(read, end_s)
-            found = read.decoded(self.bank.table, request, data, error)
-        if found == IRREGULAR:
+            outcome = read.decoded(self.bank.table, request, data, error)
+        if outcome == IRREGULAR:
             self._send_replies(end_s, self._execute(request.packet, end_s))
             return IRREGULAR
         self.busy_s += wire_s
         self._quiet_s = due_s - self.usb_latency_s
         self.clock.sleep_until_s(due_s)
-        return found
+        return outcome
 
     # the wire
 
@@ -190,12 +190,12 @@ class SimLine(Wire):
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         self._asked = data
         if self._script is None:
-            apart = self.tamper is not None or bool(self.taps)
-            quick = self._group.execute(data, end_s, whole=not apart)
+            bytewise = self.tamper is not None or bool(self.taps)
+            quick = self._group.execute(data, end_s, gapless=not bytewise)
             return self._one_by_one(data, end_s) if quick is None else quick
         replies: list[Reply] = []
         for piece in self._instruction_with_faults(data, end_s):
-            quick = self._group.execute(piece, end_s, whole=False)
+            quick = self._group.execute(piece, end_s, gapless=False)
             replies += self._one_by_one(piece, end_s) if quick is None else quick
         return replies
 
@@ -216,12 +216,12 @@ class SimLine(Wire):
         if len(data) >= 7 and data[5] | data[6] << 8 == len(data) - 7:
             return (data,)
         frames = []
-        at = 0
-        while data.startswith(HEADER, at) and at + 7 <= len(data):
-            end = at + 7 + int.from_bytes(data[at + 5 : at + 7], "little")
+        start = 0
+        while data.startswith(HEADER, start) and start + 7 <= len(data):
+            end = start + 7 + int.from_bytes(data[start + 5 : start + 7], "little")
             if end >= len(data):
                 break
-            frames.append(data[at:end])
-            at = end
-        frames.append(data[at:])
+            frames.append(data[start:end])
+            start = end
+        frames.append(data[start:])
         return frames

@@ -21,7 +21,7 @@ def _call(typing: Any, function: Any, model: Any, data: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.VoidType(), [voidptr_t, voidptr_t])
         function = builder.inttoptr(args[0], kind.as_pointer())
-        builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
+        builder.call(function, [builder.inttoptr(address, voidptr_t) for address in args[1:]])
         return context.get_dummy_value()
 
     return types.none(types.int64, types.int64, types.int64), build
@@ -33,14 +33,16 @@ def _call_with(typing: Any, function: Any, model: Any, data: Any, third: Any) ->
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [voidptr_t, voidptr_t, voidptr_t])
         function = builder.inttoptr(args[0], kind.as_pointer())
-        return builder.call(function, [builder.inttoptr(each, voidptr_t) for each in args[1:]])
+        return builder.call(
+            function, [builder.inttoptr(address, voidptr_t) for address in args[1:]]
+        )
 
     return types.int32(types.int64, types.int64, types.int64, types.int64), build
 
 
 def _copy(typing: Any, to: Any, source: Any, words: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        to, source = (builder.inttoptr(each, voidptr_t) for each in args[:2])
+        to, source = (builder.inttoptr(address, voidptr_t) for address in args[:2])
         raw_memcpy(builder, to, source, args[2], 8, align=8)
         return context.get_dummy_value()
 

@@ -48,17 +48,17 @@ class BellyContacts:
         model = mechanics.model
         planes = mechanics.planes
         bellies = np.array([model.geom(k).name.startswith("belly") for k in range(model.ngeom)])
-        known = bellies | (mechanics.contact_role == GROUND)
-        others = ~known & ((model.geom_contype | model.geom_conaffinity) != 0)
+        is_touching = bellies | (mechanics.contact_role == GROUND)
+        others = ~is_touching & ((model.geom_contype | model.geom_conaffinity) != 0)
         more = model.nu, model.neq, model.ntendon, model.nflex, model.nsensor, model.nplugin
         if not bellies.any() or others.any() or any(more) or model.body_rootid[1:].max() > 1:
             return None
         data = _sunk(model, planes, bellies)
         count = data.ncon
         capsule = model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE
-        each = PLANES if len(planes.planes) else 1
-        whole = (bellies.sum() + (bellies & capsule).sum()) * each
-        if count != whole or (data.contact.dim != 1).any():
+        per_part = PLANES if len(planes.planes) else 1
+        expected_count = (bellies.sum() + (bellies & capsule).sum()) * per_part
+        if count != expected_count or (data.contact.dim != 1).any():
             return None
         words = layout.contact_words(data)
         geoms = data.contact.geom.astype(np.int32)
@@ -108,11 +108,11 @@ def _reach_m2(model: mujoco.MjModel, bellies: NDArray[np.bool_]) -> Floats:
         body = int(model.geom_bodyid[geom])
         away_m = float(np.linalg.norm(model.geom_pos[geom] - model.body_ipos[body]))
         reach_m[body] = max(reach_m[body], away_m + model.geom_rbound[geom])
-    apart = {int(each) for each in model.exclude_signature}
+    excluded_pairs = {int(signature) for signature in model.exclude_signature}
     squares = np.full((model.nbody, model.nbody), -1.0)
     for a in range(1, model.nbody):
         for b in range(a + 1, model.nbody):
-            mate = a == model.body_parentid[b] or (a << 16) + b in apart
+            mate = a == model.body_parentid[b] or (a << 16) + b in excluded_pairs
             if reach_m[a] and reach_m[b] and not mate:
                 squares[a, b] = ((reach_m[a] + reach_m[b]) * _SAFE) ** 2
     return squares
@@ -142,7 +142,7 @@ def links_near(centre_m: Floats, reach_m2: Floats, work: Floats) -> bool:
 
 def write_contacts(
     reals: Floats,
-    at: tuple[int, int, int, int, int],
+    fields: tuple[int, int, int, int, int],
     words: NDArray[np.int64],
     geoms: NDArray[np.int32],
     shapes_m: Floats,
@@ -152,7 +152,7 @@ def write_contacts(
     plane_quat: Floats,
     turn: int,
     plane_axes: Floats,
-    held: NDArray[np.int64],
+    claimed_slots: NDArray[np.int64],
 ) -> int:
     """Write all present contacts in sequence; returns their number, -1 for MuJoCo's own search.
 
@@ -160,7 +160,7 @@ def write_contacts(
 
     Args:
         reals: space for all contacts, as numbers.
-        at: offsets in words of distance, place and normal; begin and end of the unused words.
+        fields: offsets in words of distance, place and normal; begin and end of the unused words.
         words: of ``BellyContacts``.
         geoms: of ``BellyContacts``.
         shapes_m: of ``BellyContacts``.
@@ -171,14 +171,14 @@ def write_contacts(
         turn: address of ``mju_quat2Mat`` if they were just laid, else 0. Its last bits depend on
             the version of MuJoCo.
         plane_axes: (9,) overwritten.
-        held: (C,) contacts whose constants are already at each place of the list; -1 for none.
+        claimed_slots: (C,) contact whose constants each place of the list has; -1 for none.
 
     """
     size = words.shape[1]
-    found = 0
+    slot = 0
     room = reals.ctypes.data
     constants = words.ctypes.data
-    at_dist, at_place, at_normal, first, last = at
+    at_dist, at_place, at_normal, first, last = fields
     for c in range(len(words)):
         plane = geoms[c, 0]
         belly = geoms[c, 1]
@@ -201,9 +201,9 @@ def write_contacts(
         dist = away - radius
         if dist >= margin:
             return -1  # it touches without load: MuJoCo lists it with a mark
-        base = size * found
-        if held[found] != c:
-            held[found] = c
+        base = size * slot
+        if claimed_slots[slot] != c:
+            claimed_slots[slot] = c
             to = room + base * _WORD
             source = constants + c * size * _WORD
             copy_words(to, source, first)
@@ -217,6 +217,6 @@ def write_contacts(
         reals[base + at_normal] = n0 * length
         reals[base + at_normal + 1] = n1 * length
         reals[base + at_normal + 2] = n2 * length
-        found += 1
-    held[found:] = -1  # entries after the contacts are overwritten
-    return found
+        slot += 1
+    claimed_slots[slot:] = -1  # entries after the contacts are overwritten
+    return slot

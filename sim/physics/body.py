@@ -168,7 +168,7 @@ def mjcf(
     With ``planes``, tangent planes replace a height field for bellies and feet.
     """
     soft = f'solref="{max(CONTACT_TIME_S, 2.0 * step_s)} 1" solimp="0.9 0.95 0.001"'
-    held = f'solreffriction="{2.0 * step_s} 1" solimpfriction="{GEAR_IMPEDANCE} 0.001"'
+    solver_settings = f'solreffriction="{2.0 * step_s} 1" solimpfriction="{GEAR_IMPEDANCE} 0.001"'
     by_planes = planes and ground is not None
     asset, floor = _ground(world, ground, touches=not by_planes)
     options, obstacle = obstacle_mjcf(world)
@@ -188,7 +188,7 @@ def mjcf(
     {options}/>
   <asset>{asset}</asset>
   <default>
-    <joint type="hinge" {held}/>
+    <joint type="hinge" {solver_settings}/>
     <geom condim="1" {soft}/>
   </default>
   <worldbody>
@@ -231,7 +231,9 @@ def _link(robot: RobotConfig, index: int, *, balls: bool) -> str:
     mast = 0.0  # its mass is in the link's; here its height adds to the inertia
     if robot.stereo_head is not None and robot.stereo_head.link == index:
         mast = robot.stereo_head.mass_kg * robot.stereo_head.height_m**2
-    about = " ".join(repr(each) for each in (m * r**2 / 2 + mast, across + mast, across))
+    about = " ".join(
+        repr(inertia_kg_m2) for inertia_kg_m2 in (m * r**2 / 2 + mast, across + mast, across)
+    )
     return (
         f'<inertial pos="{centre}" mass="{m!r}" diaginertia="{about}"/>'
         f"{_belly(robot, index, balls)}"
@@ -244,12 +246,12 @@ def _belly(robot: RobotConfig, index: int, balls: bool) -> str:
     text = ""
     for c, row in enumerate(belly_points_m(robot, index)):
         row[:, 0] -= 0.0 if index == 0 else robot.link_lengths_m[index] / 2
-        at = [" ".join(repr(float(v)) for v in point) for point in row]
-        if balls or len(at) == 1:
-            for k, place in enumerate(at):
+        ball_points = [" ".join(repr(float(v)) for v in point) for point in row]
+        if balls or len(ball_points) == 1:
+            for k, place in enumerate(ball_points):
                 text += f'<geom name="belly{index}_{c}_{k}" type="sphere" pos="{place}" {common}/>'
         else:
-            ends = f'fromto="{at[0]} {at[-1]}"'
+            ends = f'fromto="{ball_points[0]} {ball_points[-1]}"'
             text += f'<geom name="belly{index}_{c}" type="capsule" {ends} {common}/>'
     return text
 
@@ -293,7 +295,7 @@ def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str
         axis = f"0 0 {-side!r}" if pair.joint_axes[k] == "y" else f"{side!r} 0 0"
         stop = limits[first + k - 1] + STOP_MARGIN_RAD
         along = -0.5 * robot.link_lengths_m[pair.link] if pair.link > 0 else 0.0
-        at = (along, side * pair.hip_m) if k == 0 else (0.0, side * pair.segments_m[k - 1])
+        hip = (along, side * pair.hip_m) if k == 0 else (0.0, side * pair.segments_m[k - 1])
         length = pair.segments_m[k]
         mass = pair.segment_mass_kg
         r = pair.foot_radius_m
@@ -306,7 +308,7 @@ def _limb(robot: RobotConfig, pair: LimbsConfig, first: int, side: float) -> str
             else ""
         )
         text = (
-            f'<body name="link{first + k}" pos="{at[0]!r} {at[1]!r} 0">'
+            f'<body name="link{first + k}" pos="{hip[0]!r} {hip[1]!r} 0">'
             f'<joint name="{name}" axis="{axis}" range="{-stop!r} {stop!r}" '
             f'armature="{robot.armatures_kg_m2[first + k - 1]!r}"/>'
             f'<inertial pos="0 {0.5 * side * length!r} 0" mass="{mass!r}" '

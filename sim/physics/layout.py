@@ -147,8 +147,10 @@ def _ctype(kind: object) -> Any:
 def _addresses(functions: Iterable[str]) -> dict[str, int]:
     """Find C functions in the library of the Python module."""
     library = ctypes.CDLL(mujoco._functions.__file__)
-    found = {name: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in functions}
-    return {name: address for name, address in found.items() if address}
+    addresses = {
+        name: ctypes.cast(getattr(library, name), ctypes.c_void_p).value for name in functions
+    }
+    return {name: address for name, address in addresses.items() if address}
 
 
 def _ball() -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -188,14 +190,14 @@ def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
 
 def _steps_by_parts(layout: StepLayout) -> bool:
     """Whether steps by parts, with a contact written in place, equal ``mj_step`` to the bit."""
-    model, whole = _ball()
+    model, reference = _ball()
     _, parts = _ball()
     part = ctypes.CFUNCTYPE(None, *_POINTERS[:2])
     add = ctypes.CFUNCTYPE(ctypes.c_int, *_POINTERS)
     calls = {name: part(address) for name, address in layout.functions.items()}
     add_contact = add(layout.functions["mj_addContact"])
     for _ in range(3):
-        mujoco.mj_step(model, whole)
+        mujoco.mj_step(model, reference)
         for name in FUNCTIONS[WHOLE:-4]:
             if name == "mj_comPos":
                 calls["mj_kinematics"](model._address, parts._address)
@@ -218,7 +220,7 @@ def _steps_by_parts(layout: StepLayout) -> bool:
         ctypes.c_int64.from_address(fields["parena_at"]).value = count * layout.contact["size"]
         for name in (*FUNCTIONS[-4:-1], "mj_step2"):
             calls[name](model._address, parts._address)
-        pairs = ((whole.qpos, parts.qpos), (whole.qvel, parts.qvel))
-        if any(one.tobytes() != other.tobytes() for one, other in pairs):
+        pairs = ((reference.qpos, parts.qpos), (reference.qvel, parts.qvel))
+        if any(array.tobytes() != other.tobytes() for array, other in pairs):
             return False
-    return bool(whole.efc_force.tobytes() == parts.efc_force.tobytes())
+    return bool(reference.efc_force.tobytes() == parts.efc_force.tobytes())

@@ -163,17 +163,17 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls)
         return clear[np.isfinite(clear)]
 
     for _ in range(DRAPE_ROUNDS):
-        here = above_m()
+        rest_m = above_m()
         qpos = data.qpos.copy()
-        slopes = np.empty((len(here), len(free)))
+        slopes = np.empty((len(rest_m), len(free)))
         for column, dof in enumerate(free):
             step = np.zeros(model.nv)
             step[dof] = 1e-4
             mujoco.mj_integratePos(model, data.qpos, step, 1.0)
-            slopes[:, column] = (above_m() - here) / 1e-4
+            slopes[:, column] = (above_m() - rest_m) / 1e-4
             data.qpos[:] = qpos
         change = np.zeros(model.nv)
-        change[free] = least_squares(slopes, -here, stiff)
+        change[free] = least_squares(slopes, -rest_m, stiff)
         change[3:] = np.clip(change[3:], -0.3, 0.3)
         mujoco.mj_integratePos(model, data.qpos, change, 1.0)
         data.qpos[pitch] = np.clip(data.qpos[pitch], -limit, limit)
@@ -182,7 +182,7 @@ def _drape(m: Mechanics, robot: RobotConfig, ground: HeightField, balls: _Balls)
 def _settle(m: Mechanics) -> None:
     model = m.model
     data = m.data
-    held = data.qpos[7:].copy()
+    joint_rad = data.qpos[7:].copy()
     start = data.qpos[:2].copy()
     for _ in range(int(SETTLE_MAX_S / m.step_s)):
         m.planes.lay(data)
@@ -190,7 +190,7 @@ def _settle(m: Mechanics) -> None:
         data.qvel[:] *= np.exp(-SETTLE_DAMPING_PER_S * m.step_s)
         data.qvel[:2] = 0.0
         data.qvel[5:] = 0.0
-        data.qpos[7:] = held
+        data.qpos[7:] = joint_rad
         data.qpos[:2] = start
         fall = np.abs(data.qvel[2])
         turn = np.abs(data.qvel[3:]).max()
@@ -228,11 +228,11 @@ def _rest_height_m(ground: HeightField | None, centre: Floats, radius_m: Floats)
     rest_m = np.empty(len(centre))
     for radius in np.unique(radius_m):
         offsets = np.linspace(-1.0, 1.0, 9) * radius
-        dx, dy = (each.ravel() for each in np.meshgrid(offsets, offsets))
+        dx, dy = (offset.ravel() for offset in np.meshgrid(offsets, offsets))
         inside = dx**2 + dy**2 <= radius**2
         dx, dy = dx[inside], dy[inside]
         cap = np.sqrt(radius**2 - dx**2 - dy**2)
-        own = radius_m == radius
-        z = ground.elevation_m(centre[own, :1] + dx, centre[own, 1:2] + dy)
-        rest_m[own] = (z + cap).max(axis=1)
+        is_same_radius = radius_m == radius
+        z = ground.elevation_m(centre[is_same_radius, :1] + dx, centre[is_same_radius, 1:2] + dy)
+        rest_m[is_same_radius] = (z + cap).max(axis=1)
     return rest_m

@@ -89,13 +89,17 @@ class PublicSteps:
         return Body(self._state, self._chain, self._links, self._geoms, law, m.totals)
 
     def _contacts(self) -> Contacts:
-        found = self._mechanics.data.contact
-        count = len(found.dist)
+        contact = self._mechanics.data.contact
+        count = len(contact.dist)
         reals = np.zeros((count, _AT.size))
-        reals[:, _AT.dist], reals[:, 1:4], reals[:, 4:7] = found.dist, found.pos, found.frame[:, :3]
+        reals[:, _AT.dist], reals[:, 1:4], reals[:, 4:7] = (
+            contact.dist,
+            contact.pos,
+            contact.frame[:, :3],
+        )
         integers = reals.view(np.int32)
-        integers[:, _AT.geom : _AT.geom + 2] = found.geom
-        integers[:, _AT.row] = found.efc_address
+        integers[:, _AT.geom : _AT.geom + 2] = contact.geom
+        integers[:, _AT.row] = contact.efc_address
         if count > len(self._lanes[1]):
             self._lanes = make_lanes(count)
         return Contacts(reals.ravel(), integers.ravel(), count, _AT)

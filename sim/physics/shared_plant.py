@@ -23,9 +23,9 @@ class SharedPlant:
 
     def share(self, rows: Sequence[int]) -> "PlantShare":
         """The shafts of one group of servos, by index."""
-        made = PlantShare(self, np.array(rows, np.intp))
-        self._shares.append(made)
-        return made
+        plant_share = PlantShare(self, np.array(rows, np.intp))
+        self._shares.append(plant_share)
+        return plant_share
 
     def advance(self) -> None:
         """Step the body to the time that all groups have reached."""
@@ -66,10 +66,10 @@ class PlantShare:
         """Set the inputs of these shafts; the body steps when the other groups are as far."""
         self._drive = drive
         self.reached_s = until_s
-        for whole, own in zip(
+        for column, part in zip(
             self._shared.drive.columns()[:_INPUTS], drive.columns(), strict=False
         ):
-            whole[self._rows] = own
+            column[self._rows] = part
         self._shared.advance()
 
     def return_outputs(self) -> None:
@@ -77,5 +77,5 @@ class PlantShare:
         if self._drive is None:
             return
         outputs = self._shared.drive.columns()[_INPUTS:]
-        for whole, own in zip(outputs, self._drive.columns()[_INPUTS:], strict=True):
-            own[:] = whole[self._rows]
+        for output, share_column in zip(outputs, self._drive.columns()[_INPUTS:], strict=True):
+            share_column[:] = output[self._rows]

@@ -57,21 +57,21 @@ class SplitPlant:
 
     def follow(self, measured_at_s: Floats, position_rad: Floats, velocity_rad_s: Floats) -> None:
         """Store the measured positions of the real joints, (J,) each, if finite."""
-        known = np.isfinite(position_rad[self._real])
-        rows = self._real[known]
-        self._measured_at_s[known] = measured_at_s[rows]
-        self._position_rad[known] = position_rad[rows]
-        self._velocity_rad_s[known] = velocity_rad_s[rows]
+        is_known = np.isfinite(position_rad[self._real])
+        rows = self._real[is_known]
+        self._measured_at_s[is_known] = measured_at_s[rows]
+        self._position_rad[is_known] = position_rad[rows]
+        self._velocity_rad_s[is_known] = velocity_rad_s[rows]
         self._drive.torque_on[rows] = 1.0
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
         """Step the body under ``drive`` (S,), with its other shafts following."""
-        whole = self._drive
+        joined = self._drive
         rows = self._simulated
-        for mine, given in zip(whole.columns()[:_INPUTS], drive.columns(), strict=False):
+        for mine, given in zip(joined.columns()[:_INPUTS], drive.columns(), strict=False):
             mine[rows] = given
         ahead_s = np.clip(until_s - self._measured_at_s, 0.0, AHEAD_S)
-        whole.goal_rad[self._real] = self._position_rad + self._velocity_rad_s * ahead_s
-        self._plant.advance(until_s, whole)
-        for mine, given in zip(whole.columns()[_INPUTS:], drive.columns()[_INPUTS:], strict=True):
+        joined.goal_rad[self._real] = self._position_rad + self._velocity_rad_s * ahead_s
+        self._plant.advance(until_s, joined)
+        for mine, given in zip(joined.columns()[_INPUTS:], drive.columns()[_INPUTS:], strict=True):
             given[:] = mine[rows]

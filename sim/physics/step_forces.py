@@ -99,23 +99,26 @@ def _line_up(body: Body, contacts: Contacts, still_n_s: float, lanes: Lanes) -> 
 
     Contacts with an obstacle and of a foot have MuJoCo's own friction, those of two links none.
     """
-    reals, integers, count, at = contacts
+    reals, integers, count, contact_fields = contacts
     geom_body, role = body.geoms
     v, w, _, depth, _, load, mass_kg, _ = body.links
     centre, rotation, _, _, _ = body.chain
     table, of_link = lanes
-    found = 0
+    line_count = 0
     depth[:] = 0.0
     for c in range(count):
-        geom = 2 * at.size * c + at.geom
+        geom = 2 * contact_fields.size * c + contact_fields.geom
         if role[integers[geom]] != GROUND or role[integers[geom + 1]] == FOOT:
             continue
         i = int(geom_body[integers[geom + 1]]) - 1
-        row = found // LANES * ROWS + found % LANES
-        of_link[found] = i
-        found += 1
-        p, n = at.size * c + at.place, at.size * c + at.normal
-        deep = max(-reals[at.size * c + at.dist], LEAST_DEPTH_M)
+        row = line_count // LANES * ROWS + line_count % LANES
+        of_link[line_count] = i
+        line_count += 1
+        p, n = (
+            contact_fields.size * c + contact_fields.place,
+            contact_fields.size * c + contact_fields.normal,
+        )
+        deep = max(-reals[contact_fields.size * c + contact_fields.dist], LEAST_DEPTH_M)
         depth[i] += deep
         p0, p1, p2 = reals[p], reals[p + 1], reals[p + 2]
         r0, r1, r2 = p0 - centre[i + 1, 0], p1 - centre[i + 1, 1], p2 - centre[i + 1, 2]
@@ -132,9 +135,9 @@ def _line_up(body: Body, contacts: Contacts, still_n_s: float, lanes: Lanes) -> 
         table[row + AXIS + 2 * LANES] = rotation[i + 1, 6]
         table[row + DEPTH], table[row + LOAD] = deep, load[i]
         table[row + STILL] = still_n_s * mass_kg[i]
-    for k in range(found):
+    for k in range(line_count):
         table[k // LANES * ROWS + k % LANES + DEPTH + LANES] = depth[of_link[k]]
-    return found
+    return line_count
 
 
 def _add_friction(body: Body, contacts: Contacts, lanes: Lanes) -> None:
@@ -309,12 +312,14 @@ def settle(body: Body, shafts: Shafts, contacts: Contacts, force_n: Floats, rubs
 def _weigh(body: Body, contacts: Contacts, force_n: Floats) -> None:
     load = body.links.load
     load[:] = 0.0
-    _, integers, count, at = contacts
+    _, integers, count, contact_fields = contacts
     geom_body, role = body.geoms
     for c in range(count):
-        row = integers[2 * at.size * c + at.row]
-        if row >= 0 and role[integers[2 * at.size * c + at.geom]] == GROUND:
-            load[geom_body[integers[2 * at.size * c + at.geom + 1]] - 1] += force_n[row]
+        row = integers[2 * contact_fields.size * c + contact_fields.row]
+        if row >= 0 and role[integers[2 * contact_fields.size * c + contact_fields.geom]] == GROUND:
+            load[
+                geom_body[integers[2 * contact_fields.size * c + contact_fields.geom + 1]] - 1
+            ] += force_n[row]
 
 
 callable_in_loops(gauges)

@@ -90,7 +90,7 @@ def _bellies_at(m: Any) -> tuple[Any, ...]:
 
 def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, ...]) -> int:
     """Write the contacts of the bellies; return their number, -1 if MuJoCo must search."""
-    words, geoms, shapes_m, reach_m2, work, axes, held, plane_axes = bellies
+    words, geoms, shapes_m, reach_m2, work, axes, claimed_slots, plane_axes = bellies
     places, balls, _, _, _, _, plane_m, plane_quat = ground
     if links_near(xipos, reach_m2, work):
         return -1
@@ -99,14 +99,22 @@ def _find_contacts(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tupl
     ncon[0] = 0
     # drops the contacts of the previous step
     call_with(m.mj_addContact_at, m.model_at, m.data_at, words.ctypes.data)
-    held[0] = 0
+    claimed_slots[0] = 0
     list_at = carray(pointer(m.contact_at), (1,), np.int64)[0]
     reals = reals_at(list_at, (words.size,))
     fields = contact_fields_at(m)
-    at = fields.dist, fields.place, fields.normal, m.contact_hessian_begin, m.contact_hessian_end
+    contact_fields = (
+        fields.dist,
+        fields.place,
+        fields.normal,
+        m.contact_hessian_begin,
+        m.contact_hessian_end,
+    )
     turn = m.mju_quat2Mat_at if tangent else 0
     laid = plane_m if tangent else places, plane_quat, turn, plane_axes
-    count = write_contacts(reals, at, words, geoms, shapes_m, places, axes, *laid, held)
+    count = write_contacts(
+        reals, contact_fields, words, geoms, shapes_m, places, axes, *laid, claimed_slots
+    )
     ncon[0] = max(count, 0)
     carray(pointer(m.parena_at), (1,), np.int64)[0] = max(count, 0) * m.contact_size
     return count
@@ -116,8 +124,8 @@ def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, .
     """Lay the planes and call ``mj_step1``; by parts if all contacts are of bellies."""
     model = m.model_at
     data = m.data_at
-    held = bellies[6]
-    by_parts = len(held) > 0
+    claimed_slots = bellies[6]
+    by_parts = len(claimed_slots) > 0
     tangent = len(ground[1]) > 0
     if by_parts:
         call(m.mj_checkPos_at, model, data)
@@ -133,7 +141,7 @@ def _step1(m: Any, xipos: Floats, ground: tuple[Any, ...], bellies: tuple[Any, .
     call(m.mj_makeM_at, model, data)
     call(m.mj_factorM_at, model, data)
     if _find_contacts(m, xipos, ground, bellies) < 0:
-        held[:] = -1
+        claimed_slots[:] = -1
         if tangent:
             call(m.mj_kinematics_at, model, data)
         call(m.mj_collision_at, model, data)
@@ -152,7 +160,7 @@ def _run(steps: int, memory: NDArray[np.void]) -> float:
     bellies[6][:] = -1  # other data may have used the memory since the last run
     rubs = has_friction(shafts.gears.terms)
     lanes = make_lanes(2 * m.count_joints)
-    at = contact_fields_at(m)
+    contact_fields = contact_fields_at(m)
     ncon = integers_at(m.ncon_at, (1,))
     contact_list = carray(pointer(m.contact_at), (1,), np.int64)
     force_list = carray(pointer(m.efc_force_at), (1,), np.int64)
@@ -161,10 +169,10 @@ def _run(steps: int, memory: NDArray[np.void]) -> float:
         count = ncon[0]
         first = contact_list[0]
         contacts = Contacts(
-            reals_at(first, (count * at.size,)),
-            integers_at(first, (count * at.size * 2,)),
+            reals_at(first, (count * contact_fields.size,)),
+            integers_at(first, (count * contact_fields.size * 2,)),
             count,
-            at,
+            contact_fields,
         )
         if count > len(lanes[1]):
             lanes = make_lanes(count)
@@ -188,8 +196,8 @@ class CompiledSteps:
 
     def __init__(self, mechanics: Mechanics, layout: StepLayout) -> None:
         self._mechanics = mechanics
-        found = BellyContacts.of(mechanics, layout) if layout.has_parts else None
-        bellies = found or NO_CONTACTS
+        belly_contacts = BellyContacts.of(mechanics, layout) if layout.has_parts else None
+        bellies = belly_contacts or NO_CONTACTS
         m = mechanics.model
         d = mechanics.data
         planes = mechanics.planes

@@ -138,21 +138,21 @@ def _is_nearest(
 
 
 @compiled(f"void(float64[::1], {_POINT}[:, ::1])")
-def _keep(point: Floats, distance: float, same_m: float, found: Floats) -> None:
+def _keep(point: Floats, distance: float, same_m: float, planes: Floats) -> None:
     slot = 0
     for k in range(PLANES):
-        apart = 0.0
-        if found[k, 3] < np.inf:
+        distance_m2 = 0.0
+        if planes[k, 3] < np.inf:
             for axis in range(3):
-                apart += (found[k, axis] - point[axis]) ** 2
-            if apart < same_m * same_m:
+                distance_m2 += (planes[k, axis] - point[axis]) ** 2
+            if distance_m2 < same_m * same_m:
                 slot = k
                 break
-        if found[k, 3] > found[slot, 3]:
+        if planes[k, 3] > planes[slot, 3]:
             slot = k
-    if distance < found[slot, 3]:
-        found[slot, 0], found[slot, 1], found[slot, 2] = point[0], point[1], point[2]
-        found[slot, 3] = distance
+    if distance < planes[slot, 3]:
+        planes[slot, 0], planes[slot, 1], planes[slot, 2] = point[0], point[1], point[2]
+        planes[slot, 3] = distance
 
 
 @compiled(f"void({_POINT}, float64, {_FIELD}, float64[:, ::1])")
@@ -163,18 +163,18 @@ def touch(
     radius_m: float,
     z_m: Floats,
     corner_m: tuple[float, float, float],
-    found: Floats,
+    planes: Floats,
 ) -> None:
-    """Find where a ball meets the field: points (PLANES, 3) and distances in ``found``.
+    """Find where a ball meets the field: points (PLANES, 3) and distances in ``planes``.
 
     A distance of ``radius_m`` or more means no contact; 0 means a centre below the surface.
     """
     x0, y0, spacing = corner_m
     rows, columns = z_m.shape
-    found[:, 3] = np.inf
+    planes[:, 3] = np.inf
     level, _, _ = _face(x, y, z_m, corner_m)
     if z <= level:
-        found[0, 0], found[0, 1], found[0, 2], found[0, 3] = x, y, level, 0.0
+        planes[0, 0], planes[0, 1], planes[0, 2], planes[0, 3] = x, y, level, 0.0
         return
     first = max(math.floor((x - radius_m - x0) / spacing), 0)
     last = min(math.floor((x + radius_m - x0) / spacing), columns - 2)
@@ -209,7 +209,7 @@ def touch(
                 else:
                     counts = _is_nearest(x, y, z, nearest, distance, z_m, corner_m)
                 if counts:
-                    _keep(nearest, distance, _SAME * radius_m, found)
+                    _keep(nearest, distance, _SAME * radius_m, planes)
 
 
 @compiled(
@@ -239,27 +239,27 @@ def lay_planes(
         plane_quat: (geoms, 4) orientations; written.
 
     """
-    found = np.empty((PLANES, 4))
+    laid = np.empty((PLANES, 4))
     for b in range(len(balls)):
         centre = places_m[balls[b]]
         radius_m = ball_m[b]
-        touch(centre[0], centre[1], centre[2], radius_m, z_m, corner_m, found)
+        touch(centre[0], centre[1], centre[2], radius_m, z_m, corner_m, laid)
         for k in range(PLANES):
             plane = planes[b, k]
-            if found[k, 3] >= radius_m:
+            if laid[k, 3] >= radius_m:
                 plane_m[plane, 2] = AWAY_M
                 continue
             n0, n1, n2 = 0.0, 0.0, 1.0
-            if found[k, 3] > 0.0:
-                n0 = (centre[0] - found[k, 0]) / found[k, 3]
-                n1 = (centre[1] - found[k, 1]) / found[k, 3]
-                n2 = (centre[2] - found[k, 2]) / found[k, 3]
+            if laid[k, 3] > 0.0:
+                n0 = (centre[0] - laid[k, 0]) / laid[k, 3]
+                n1 = (centre[1] - laid[k, 1]) / laid[k, 3]
+                n2 = (centre[2] - laid[k, 2]) / laid[k, 3]
             else:  # the centre is below the surface: the normal of the face above it
-                _, gx, gy = _face(found[k, 0], found[k, 1], z_m, corner_m)
+                _, gx, gy = _face(laid[k, 0], laid[k, 1], z_m, corner_m)
                 steep = math.sqrt(1.0 + gx * gx + gy * gy)
                 n0, n1, n2 = -gx / steep, -gy / steep, 1.0 / steep
             for axis in range(3):
-                plane_m[plane, axis] = found[k, axis]
+                plane_m[plane, axis] = laid[k, axis]
             # the shortest rotation from the vertical to the normal
             length = math.sqrt(2.0 * (1.0 + n2))
             plane_quat[plane, 0] = 0.5 * length

@@ -115,7 +115,7 @@ class CrowdView:
             mujoco.mjtCatBit.mjCAT_STATIC,
             scene,
         )
-        bodies = [(one.kind, one.level, one.points_m, one.radius_m) for one in shot.bodies]
+        bodies = [(body.kind, body.level, body.points_m, body.radius_m) for body in shot.bodies]
         self._meshes.lay(self._model, scene, bodies, self._ground)
         return self._screen.draw(scene, shot.caption)
 

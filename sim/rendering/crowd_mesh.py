@@ -138,7 +138,7 @@ class CrowdMeshes:
         for kind, level, points, radius in bodies:
             groups.setdefault((kind % len(COLOURS), level), []).append((points, radius))
         for (kind, level), group in groups.items():
-            points_m, radius_m = (np.stack(each) for each in zip(*group, strict=True))
+            points_m, radius_m = (np.stack(column) for column in zip(*group, strict=True))
             corner, normal = self._grids[level].tubes(points_m, radius_m)
             _draw(model, scene, f"crowd{kind}-{level}", corner, normal)
         if bodies:

@@ -220,4 +220,6 @@ def _corner(camera: Floats) -> Floats:
 def _scale_m(length_m: float) -> float:
     """A round length of about a fifth of the body's."""
     power = 10.0 ** np.floor(np.log10(0.2 * length_m))
-    return float(power * max(each for each in (1.0, 2.0, 5.0) if each * power <= 0.2 * length_m))
+    return float(
+        power * max(length for length in (1.0, 2.0, 5.0) if length * power <= 0.2 * length_m)
+    )

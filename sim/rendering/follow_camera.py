@@ -134,7 +134,9 @@ def _raised(
     frames = len(plain)
     rows = np.arange(0, frames, _STRIDE)
     shown = track.parts_m[rows][:, np.linspace(0, track.parts_m.shape[1] - 1, 9).astype(int)]
-    levels = np.array([one for one in ELEVATIONS_DEG if one >= first_deg])
+    levels = np.array(
+        [elevation_deg for elevation_deg in ELEVATIONS_DEG if elevation_deg >= first_deg]
+    )
     level = np.zeros(len(rows), dtype=np.intp)
     camera = plain.copy()
     while True:

@@ -57,19 +57,19 @@ class GroundTiles:
             0.5 * np.linalg.norm(high - low, axis=1),
         )
         self._geoms: Ints = np.zeros(0, dtype=np.int64)
-        self._error_m = np.array([[one.error_m for one in levels] for levels in self._tiles])
+        self._error_m = np.array([[level.error_m for level in levels] for levels in self._tiles])
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add the tiles to an uncompiled model with the material ``ground``, which they replace."""
         spec.geom("ground").group = _UNSEEN
-        for name, one in self._named():
+        for name, tile in self._named():
             spec.add_mesh(
                 name=name,
-                uservert=one.corners_m.ravel(),
-                usernormal=one.normals.ravel(),
-                usertexcoord=one.uv.ravel(),
-                userface=one.faces.ravel(),
-                userfacetexcoord=one.faces.ravel(),
+                uservert=tile.corners_m.ravel(),
+                usernormal=tile.normals.ravel(),
+                usertexcoord=tile.uv.ravel(),
+                userface=tile.faces.ravel(),
+                userfacetexcoord=tile.faces.ravel(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
             )
             spec.worldbody.add_geom(
@@ -98,8 +98,8 @@ class GroundTiles:
 
     def _named(self) -> Iterator[tuple[str, TileMesh]]:
         for tile, levels in enumerate(self._tiles):
-            for level, one in enumerate(levels):
-                yield f"tile{tile}-{level}", one
+            for level, tile_level in enumerate(levels):
+                yield f"tile{tile}-{level}", tile_level
 
 
 def _tile(ground: HeightField, row: int, column: int) -> tuple[TileMesh, ...]:
@@ -118,7 +118,7 @@ def _tile(ground: HeightField, row: int, column: int) -> tuple[TileMesh, ...]:
 def _error_m(ground: HeightField, j: Ints, i: Ints) -> float:
     """Largest height of a coarse tile over the samples below it, or below those above."""
     rows, columns = np.arange(j[0], j[-1] + 1), np.arange(i[0], i[-1] + 1)
-    coarse = np.array([np.interp(columns, i, ground.z_m[one, i]) for one in j])
+    coarse = np.array([np.interp(columns, i, ground.z_m[row, i]) for row in j])
     fine = np.array([np.interp(rows, j, column) for column in coarse.T]).T
     return float(
         np.abs(fine - ground.z_m[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]).max()

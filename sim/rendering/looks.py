@@ -30,7 +30,7 @@ REACHED: Rgba = rgba(colours.REACHED)
 HIDDEN: Rgba = (0.0, 0.0, 0.0, 0.0)
 """Colour of hidden objects."""
 RING_PARTS = 32
-LOWLAND, HIGHLAND = (np.array(rgb(one), float) for one in (colours.LOWLAND, colours.HIGHLAND))
+LOWLAND, HIGHLAND = (np.array(rgb(colour), float) for colour in (colours.LOWLAND, colours.HIGHLAND))
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
 SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
 CONTOURS = 12
@@ -165,9 +165,9 @@ def _mark(
     if hollow:
         spec.geom(name).rgba = HIDDEN
     ring = _ring(ground, x, y, radius_m)
-    for part, (one, other) in enumerate(itertools.pairwise(ring)):
+    for part, (before, other) in enumerate(itertools.pairwise(ring)):
         of_ring = f"{name}ring{part}"
-        _add(spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*one, *other)).name = of_ring
+        _add(spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*before, *other)).name = of_ring
         if hollow and part % 2:
             spec.geom(of_ring).rgba = HIDDEN
 

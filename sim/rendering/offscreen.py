@@ -97,8 +97,8 @@ def _free_at_exit() -> None:
 
 
 def _free_unclosed() -> None:
-    for each in list(_UNCLOSED):
-        each.close()
+    for renderer in list(_UNCLOSED):
+        renderer.close()
 
 
 def _context(width: int, height: int) -> Any:

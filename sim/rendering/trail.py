@@ -156,8 +156,8 @@ def _dots(path_m: Floats) -> Floats:
     if len(path_m) < 2:
         return np.zeros((0, 2))
     arc = _arc_m(path_m)
-    at = np.arange(0.0, arc[-1], max(SPACING_M, arc[-1] / MOST))
-    return np.column_stack([np.interp(at, arc, path_m[:, k]) for k in range(2)])
+    arc_m = np.arange(0.0, arc[-1], max(SPACING_M, arc[-1] / MOST))
+    return np.column_stack([np.interp(arc_m, arc, path_m[:, k]) for k in range(2)])
 
 
 def _arc_m(points_m: Floats) -> Floats:

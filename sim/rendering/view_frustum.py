@@ -49,10 +49,10 @@ class ViewFrustum:
     def touches(self, centre_m: Floats, radius_m: Floats) -> Bools:
         """(N,) whether spheres with centres (N, 3) and radii (N,) touch the view."""
         depth, *offsets = self.in_camera(centre_m)
-        seen = depth > -radius_m
+        is_visible = depth > -radius_m
         for offset, tangent in zip(offsets, self.half_tan, strict=True):
-            seen &= np.abs(offset) <= tangent * depth + radius_m * np.hypot(1.0, tangent)
-        return np.asarray(seen)
+            is_visible &= np.abs(offset) <= tangent * depth + radius_m * np.hypot(1.0, tangent)
+        return np.asarray(is_visible)
 
 
 def camera_axes(azimuth_deg: ArrayLike, elevation_deg: ArrayLike) -> tuple[Floats, Floats, Floats]:

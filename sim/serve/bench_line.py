@@ -51,7 +51,7 @@ def bench_line(
             )
         _check_one_model(models)
         plant = BenchPlant(
-            len(chain.ids), gear=[measured_gearbox(each) for each in models], start_rad=start_rad
+            len(chain.ids), gear=[measured_gearbox(model) for model in models], start_rad=start_rad
         )
         if first.protocol == 1:
             return _ax12_line(chain.ids, first, baud, plant)
@@ -75,7 +75,7 @@ def _check_one_model(models: Sequence[ServoModel]) -> None:
     by_protocol = {facts.protocol: facts for facts in models}
     if len(by_protocol) > 1:
         first, *others = by_protocol.values()
-        shown = ", ".join(f"{each.model} {protocol_name(each)}" for each in others)
+        shown = ", ".join(f"{other.model} {protocol_name(other)}" for other in others)
         raise InputError(f"{first.model} speaks {protocol_name(first)} and {shown}: not on one bus")
     names = sorted({facts.model for facts in models})
     if len(names) > 1:

@@ -37,8 +37,8 @@ class ChainSpec:
             InputError: the model does not exist, or the faults of its file.
 
         """
-        known = {model: servo_model(model, Path()) for model in self.kinds}
-        return tuple(known[model] for model in self.models)
+        records_by_model = {model: servo_model(model, Path()) for model in self.kinds}
+        return tuple(records_by_model[model] for model in self.models)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -85,8 +85,8 @@ def parse_imu(text: str) -> ImuConfig:
     ids = id_range(number.strip(), source, IMU_EXAMPLE)
     if len(ids) != 1:
         raise InputError(f"{source}: one device has one ID; {IMU_EXAMPLE}")
-    known = {each.upper(): each for each in IMU_TABLES}
-    name = known.get((model.strip() or "imu_to_dxl").upper())
+    models_by_name = {model_name.upper(): model_name for model_name in IMU_TABLES}
+    name = models_by_name.get((model.strip() or "imu_to_dxl").upper())
     if name is None:
         raise InputError(f"{source}: no such model; there are {', '.join(IMU_TABLES)}")
     ranges = {} if name == "imu_to_dxl" else BENCH_RANGES

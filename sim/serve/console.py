@@ -54,13 +54,17 @@ class Console:
         except (InputError, ControlTableError) as error:
             return str(error)
         except (ValueError, IndexError):
-            usage = next(each for each in HELP.splitlines() if each.startswith(word))
+            usage = next(line for line in HELP.splitlines() if line.startswith(word))
             return f"write {usage}"
 
     def _rows(self, text: str) -> list[int]:
         if text == "all":
             return rows_of(self._line, None)
-        asked = [each for piece in text.split(",") for each in id_range(piece, "IDS", "write 1-4")]
+        asked = [
+            servo_id
+            for piece in text.split(",")
+            for servo_id in id_range(piece, "IDS", "write 1-4")
+        ]
         return rows_of(self._line, asked)
 
     def _set(self, words: list[str]) -> str:

@@ -39,13 +39,13 @@ def servo_bus(request: pytest.FixtureRequest) -> "Iterator[Callable[..., ServoBu
     # pytest loads this in every suite of the environment: slow imports wait for the first use
     from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415  every suite loads this
 
-    made: list[ServoBus] = []
-    request.node.stash[_BUSES] = made
+    buses: list[ServoBus] = []
+    request.node.stash[_BUSES] = buses
 
     def make(servos: str = "1-4", **options: object) -> ServoBus:
-        made.append(ServoBus(servos, **options))  # type: ignore[arg-type]
-        return made[-1]
+        buses.append(ServoBus(servos, **options))  # type: ignore[arg-type]
+        return buses[-1]
 
     yield make
-    for bus in made:
+    for bus in buses:
         bus.close()

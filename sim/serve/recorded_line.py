@@ -50,24 +50,26 @@ class RecordedLine(Wire):
 
         """
         byte_s = BITS_PER_BYTE / baud
-        found: list[Exchange] = []
+        exchanges: list[Exchange] = []
         quiet_s = 0.0
         for time_s, from_host, data in read_exchange(path):
             if from_host:
-                found.append(Exchange(data))
-            elif found:  # the first bytes are not a reply
+                exchanges.append(Exchange(data))
+            elif exchanges:  # the first bytes are not a reply
                 begin_s = time_s - len(data) * byte_s
-                found[-1].replies.append(Reply(max(begin_s - quiet_s, 0.0), data))
+                exchanges[-1].replies.append(Reply(max(begin_s - quiet_s, 0.0), data))
             quiet_s = time_s
-        if not found:
+        if not exchanges:
             raise InputError(f"{path}: no host sends anything in it")
-        return RecordedLine(found, baud)
+        return RecordedLine(exchanges, baud)
 
     @property
     def ids(self) -> list[int]:
         """Servos that reply in the recording."""
-        told = {reply.data[_ID_AT] for each in self._exchanges for reply in each.replies}
-        return sorted(told - {BROADCAST_ID})  # of a fast read: all requested servos
+        servo_ids = {
+            reply.data[_ID_AT] for exchange in self._exchanges for reply in exchange.replies
+        }
+        return sorted(servo_ids - {BROADCAST_ID})  # of a fast read: all requested servos
 
     # the wire
 
@@ -80,15 +82,15 @@ class RecordedLine(Wire):
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
         for alike in (_same, _same_write):
             for k in range(len(self._exchanges)):
-                at = (self._at + k) % len(self._exchanges)
-                if alike(self._exchanges[at].question, data):
-                    self._at = at + 1
-                    return list(self._exchanges[at].replies)
+                index = (self._at + k) % len(self._exchanges)
+                if alike(self._exchanges[index].question, data):
+                    self._at = index + 1
+                    return list(self._exchanges[index].replies)
         self.unknown += 1
         return []
 
     def _split(self, data: bytes) -> Sequence[bytes]:
-        starts = [at for at in range(len(data)) if data.startswith(HEADER, at)] or [0]
+        starts = [start for start in range(len(data)) if data.startswith(HEADER, start)] or [0]
         ends = [*starts[1:], len(data)]
         return [data[start:end] for start, end in zip(starts, ends, strict=True)]
 

@@ -26,11 +26,11 @@ def rows_of(line: BenchLine, servo_ids: Sequence[int] | None) -> list[int]:
     there = {servo_id: row for row, servo_id in enumerate(line.ids())}
     if servo_ids is None:
         return list(there.values())
-    missing = [str(each) for each in servo_ids if each not in there]
+    missing = [str(servo_id) for servo_id in servo_ids if servo_id not in there]
     if missing:
-        known = ", ".join(map(str, there))
-        raise InputError(f"no servo has ID {', '.join(missing)}; the bus has {known}")
-    return [there[each] for each in servo_ids]
+        ids_text = ", ".join(map(str, there))
+        raise InputError(f"no servo has ID {', '.join(missing)}; the bus has {ids_text}")
+    return [there[servo_id] for servo_id in servo_ids]
 
 
 def register_name(line: BenchLine, name: str, rows: Sequence[int]) -> str:
@@ -40,12 +40,17 @@ def register_name(line: BenchLine, name: str, rows: Sequence[int]) -> str:
         InputError: not all servos have it; lists the closest names.
 
     """
-    known = {each.lower(): each for each in _names(line)}
-    found = known.get(name.lower())
-    if found is not None and all(line.register_type(row, found) is not None for row in rows):
-        return found
-    close = [known[each] for each in get_close_matches(name.lower(), known, 3, 0.5)]
-    hint = f"; did you mean {', '.join(close)}?" if close and found is None else ""
+    names_by_lower = {plain_name.lower(): plain_name for plain_name in _names(line)}
+    full_name = names_by_lower.get(name.lower())
+    if full_name is not None and all(
+        line.register_type(row, full_name) is not None for row in rows
+    ):
+        return full_name
+    close = [
+        names_by_lower[close_match]
+        for close_match in get_close_matches(name.lower(), names_by_lower, 3, 0.5)
+    ]
+    hint = f"; did you mean {', '.join(close)}?" if close and full_name is None else ""
     raise InputError(f"{name or 'REGISTER'}: no register of all these servos{hint}")
 
 
@@ -64,22 +69,22 @@ def set_register(line: BenchLine, rows: Sequence[int], name: str, value: int) ->
     if not isinstance(value, int | np.integer):
         raise InputError(f"{name} {value}: must be a whole number")
     value = int(value)
-    found = register_name(line, name, rows)
-    if found.startswith(_MEASURED):
-        raise InputError(f"{found}: is measured, not set; see load and fault")
+    full_name = register_name(line, name, rows)
+    if full_name.startswith(_MEASURED):
+        raise InputError(f"{full_name}: is measured, not set; see load and fault")
     if isinstance(line, Ax12Line):
-        line.write_register(np.array(rows, np.intp), found, value)
+        line.write_register(np.array(rows, np.intp), full_name, value)
         line.refresh_ids()
-        return found
+        return full_name
     bank = line.bank
-    register = bank.register(found)
+    register = bank.register(full_name)
     data = register.encode(value)
     for row in rows:
         bank.table[row, register.address : register.address + register.size] = list(data)
     bank.indirect.refresh()
     line.firmware.apply_registers()
     line.refresh_ids()
-    return found
+    return full_name
 
 
 def set_load(line: BenchLine, rows: Sequence[int], load_n_m: float) -> None:

@@ -44,10 +44,10 @@ def free_rotor(
 
     ``damping_n_m_s`` includes the viscous friction of ``gear`` (13,).
     """
-    whole = inertia_kg_m2 + h * damping_n_m_s
-    free = (inertia_kg_m2 * speed_rad_s + h * push_n_m) / whole
+    effective_inertia = inertia_kg_m2 + h * damping_n_m_s
+    free = (inertia_kg_m2 * speed_rad_s + h * push_n_m) / effective_inertia
     motor_n_m = push_n_m - (damping_n_m_s - gear[2]) * speed_rad_s
-    rest = abs(free) - h * friction_n_m(gear, speed_rad_s, motor_n_m, 0.0) / whole
+    rest = abs(free) - h * friction_n_m(gear, speed_rad_s, motor_n_m, 0.0) / effective_inertia
     if rest <= 0.0:
         return 0.0
     return rest if free > 0.0 else -rest

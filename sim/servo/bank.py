@@ -106,10 +106,16 @@ class ServoBank:
         models: Sequence[Model] = (
             [model] * len(self.ids) if isinstance(model, str | ServoModel) else model
         )
-        by_name = {each.layout.model: each for each in map(registers_of, _different(models))}
-        self._of_row = [by_name[load_control_table(each).model] for each in models]
+        by_name = {
+            registers.layout.model: registers for registers in map(registers_of, _different(models))
+        }
+        self._of_row = [by_name[load_control_table(model_name).model] for model_name in models]
         kinds = list(by_name.values())
-        faults = [f"ID {each}: a servo has 0 to 252" for each in self.ids if not 0 <= each <= 252]
+        faults = [
+            f"ID {servo_id}: a servo has 0 to 252"
+            for servo_id in self.ids
+            if not 0 <= servo_id <= 252
+        ]
         if len(set(self.ids)) != len(self.ids) and not clashing:
             faults.append(f"two servos share an ID: {', '.join(map(str, sorted(self.ids)))}")
         faults += [
@@ -126,36 +132,42 @@ class ServoBank:
         ][:1]
         if faults:
             raise ControlTableError(faults)
-        self.models = tuple(each.layout.model for each in self._of_row)
+        self.models = tuple(registers.layout.model for registers in self._of_row)
         """(S,) names as printed on the servos."""
-        self.measures_current = np.array([each.measures_current for each in self._of_row], bool)
+        self.measures_current = np.array(
+            [registers.measures_current for registers in self._of_row], bool
+        )
         """(S,) False where a servo has no current sensor."""
         self.false_alert = np.zeros(len(self.ids), bool)
         """(S,) servos that set the alert bit of their replies without an error."""
         self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
         rows = [self._rows_of(kind) for kind in kinds]
         self._kinds = tuple(zip(kinds, rows, strict=True))
-        self.scales = ServoScales.of([each.facts for each in self._of_row])
+        self.scales = ServoScales.of([registers.facts for registers in self._of_row])
         self._registers = _in_one_place(kinds)
-        self._columns = {name: self._column(each) for name, each in self._registers.items()}
+        self._columns = {name: self._column(layout) for name, layout in self._registers.items()}
         self._defined = np.zeros((len(self.ids), TABLE_BYTES), bool)
-        for kind, own in self._kinds:
-            for each in kind.registers.values():
-                self._defined[own, each.address : each.address + each.size] = True
+        for kind, rows_of_kind in self._kinds:
+            for layout in kind.registers.values():
+                self._defined[rows_of_kind, layout.address : layout.address + layout.size] = True
         self._starts = {
-            kind.layout.model: {each.address: each for each in kind.registers.values()}
+            kind.layout.model: {layout.address: layout for layout in kind.registers.values()}
             for kind in kinds
         }
         self.indirect = Indirect(
             self.table,
-            [(slice(None) if len(kinds) == 1 else own, kind.indirect) for kind, own in self._kinds],
+            [
+                (slice(None) if len(kinds) == 1 else rows_of_kind, kind.indirect)
+                for kind, rows_of_kind in self._kinds
+            ],
         )
         self._registered: dict[int, tuple[int, bytes]] = {}
         self._backup: dict[int, bytes] = {}
         self.reset(np.arange(len(self.ids)), keep=())
         self["ID"][:] = self.ids
         self._codes = [
-            {rate: code for code, rate in enumerate(each.facts.bauds)} for each in self._of_row
+            {rate: code for code, rate in enumerate(registers.facts.bauds)}
+            for registers in self._of_row
         ]
         self["Baud Rate"][:] = [codes[baud] for codes in self._codes]
 
@@ -186,7 +198,7 @@ class ServoBank:
     @property
     def facts(self) -> tuple[ServoModel, ...]:
         """(S,) records of the models."""
-        return tuple(each.facts for each in self._of_row)
+        return tuple(registers.facts for registers in self._of_row)
 
     def range_of(self, row: int, name: str) -> tuple[int, int]:
         """Lowest and highest accepted value; 0 and 0 if read-only."""
@@ -223,35 +235,37 @@ class ServoBank:
         """
         if not data:
             return ResultError.DATA_LENGTH
-        own = self._of_row[row]
-        starts = self._starts[own.layout.model]
-        for start, run in self.indirect.resolve(row, address, data, own.indirect):
-            at = start
-            while at < start + len(run):
-                register = starts.get(at)
+        registers = self._of_row[row]
+        starts = self._starts[registers.layout.model]
+        for start, run in self.indirect.resolve(row, address, data, registers.indirect):
+            position = start
+            while position < start + len(run):
+                register = starts.get(position)
                 if register is None:
                     return ResultError.ACCESS
-                rule = own.rules[register.name]
-                end = at + register.size
+                rule = registers.rules[register.name]
+                end = position + register.size
                 if end > start + len(run):
                     return ResultError.DATA_LENGTH
-                locked = at < own.facts.ram_from and (ram_only or self["Torque Enable"][row])
+                locked = position < registers.facts.ram_from and (
+                    ram_only or self["Torque Enable"][row]
+                )
                 if not rule.writable or locked:
                     return ResultError.ACCESS
                 error = self._check_value(
-                    row, register.name, register.decode(run[at - start : end - start])
+                    row, register.name, register.decode(run[position - start : end - start])
                 )
                 if error:
                     return error
-                at = end
+                position = end
         return ResultError.NONE
 
     def write(self, row: int, address: int, data: bytes, *, ram_only: bool = False) -> ResultError:
         """Write a block to one servo completely or, with an error, not at all."""
         error = self.check(row, address, data, ram_only=ram_only)
         if not error:
-            for at, run in self.indirect.resolve(row, address, data, self._of_row[row].indirect):
-                self.table[row, at : at + len(run)] = np.frombuffer(run, np.uint8)
+            for start, run in self.indirect.resolve(row, address, data, self._of_row[row].indirect):
+                self.table[row, start : start + len(run)] = np.frombuffer(run, np.uint8)
             self.indirect.on_write(address, len(data))
         return error
 
@@ -272,8 +286,8 @@ class ServoBank:
 
     def reset(self, rows: Indices, keep: Sequence[str], ram_only: bool = False) -> None:
         """Set initial values, in the RAM only (reboot) or in both areas (factory reset)."""
-        for kind, own in self._kinds:
-            some = np.intersect1d(rows, own)
+        for kind, rows_of_kind in self._kinds:
+            some = np.intersect1d(rows, rows_of_kind)
             for name, rule in kind.rules.items():
                 register = kind.registers[name]
                 if name not in keep and not (ram_only and register.address < kind.facts.ram_from):
@@ -321,8 +335,8 @@ class ServoBank:
 
     def switch_mode(self, rows: Indices) -> None:
         """Reset gains, profile and output limits after a change of Operating Mode(11)."""
-        for kind, own in self._kinds:
-            some = np.intersect1d(rows, own)
+        for kind, rows_of_kind in self._kinds:
+            some = np.intersect1d(rows, rows_of_kind)
             for name in MODE_RESETS:
                 self[name][some] = kind.rules[name].initial
             for goal in ("Goal PWM", "Goal Current"):
@@ -364,7 +378,7 @@ class ServoBank:
         return -limit, limit
 
     def _rows_of(self, kind: ModelRegisters) -> Indices:
-        return np.flatnonzero([each is kind for each in self._of_row])
+        return np.flatnonzero([registers is kind for registers in self._of_row])
 
     def _column(self, register: Register) -> SignedInts:
         number = f"<{'i' if register.signed else 'u'}{register.size}"
@@ -374,13 +388,13 @@ class ServoBank:
 
 def _in_one_place(kinds: Sequence[ModelRegisters]) -> dict[str, Register]:
     """Registers with the same address in all models that have them."""
-    found: dict[str, Register] = {}
-    apart: set[str] = set()
+    registers: dict[str, Register] = {}
+    moved_names: set[str] = set()
     for kind in kinds:
         for name, register in kind.registers.items():
-            if found.setdefault(name, register) != register:
-                apart.add(name)
-    return {name: register for name, register in found.items() if name not in apart}
+            if registers.setdefault(name, register) != register:
+                moved_names.add(name)
+    return {name: register for name, register in registers.items() if name not in moved_names}
 
 
 def _different(models: Sequence[Model]) -> list[Model]:

@@ -43,7 +43,7 @@ class BenchPlant:
         self._steps = 0
         bare = Gearbox(0.0, dry_n_m, viscous_n_m_s, 0.0, 1.0, 0.0, 0.0, 0.0)
         gears = [gear] * joints if isinstance(gear, Gearbox) or gear is None else list(gear)
-        self._gear = Gearbox.columns([each or bare for each in gears]).rows()
+        self._gear = Gearbox.columns([gearbox or bare for gearbox in gears]).rows()
         self._shaft_kg_m2 = inertia_kg_m2
         self._gear[0] += inertia_kg_m2
         self._play = np.zeros((3, joints))

@@ -106,7 +106,7 @@ class ControlLoops:
         goal = np.where(self.position, goal_rad, self.trajectory.goal)
         self.trajectory.set_goals(goal, velocity, ramp, self._timed)
 
-    def tick(self, plant: Plant, goal_rad: Floats, sign: Floats, held: Bools) -> None:
+    def tick(self, plant: Plant, goal_rad: Floats, sign: Floats, is_held: Bools) -> None:
         """Run one control period: set the drive of the servos with these loops.
 
         ``goal_rad`` is the angle of held servos; ``sign`` converts registers to the shafts' frame.
@@ -116,7 +116,7 @@ class ControlLoops:
         if self._any_velocity:
             _run_velocity(
                 self.velocity,
-                held,
+                is_held,
                 sign,
                 plant.position_rad,
                 plant.velocity_rad_s,
@@ -132,7 +132,7 @@ class ControlLoops:
             path.advance(CONTROL_S, self.position)
             _run_position(
                 self.position,
-                held,
+                is_held,
                 goal_rad,
                 plant.position_rad,
                 drive.pwm_limit,
@@ -161,7 +161,7 @@ def _limited_sum(errors: float, gain: float, pwm_limit: float, full_pwm: float) 
 )
 def _run_position(
     run: Bools,
-    held: Bools,
+    is_held: Bools,
     hold_rad: Floats,
     shaft_rad: Floats,
     pwm_limit: Floats,
@@ -186,12 +186,12 @@ def _run_position(
         per_rad = scales[0, k]
         full_pwm = scales[1, k]
         ticks = per_rad * CONTROL_S
-        target = hold_rad[k] if held[k] else path_rad[k]
+        target = hold_rad[k] if is_held[k] else path_rad[k]
         error = (target - shaft_rad[k]) * per_rad
         sums[k] = _limited_sum(sums[k] + error, gains[1, k], pwm_limit[k], full_pwm)
         pwm = gains[1, k] * sums[k] + gains[2, k] * (error - last_error[k])
         last_error[k] = error
-        if not held[k]:
+        if not is_held[k]:
             pwm += gains[3, k] * path_rad_s[k] * ticks
             pwm += gains[4, k] * path_rad_s2[k] * (ticks * CONTROL_S)
         gain = max(gains[0, k], TINY_GAIN)
@@ -205,7 +205,7 @@ def _run_position(
 )
 def _run_velocity(
     run: Bools,
-    held: Bools,
+    is_held: Bools,
     sign: Floats,
     shaft_rad: Floats,
     shaft_rad_s: Floats,
@@ -228,10 +228,10 @@ def _run_velocity(
         full_pwm = scales[1, k]
         rad_s = scales[2, k]
         rad_s2 = scales[3, k]
-        goal = 0.0 if held[k] else settings[0, k] * sign[k]
+        goal = 0.0 if is_held[k] else settings[0, k] * sign[k]
         ramp = settings[1, k]
         step = np.inf
-        if ramp > 0.0 and not held[k]:  # a watchdog's stop has no profile
+        if ramp > 0.0 and not is_held[k]:  # a watchdog's stop has no profile
             if timed[k]:
                 step = abs(goal) / ramp * (CONTROL_S * 1e3)
             else:

@@ -104,7 +104,7 @@ class Firmware:
         self.bank = bank
         self.plant = plant
         if motors is None:
-            motors = [MotorModel.of(each) for each in bank.facts]
+            motors = [MotorModel.of(fact) for fact in bank.facts]
         self._motor = motor = MotorColumns(motors)
         around = supply_and_ambient or SupplyAndAmbient()
         usual_v = motor.nominal_v if around.supply_v is None else around.supply_v
@@ -225,8 +225,8 @@ class Firmware:
         self._set_drive_goals()
         self._watchdog.arm(on)
 
-    def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], at: int) -> None:
-        """Goal Position(116) of many servos: entries of ``raw`` from ``at``, ID and 4 bytes.
+    def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], offset: int) -> None:
+        """Goal Position(116) of many servos: entries of ``raw`` from ``offset``, ID and 4 bytes.
 
         Values out of limits are rejected.
         """
@@ -240,7 +240,7 @@ class Firmware:
         limits = self._limits
         frame = self._frame
         per_rad = self._scales.positions_per_rad
-        accept_goals(raw, rows, table, at, address, limits, frame, per_rad, goal_rad, taken)
+        accept_goals(raw, rows, table, offset, address, limits, frame, per_rad, goal_rad, taken)
         if self._enabled_by_goals:
             self.enable_by_goal(np.flatnonzero(taken))
         if not plain:

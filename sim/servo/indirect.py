@@ -64,13 +64,13 @@ class Indirect:
         if not self.covers(address, len(data)):
             return [(address, data)]
         runs: list[tuple[int, bytearray]] = []
-        for at, byte in enumerate(data, address):
-            target = self._target(row, at, blocks)
+        for byte_address, byte in enumerate(data, address):
+            target = self._target(row, byte_address, blocks)
             if runs and target == runs[-1][0] + len(runs[-1][1]):
                 runs[-1][1].append(byte)
             else:
                 runs.append((target, bytearray((byte,))))
-        return [(at, bytes(run)) for at, run in runs]
+        return [(start, bytes(run)) for start, run in runs]
 
     def _target(self, row: int, address: int, blocks: Sequence[IndirectBlock]) -> int:
         for block in blocks:

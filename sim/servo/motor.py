@@ -85,22 +85,22 @@ class MotorModel:
         """k_e in V s/rad: at no-load speed the back-EMF is the supply."""
         return self.nominal_v / self.no_load_rad_s
 
-    def with_constants(self, own: MotorConfig | None) -> "MotorModel":
+    def with_constants(self, motor: MotorConfig | None) -> "MotorModel":
         """The motor with the constants of a robot's file."""
-        if own is None:
+        if motor is None:
             return self
         k_t, k_e = self.torque_constant_n_m_a, self.back_emf_v_s
-        if own.torque_constant_n_m_a is not None:  # one winding: both are equal
-            k_t = k_e = own.torque_constant_n_m_a
-        stall_a = self.nominal_v / (own.resistance_ohm or self.resistance_ohm)
+        if motor.torque_constant_n_m_a is not None:  # one winding: both are equal
+            k_t = k_e = motor.torque_constant_n_m_a
+        stall_a = self.nominal_v / (motor.resistance_ohm or self.resistance_ohm)
         divisor = self.p_gain_divisor
-        if own.p_unit_per_rad is not None:
-            divisor = self.positions_per_rad / self.full_pwm / own.p_unit_per_rad
+        if motor.p_unit_per_rad is not None:
+            divisor = self.positions_per_rad / self.full_pwm / motor.p_unit_per_rad
         return replace(
             self,
             stall_torque_n_m=k_t * stall_a,
             stall_current_a=stall_a,
-            no_load_rad_s=self.nominal_v / (own.back_emf_v_s or k_e),
+            no_load_rad_s=self.nominal_v / (motor.back_emf_v_s or k_e),
             p_gain_divisor=divisor,
         )
 
@@ -133,8 +133,8 @@ def known_motors(robot: RobotConfig) -> list[MotorModel | None]:
     """Motors of a robot's J servos, with the constants of its file; None if unknown."""
     models = zip(robot.servo_records, robot.motors, strict=True)
     return [
-        None if facts.motor is None else MotorModel.of(facts).with_constants(own)
-        for facts, own in models
+        None if facts.motor is None else MotorModel.of(facts).with_constants(motor_config)
+        for facts, motor_config in models
     ]
 
 
@@ -146,7 +146,7 @@ def motors_of(robot: RobotConfig) -> list[MotorModel]:
 
     """
     models = zip(robot.servo_records, robot.motors, strict=True)
-    return [MotorModel.of(facts).with_constants(own) for facts, own in models]
+    return [MotorModel.of(facts).with_constants(motor_config) for facts, motor_config in models]
 
 
 class MotorColumns:
@@ -231,12 +231,12 @@ class Gearbox:
     @staticmethod
     def columns(gears: "Sequence[Gearbox]") -> "Gearbox":
         """Gearboxes of J servos as one of (J,) columns."""
-        names = [each.name for each in fields(Gearbox)]
+        names = [field.name for field in fields(Gearbox)]
         return Gearbox(*(np.array([getattr(gear, name) for gear in gears]) for name in names))
 
     def rows(self) -> Floats:
         """(13, J) fields in order, for ``friction_n_m``."""
-        return np.array([np.atleast_1d(getattr(self, each.name)) for each in fields(self)], float)
+        return np.array([np.atleast_1d(getattr(self, field.name)) for field in fields(self)], float)
 
 
 @compiled(f"float64({readonly_array()}, float64, float64, float64)")
@@ -259,18 +259,18 @@ def friction_n_m(gear: Floats, speed_rad_s: float, motor_n_m: float, load_n_m: f
 
 def measured_gearbox(facts: ServoModel) -> Gearbox | None:
     """Gearbox of a model with measured friction; None without."""
-    own = facts.friction
-    if own is None:
+    friction = facts.friction
+    if friction is None:
         return None
     return Gearbox(
-        own.armature_kg_m2,
-        own.dry_n_m,
-        own.viscous_n_m_s,
-        own.stribeck_n_m,
-        own.stribeck_rad_s,
-        own.by_motor,
-        own.by_load,
-        own.by_load_slow,
+        friction.armature_kg_m2,
+        friction.dry_n_m,
+        friction.viscous_n_m_s,
+        friction.stribeck_n_m,
+        friction.stribeck_rad_s,
+        friction.by_motor,
+        friction.by_load,
+        friction.by_load_slow,
     )
 
 
@@ -282,23 +282,23 @@ def gears_of(robot: RobotConfig) -> list[Gearbox]:
     """Gearboxes of a robot's J servos from its file; without friction by default."""
     terms = [
         Gearbox(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-        if own is None
+        if friction is None
         else Gearbox(
             0.0,
-            own.dry_n_m,
+            friction.dry_n_m,
             0.0,
-            own.stribeck_n_m,
-            own.stribeck_rad_s,
-            own.by_motor,
-            own.by_load,
-            own.by_load_slow,
-            own.by_motor_slow,
-            own.stribeck_exponent,
-            own.by_motor_square,
-            own.by_load_square,
-            own.backlash_rad,
+            friction.stribeck_n_m,
+            friction.stribeck_rad_s,
+            friction.by_motor,
+            friction.by_load,
+            friction.by_load_slow,
+            friction.by_motor_slow,
+            friction.stribeck_exponent,
+            friction.by_motor_square,
+            friction.by_load_square,
+            friction.backlash_rad,
         )
-        for own in robot.motors
+        for friction in robot.motors
     ]
     inertia_and_drag = zip(robot.armatures_kg_m2, robot.gear_drags_n_m_s, strict=True)
     return [

@@ -104,8 +104,8 @@ def _advance(
         if np.isfinite(brake):  # so fast that later steps can still stop in time
             root = np.sqrt(1.0 + 8.0 * abs(distance) / max(brake * seconds, 1e-300))
             limit = 0.5 * brake * (root - 1.0)
-        wanted = np.sign(distance) * min(speed[k], limit, abs(distance) / seconds)
-        moved = velocity[k] + min(max(wanted - velocity[k], -brake), brake)
+        speed_now = np.sign(distance) * min(speed[k], limit, abs(distance) / seconds)
+        moved = velocity[k] + min(max(speed_now - velocity[k], -brake), brake)
         acceleration[k] = (moved - velocity[k]) / seconds
         if abs(distance - moved * seconds) < 1e-9:
             position[k], velocity[k] = goal[k], 0.0

@@ -98,7 +98,7 @@ class Protection:
         self._slow_rad_s = SLOW * motor.no_load_rad_s
         self._drop_v = np.zeros(len(bank))
         volts = self._supply.usual_v
-        several = [np.flatnonzero(volts == each) for each in np.unique(volts)]
+        several = [np.flatnonzero(volts == volt) for volt in np.unique(volts)]
         self._cables = [
             (rows, sum(amps * count for amps, count in Counter(motor.standby_a[rows]).items()))
             for rows in (several if len(several) > 1 else [slice(None)])
@@ -108,8 +108,8 @@ class Protection:
 
     def alarms(self, row: int) -> Mapping[str, int]:
         """Errors that a servo can detect, and their bits."""
-        known = self._bank.facts[row].alarms
-        return {kind: bit for kind, bit in ALARMS.items() if kind in known}
+        present_kinds = self._bank.facts[row].alarms
+        return {kind: bit for kind, bit in ALARMS.items() if kind in present_kinds}
 
     def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
         """Set the supply of all servos, or of ``rows``; None: the usual voltage."""

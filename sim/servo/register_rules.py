@@ -87,10 +87,10 @@ def motor_row(facts: ServoModel) -> MotorRow:
 
     """
     if facts.motor is None:
-        known = ", ".join(simulated_models())
+        names = ", ".join(simulated_models())
         raise ControlTableError(
             f"{facts.model}: its file has no table [motor], so it cannot be simulated; models that "
-            f"can are {known}; docs/how-to/add-a-servo-model.md"
+            f"can are {names}; docs/how-to/add-a-servo-model.md"
         )
     return facts.motor
 
@@ -139,11 +139,11 @@ def _registers(layout: ControlTable) -> ModelRegisters:
 
 def _rules(facts: ServoModel) -> dict[str, Rule]:
     """Rules of the file's registers; initial identity and goals come from other facts."""
-    known = {"Model Number": facts.model_number, "Firmware Version": facts.firmware}
+    initial_values = {"Model Number": facts.model_number, "Firmware Version": facts.firmware}
     for goal in GOALS[:3]:
         if limit_of(goal) in facts.registers:
-            known[goal] = facts.registers[limit_of(goal)].initial
+            initial_values[goal] = facts.registers[limit_of(goal)].initial
     return {
-        name: Rule(known.get(name, row.initial), *(row.range or ()))
+        name: Rule(initial_values.get(name, row.initial), *(row.range or ()))
         for name, row in facts.registers.items()
     }

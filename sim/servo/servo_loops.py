@@ -25,10 +25,10 @@ _FRAME = readonly_array(dimensions=2, layout="C")
 
 
 @compiled("void(uint8[::1], int64, int64, int64)", makes_arrays=False)
-def write_le(data: Bytes, at: int, value: int, size: int) -> None:
+def write_le(data: Bytes, offset: int, value: int, size: int) -> None:
     """Write a signed number, little-endian."""
     for k in range(size):
-        data[at + k] = (value >> (8 * k)) & 0xFF
+        data[offset + k] = (value >> (8 * k)) & 0xFF
 
 
 @compiled(
@@ -161,7 +161,7 @@ def accept_goals(
     raw: Bytes,
     rows: Indices,
     table: Bytes,
-    at: int,
+    offset: int,
     address: int,
     limits: Ints,
     frame: Floats,
@@ -175,7 +175,7 @@ def accept_goals(
         raw: the packet.
         rows: servos, in the order of the entries.
         table: (S, bytes) control tables.
-        at: place of the first entry in ``raw``.
+        offset: place of the first entry in ``raw``.
         address: of the register.
         limits: (2, S) least and greatest goal, ticks.
         frame: as in ``write_motion``.
@@ -187,7 +187,7 @@ def accept_goals(
     taken[:] = False
     for k in range(len(rows)):
         row = rows[k]
-        entry = at + 5 * k + 1
+        entry = offset + 5 * k + 1
         ticks = 0
         for j in range(4):
             ticks |= int(raw[entry + j]) << (8 * j)
@@ -267,7 +267,7 @@ def count_blocked(
     for row in range(len(blocked_s)):
         full = abs(pwm[row]) >= 0.98 * min(pwm_limit[row], 1.0)
         along_rad_s = np.sign(pwm[row]) * velocity_rad_s[row]
-        held = full and along_rad_s < slow_rad_s[row] and torque_on[row] > 0.0
-        blocked_s[row] = blocked_s[row] + slice_s if held else 0.0
+        is_blocked = full and along_rad_s < slow_rad_s[row] and torque_on[row] > 0.0
+        blocked_s[row] = blocked_s[row] + slice_s if is_blocked else 0.0
         longest_s = max(longest_s, blocked_s[row])
     return longest_s

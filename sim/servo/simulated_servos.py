@@ -32,7 +32,11 @@ def check_ids(ids: Sequence[int], model: str, most: int) -> None:
         InputError: an ID is outside 0 to ``most`` or used twice.
 
     """
-    wrong = [f"ID {each}: an {model} has 0 to {most}" for each in ids if not 0 <= each <= most]
+    wrong = [
+        f"ID {servo_id}: an {model} has 0 to {most}"
+        for servo_id in ids
+        if not 0 <= servo_id <= most
+    ]
     if len(set(ids)) != len(ids):
         wrong.append(f"two servos share an ID: {', '.join(map(str, sorted(ids)))}")
     if wrong:

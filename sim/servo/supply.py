@@ -42,8 +42,8 @@ class Supply:
         """Set ``supply_v`` (S,) to the chain's voltage minus the cable's drop ``drop_v``."""
         np.subtract(self._volts, drop_v, out=supply_v)
         if self._overridden:
-            own = ~np.isnan(self._override_v)
-            supply_v[own] = self._override_v[own]
+            is_derived = ~np.isnan(self._override_v)
+            supply_v[is_derived] = self._override_v[is_derived]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Cabling:
         ids = robot.servo_ids
         cables_ohm = power.cables_ohm or (power.cable_ohm,) * (len(ids) - 1)
         fed = power.inject_ids or ids[:1]
-        lead_ohm = [power.lead_ohm if each in fed else math.inf for each in ids]
+        lead_ohm = [power.lead_ohm if servo_id in fed else math.inf for servo_id in ids]
         return Cabling(np.array(cables_ohm, dtype=np.float64), np.array(lead_ohm))
 
     def servo_v(

@@ -98,7 +98,8 @@ class Decoder:
     ) -> None:
         self._usual = load_control_table(model)
         self._tables: dict[int, ControlTable] = {
-            servo_id: load_control_table(each) for servo_id, each in (models or {}).items()
+            servo_id: load_control_table(head_places)
+            for servo_id, head_places in (models or {}).items()
         }
         self._reader = PacketParser()
         self._asked: dict[int, Span] = {}
@@ -126,8 +127,8 @@ class Decoder:
         code = packet.instruction
         params = packet.params
         servo_id = packet.servo_id
-        known = code in Instruction.__members__.values()
-        name = Instruction(code).name.lower().replace("_", " ") if known else f"0x{code:02X}"
+        is_known = code in Instruction.__members__.values()
+        name = Instruction(code).name.lower().replace("_", " ") if is_known else f"0x{code:02X}"
         self._last = code
         self._asked.clear()
         self._fast.clear()
@@ -142,9 +143,9 @@ class Decoder:
         elif code == Instruction.SYNC_WRITE and len(params) >= 4:
             address = _word(params, 0)
             size = _word(params, 2)
-            for at in range(4, len(params) - size, size + 1):
-                part = self._values(params[at], address, params[at + 1 : at + 1 + size])
-                values |= {f"{params[at]}: {key}": value for key, value in part.items()}
+            for start in range(4, len(params) - size, size + 1):
+                part = self._values(params[start], address, params[start + 1 : start + 1 + size])
+                values |= {f"{params[start]}: {key}": value for key, value in part.items()}
         elif code == Instruction.BULK_WRITE:
             values = self._bulk_write(params)
         raw = encode_instruction(packet).hex(" ")
@@ -153,29 +154,29 @@ class Decoder:
     def _group_read(self, code: int, params: bytes) -> dict[str, object]:
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
             span = (_word(params, 0), _word(params, 2))
-            asked = [(each, span) for each in params[4:]]
+            asked = [(param, span) for param in params[4:]]
         else:
             asked = [
-                (params[at], (_word(params, at + 1), _word(params, at + 3)))
-                for at in range(0, len(params) - 4, 5)
+                (params[start], (_word(params, start + 1), _word(params, start + 3)))
+                for start in range(0, len(params) - 4, 5)
             ]
         self._asked = dict(asked)
         if code in (Instruction.FAST_SYNC_READ, Instruction.FAST_BULK_READ):
             self._fast = asked
         return {
-            f"{each}": ", ".join(self._names(each, span)) or f"{span[0]}+{span[1]}"
-            for each, span in asked
+            f"{servo_id}": ", ".join(self._names(servo_id, span)) or f"{span[0]}+{span[1]}"
+            for servo_id, span in asked
         }
 
     def _bulk_write(self, params: bytes) -> dict[str, object]:
         values: dict[str, object] = {}
-        at = 0
-        while at + 5 <= len(params):
-            size = _word(params, at + 3)
-            data = params[at + 5 : at + 5 + size]
-            part = self._values(params[at], _word(params, at + 1), data)
-            values |= {f"{params[at]}: {key}": value for key, value in part.items()}
-            at += 5 + size
+        start = 0
+        while start + 5 <= len(params):
+            size = _word(params, start + 3)
+            data = params[start + 5 : start + 5 + size]
+            part = self._values(params[start], _word(params, start + 1), data)
+            values |= {f"{params[start]}: {key}": value for key, value in part.items()}
+            start += 5 + size
         return values
 
     def _answer(self, time_s: float, packet: StatusPacket) -> DecodedPacket:
@@ -188,9 +189,9 @@ class Decoder:
         if self._last == Instruction.PING and len(packet.params) == 3:
             number = _word(packet.params, 0)
             model = model_numbers().get(number, f"model {number}")
-            known = self._tables.get(packet.servo_id, self._usual)
-            if known.model_number == number:
-                model = known.model
+            table = self._tables.get(packet.servo_id, self._usual)
+            if table.model_number == number:
+                model = table.model
             elif number in model_numbers():
                 self._tables[packet.servo_id] = load_control_table(model)
             values = {"model": model, "firmware": packet.params[2]}
@@ -201,19 +202,19 @@ class Decoder:
     def _fast_parts(self, packet: StatusPacket) -> dict[str, object]:
         said = bytes((packet.error,)) + packet.params
         values: dict[str, object] = {}
-        at = 0
+        position = 0
         for _, (address, size) in self._fast:
-            error = said[at]
-            servo_id = said[at + 1] if at + 1 < len(said) else -1
-            data = said[at + 2 : at + 2 + size]
+            error = said[position]
+            servo_id = said[position + 1] if position + 1 < len(said) else -1
+            data = said[position + 2 : position + 2 + size]
             if len(data) < size:
                 break
             part = self._values(servo_id, address, data)
             values |= {f"{servo_id}: {key}": value for key, value in part.items()}
             if error:
                 values[f"{servo_id}: error"] = _outcome(error)
-            at += size + 4
-            if at >= len(said):
+            position += size + 4
+            if position >= len(said):
                 break
         return values
 
@@ -223,11 +224,11 @@ class Decoder:
 
     def _values(self, servo_id: int, address: int, data: bytes) -> dict[str, object]:
         table = self._tables.get(servo_id, self._usual)
-        found: dict[str, object] = {}
+        texts: dict[str, object] = {}
         for name in self._registers(servo_id, address, len(data)):
             register = table[name]
-            found[name] = register.decode(data[register.address - address :])
-        return found or {f"{address}+{len(data)}": data.hex(" ")}
+            texts[name] = register.decode(data[register.address - address :])
+        return texts or {f"{address}+{len(data)}": data.hex(" ")}
 
     def _registers(self, servo_id: int, address: int, length: int) -> list[str]:
         table = self._tables.get(servo_id, self._usual)
@@ -241,11 +242,11 @@ class Decoder:
 
 def _outcome(error: int) -> str:
     code = error & ~ALERT
-    known = code in ResultError.__members__.values()
-    name = ResultError(code).name.lower().replace("_", " ") if known else f"error {code}"
+    is_known = code in ResultError.__members__.values()
+    name = ResultError(code).name.lower().replace("_", " ") if is_known else f"error {code}"
     name = "ok" if code == 0 else name
     return f"{name}, alert" if error & ALERT else name
 
 
-def _word(params: bytes, at: int) -> int:
-    return int.from_bytes(params[at : at + 2], "little")
+def _word(params: bytes, offset: int) -> int:
+    return int.from_bytes(params[offset : offset + 2], "little")

@@ -93,9 +93,9 @@ class Cpg:
         now = value[0]
         turn = np.where(np.isnan(pattern.bias_rad), 0.0, pattern.bias_rad - now)
         bias = now + np.mod(turn + np.pi, TURN) - np.pi  # the shorter way round
-        wanted = np.array([pattern.omega_rad_s])
+        omega_goal = np.array([pattern.omega_rad_s])
         self._slow = Damped.start(value, rate, _packed(pattern, bias), gain)
-        self._clock = Damped.start(omega, omega_rate, wanted, clock_gain or gain)
+        self._clock = Damped.start(omega, omega_rate, omega_goal, clock_gain or gain)
         self._t_s = 0.0
         self.pattern = pattern
 
@@ -118,11 +118,11 @@ class Cpg:
             parts = int(np.ceil(dt_s / LONGEST_STEP_S))
             for _ in range(parts):
                 h, e = dt_s / parts, self.phase_error_rad
-                one = _coupling(e)
-                two = _coupling(e + 0.5 * h * one)
+                coupling = _coupling(e)
+                two = _coupling(e + 0.5 * h * coupling)
                 three = _coupling(e + 0.5 * h * two)
                 four = _coupling(e + h * three)
-                self.phase_error_rad = e + h / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+                self.phase_error_rad = e + h / 6.0 * (coupling + 2.0 * two + 2.0 * three + four)
         return self.angle_rad()
 
     def angle_rad(self) -> Floats:

@@ -43,14 +43,14 @@ def _evaluate(
     """
     harmonics = (len(goal) - 2) // 2
     phase = clock[0]
-    wanted = clock[1]
+    goal_omega = clock[1]
     missing = clock[2]
     ramp = clock[3]
     slowing = clock[4]
     left_s = np.exp(-slowing * t)
     fallen = (1.0 - left_s) / slowing
-    omega = wanted + (missing + ramp * t) * left_s
-    phase += wanted * t + missing * fallen + ramp * (fallen - t * left_s) / slowing
+    omega = goal_omega + (missing + ramp * t) * left_s
+    phase += goal_omega * t + missing * fallen + ramp * (fallen - t * left_s) / slowing
     value = state[0]
     rate = state[1]
     fading = np.exp(-h * t)

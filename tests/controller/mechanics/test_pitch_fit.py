@@ -117,7 +117,7 @@ def test_links_that_differ_lie_on_an_incline_too() -> None:
     np.testing.assert_allclose(fit.goal_rad, 0.0, atol=2e-3)
     assert fit.residual_m < 1e-4
     skeleton = GroundStep(ridge(0.1)).place(
-        headings(UNEVEN, 0.5), (0.3, 0.1), UNEVEN.link_lengths_m, 0.03, known="head"
+        headings(UNEVEN, 0.5), (0.3, 0.1), UNEVEN.link_lengths_m, 0.03, from_end="head"
     )
     apart = np.linalg.norm(np.diff(skeleton.points_m, axis=0), axis=1)
     np.testing.assert_allclose(apart, UNEVEN.link_lengths_m, atol=1e-9)
