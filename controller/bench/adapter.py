@@ -55,13 +55,13 @@ def latency_timer(timer_ms: int | None, device: str) -> Finding:
 def wire(budget: WireBudget, rate_hz: float) -> Finding:
     """Whether the cycle fits the wire."""
     kind = "fast sync read" if budget.fast else "sync read"
-    found = (
+    load_text = (
         f"{budget.servos} servos, {budget.baud} baud, {kind}: {budget.cycle_s * 1e3:.2f} ms per "
         f"cycle, at most {budget.limit_hz:.0f} Hz; {rate_hz:g} Hz use "
         f"{budget.share(rate_hz):.0%} of the wire"
     )
     if budget.share(rate_hz) > 1.0:
-        return Finding(WIRE_CHECK, "fail", found, "raise the baud rate or lower the rate")
+        return Finding(WIRE_CHECK, "fail", load_text, "raise the baud rate or lower the rate")
     if budget.share(rate_hz) > 0.7:
-        return Finding(WIRE_CHECK, "warn", found, "little is left for retries: raise the baud")
-    return Finding(WIRE_CHECK, "ok", found)
+        return Finding(WIRE_CHECK, "warn", load_text, "little is left for retries: raise the baud")
+    return Finding(WIRE_CHECK, "ok", load_text)

@@ -230,10 +230,10 @@ def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Fin
     fall_v = float(loaded_v[high] - loaded_v[low])
     shown = f"{loaded_v[high]:.1f} V at ID {ids[high]} to {loaded_v[low]:.1f} V at ID {ids[low]}"
     if len(ids) < 2 or not np.isfinite(drawn_a).all() or len(voltage_v) < _BLOCKS:
-        found = f"voltage from {shown} under load"
+        voltage_text = f"voltage from {shown} under load"
         if fall_v > DROP_SHARE * supply_v:
-            return Finding(CHECK, "warn", found, "feed the chain at both ends")
-        return Finding(CHECK, "ok", found)
+            return Finding(CHECK, "warn", voltage_text, "feed the chain at both ends")
+        return Finding(CHECK, "ok", voltage_text)
     leads, note = leads_of(robot, voltage_v.mean(axis=0))
     estimate = estimate_cables(voltage_v, drawn_a, leads)
     cabling = estimate.cabling(leads)
@@ -248,23 +248,29 @@ def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Fin
         f"({estimate.usual_low_ohm:.3f} to {estimate.usual_high_ohm:.3f}){note}"
     )
     if bad:
-        found = f"{'; '.join(bad)}; the others: {cables}; {shown} under load"
-        return Finding(CHECK, "fail", found, "reseat its plugs, or exchange it; then run it again")
+        voltage_text = f"{'; '.join(bad)}; the others: {cables}; {shown} under load"
+        return Finding(
+            CHECK, "fail", voltage_text, "reseat its plugs, or exchange it; then run it again"
+        )
     if fall_v <= DROP_SHARE * supply_v:
         return Finding(CHECK, "ok", f"at most {fall_v:.1f} V between two servos under load")
     # the source that makes what was measured, through the same cables
     source_v = float((loaded_v - cabling.servo_v(0.0, SOURCE_OHM, load_a)).mean())
-    found = f"voltage falls from {shown} under load; {cables}"
-    return Finding(CHECK, "warn", found, advice(cabling, ids, source_v, load_a))
+    voltage_text = f"voltage falls from {shown} under load; {cables}"
+    return Finding(CHECK, "warn", voltage_text, advice(cabling, ids, source_v, load_a))
 
 
 def advice(cabling: Cabling, servo_ids: Sequence[int], source_v: float, drawn_a: Floats) -> str:
     """Where to inject power: ``inject power at ID 9: 11.2 V at the lowest; at IDs 6, 13: ...``."""
-    one, two = (best_injection(cabling, servo_ids, source_v, drawn_a, count) for count in (1, 2))
-    if not one.servo_ids:
+    best_single, two = (
+        best_injection(cabling, servo_ids, source_v, drawn_a, count) for count in (1, 2)
+    )
+    if not best_single.servo_ids:
         return "each servo has a lead of its own: shorter or thicker ones; a stronger supply"
-    text = f"inject power at ID {one.servo_ids[0]}: {one.lowest_v:.1f} V at the lowest"
-    if two.lowest_v > one.lowest_v + VOLTAGE_UNIT_V:
+    text = (
+        f"inject power at ID {best_single.servo_ids[0]}: {best_single.lowest_v:.1f} V at the lowest"
+    )
+    if two.lowest_v > best_single.lowest_v + VOLTAGE_UNIT_V:
         shown = " and ".join(map(str, two.servo_ids))
         text += f"; at IDs {shown}: {two.lowest_v:.1f} V"
     return text
@@ -296,8 +302,8 @@ def _step_stays(step_v: Floats, cable: int) -> bool:
 
     A servo with a wrong reading makes one step down and the next one up.
     """
-    beside = [step_v[k] for k in (cable - 1, cable + 1) if 0 <= k < len(step_v)]
-    return all(each > -0.5 * step_v[cable] for each in beside)
+    neighbours_v = [step_v[k] for k in (cable - 1, cable + 1) if 0 <= k < len(step_v)]
+    return all(neighbour_v > -0.5 * step_v[cable] for neighbour_v in neighbours_v)
 
 
 def _block_error(values: Floats) -> Floats:

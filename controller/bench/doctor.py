@@ -88,7 +88,7 @@ def examine(
     models = robot.models_on(on_it)
     imu = robot.imu
     if on_it is not None:
-        expected = tuple(each for each in expected if each in on_it)
+        expected = tuple(servo_id for servo_id in expected if servo_id in on_it)
         imu = imu if imu is not None and imu.id in on_it else None
     on_progress("other programs")
     port.drain_until_quiet(latency_s)  # replies to an earlier program
@@ -101,19 +101,19 @@ def examine(
     bus, pinged = _find(port, models, expected, latency_s)
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
-    found = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
+    present_ids = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
     measured = _FEETECH_MEASURED if bus.table.facts.is_feetech else _MEASURED
-    reads = [bus.probe(i, measured) for i in found]
+    reads = [bus.probe(i, measured) for i in present_ids]
     noise = line_checks.noise(pings, reads, overheard)
-    alone = [] if noise is not None else servos.unshared(found, (*pings, *reads))
+    alone = [] if noise is not None else servos.unshared(present_ids, (*pings, *reads))
     clocks = servos.read_clocks(bus, alone, servos.PATIENCE_S)
     if noise is not None:
         patience_s = bus.latency_s
         bus = servo_bus(port, models, latency_s=patience_s, tries=_NOISE_TRIES)
-    findings += _presence(bus, expected, found, imu, noise, overheard, on_progress)
+    findings += _presence(bus, expected, present_ids, imu, noise, overheard, on_progress)
     if imu is not None:
         findings.append(imu_finding(bus, imu))
-    if not found:
+    if not present_ids:
         return findings
     if findings[1].grade != "fail":  # else their replies are taken for a second servo's
         findings.append(servos.duplicates(pings, reads, noisy=noise is not None))
@@ -158,7 +158,7 @@ def _find(
 def _presence(
     bus: DynamixelBus,
     expected: Sequence[int],
-    found: Sequence[int],
+    present_ids: Sequence[int],
     imu: ImuConfig | None,
     noise: Finding | None,
     overheard: Overheard,
@@ -167,12 +167,12 @@ def _presence(
     """Findings about the devices on the line: the robot's, others, and those that are missing."""
     port = bus.port
     noisy = noise is not None or overheard.noise_bytes > 0
-    missing = [i for i in expected if i not in found]
+    missing = [i for i in expected if i not in present_ids]
     elsewhere = _at_other_bauds(bus, missing, on_progress)
     on_progress("other devices")
-    known = (*expected, *(() if imu is None else (imu.id,)))
+    expected_ids = (*expected, *(() if imu is None else (imu.id,)))
     replies = bus.scan()
-    others = {i: reply for i, reply in replies.items() if i not in known}
+    others = {i: reply for i, reply in replies.items() if i not in expected_ids}
     baud = port.getBaudRate()
     findings: list[Finding] = []
     silent = [i for i in missing if i not in elsewhere]
@@ -180,7 +180,7 @@ def _presence(
     foreign = foreign_replies(port, silent, bus.latency_s, feetech=feetech)
     findings += foreign.findings(bus.table.facts.model)
     findings += servos.presence(
-        expected, found, elsewhere, foreign.ids, list(others), baud, port.name
+        expected, present_ids, elsewhere, foreign.ids, list(others), baud, port.name
     )
     silent = [i for i in silent if i not in foreign.ids]
     findings += [] if noise is None else [noise]
@@ -188,7 +188,9 @@ def _presence(
     findings += unlisted(port, others, bus.latency_s, noisy=noisy, protocol=protocol)
     new = None
     if not feetech:
-        new = factory_servos(port, {*found, *others}, silent, noisy=noisy, on_progress=on_progress)
+        new = factory_servos(
+            port, {*present_ids, *others}, silent, noisy=noisy, on_progress=on_progress
+        )
     already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
     findings += [] if new is None or already else [new]
     return findings
@@ -206,9 +208,9 @@ def _line_quality(
     ids = [s.servo_id for s in reports]
     fast = all(s.fast_reads for s in reports)
     cycle = servo_bus(port, models, latency_s=patience_s).cycle(ids, fast=fast)
-    asked = [each for each in ids for _ in range(_ASKED)]
+    asked = [servo_id for servo_id in ids for _ in range(_ASKED)]
     return line_checks.line_quality(
-        port, cycle, latency_s, lambda: [bus.probe(each) for each in asked]
+        port, cycle, latency_s, lambda: [bus.probe(servo_id) for servo_id in asked]
     )
 
 
@@ -265,13 +267,13 @@ def examine_segments(
             on_progress=partial(_show_step, on_progress, name),
         )
         findings = [
-            each for each in findings if each.check != adapter.WIRE_CHECK
+            finding for finding in findings if finding.check != adapter.WIRE_CHECK
         ]  # of the busiest port
         findings += [
-            each
-            if each.check == adapter.WIRE_CHECK
-            else replace(each, found=f"{name}: {each.found}")
-            for each in on_this
+            finding
+            if finding.check == adapter.WIRE_CHECK
+            else replace(finding, found=f"{name}: {finding.found}")
+            for finding in on_this
         ]
     if wiggle and worst(findings) != "fail":
         on_progress("supply under load")
@@ -326,8 +328,8 @@ def _reports(
         return ()
     wrong = [str(f) for f in inspection.faults if f.cause is FaultCause.OTHER_MODEL]
     port_format = wire_format(bus.table.facts)
-    known = robot.records_by_model.items()
-    models = [name for name, facts in known if wire_format(facts) == port_format]
+    records = robot.records_by_model.items()
+    models = [name for name, facts in records if wire_format(facts) == port_format]
     findings.append(servos.models(inspection.servos, wrong, ", ".join(models)))
     return inspection.servos
 
@@ -355,24 +357,29 @@ def _moving(
     """Findings about joints whose position, or only their velocity, shows a motion."""
     before = {report.servo_id: report.registers["Present Position"] for report in reports}
     turned = [
-        each.servo_id
-        for each in registers
-        if abs(each.values["Present Position"] - before[each.servo_id]) > _STILL_POSITIONS
+        register.servo_id
+        for register in registers
+        if abs(register.values["Present Position"] - before[register.servo_id]) > _STILL_POSITIONS
     ]
     if not turned:
         fast = [
-            each.servo_id
-            for each in registers
-            if abs(each.values.get("Present Velocity", 0) * units.rad_s_per_velocity[each.joint])
+            register.servo_id
+            for register in registers
+            if abs(
+                register.values.get("Present Velocity", 0)
+                * units.rad_s_per_velocity[register.joint]
+            )
             > _STILL_RAD_S
         ]
         if not fast:
             return []
-        found = f"{shown_subject(fast, 'report', robot.label_of_servo)} a velocity, but stands"
-        return [Finding("velocity sensor", "warn", found, _NO_VELOCITY)]
-    found = f"{shown_subject(turned, 'move', robot.label_of_servo)} while the doctor looks"
+        motion_text = (
+            f"{shown_subject(fast, 'report', robot.label_of_servo)} a velocity, but stands"
+        )
+        return [Finding("velocity sensor", "warn", motion_text, _NO_VELOCITY)]
+    motion_text = f"{shown_subject(turned, 'move', robot.label_of_servo)} while the doctor looks"
     remedy = "does it fall, or does another program move it? run doctor again when it lies still"
-    return [Finding("motion", "warn", found, remedy)]
+    return [Finding("motion", "warn", motion_text, remedy)]
 
 
 def _unreadable(error: BusError, noise: Finding | None) -> Finding:
@@ -395,12 +402,14 @@ def _at_other_bauds(
             return {s.servo_id: s.baud for s in replying if s.servo_id in missing}
         answering = scan(port, others, on_progress=on_progress)
         return {s.servo_id: s.baud for s in answering.servos if s.servo_id in missing}
-    found: dict[int, int] = {}
+    baud_by_id: dict[int, int] = {}
     try:
         for baud in others:
             on_progress(f"{baud} baud")
             if port.setBaudRate(baud):
-                found |= dict.fromkeys(bus.find(i for i in missing if i not in found), baud)
+                baud_by_id |= dict.fromkeys(
+                    bus.find(i for i in missing if i not in baud_by_id), baud
+                )
     finally:
         port.setBaudRate(before)
-    return found
+    return baud_by_id

@@ -58,14 +58,14 @@ def back_up(
         BusError: a servo stops answering.
 
     """
-    found = list(DynamixelBus(port, latency_s=latency_s).scan())
-    if not found:
+    servo_ids = list(DynamixelBus(port, latency_s=latency_s).scan())
+    if not servo_ids:
         rates = [port.getBaudRate()]
-        found = [each.servo_id for each in find_feetech(port, rates, latency_s=latency_s)]
-    if not found:
+        servo_ids = [servo.servo_id for servo in find_feetech(port, rates, latency_s=latency_s)]
+    if not servo_ids:
         raise ChainError(f"{port.name}: no servo answers at {port.getBaudRate()} baud")
     servos = []
-    for servo_id in found:
+    for servo_id in servo_ids:
         on_progress(f"ID {servo_id}")
         bus = open_servo(port, servo_id, latency_s)
         servos.append(
@@ -83,16 +83,16 @@ def back_up_all(
         ChainError: (too) servos on two ports share an ID.
 
     """
-    found: dict[int, tuple[str, ServoBackup]] = {}
+    backups: dict[int, tuple[str, ServoBackup]] = {}
     for line, _ in lines.lines:
         for servo in back_up(line, line.latency_s, on_progress).servos:
-            if servo.id in found:
+            if servo.id in backups:
                 raise ChainError(
-                    f"ID {servo.id} answers on {found[servo.id][0]} and on {line.name}: one of "
+                    f"ID {servo.id} answers on {backups[servo.id][0]} and on {line.name}: one of "
                     "them needs another (snakewalk bus set)"
                 )
-            found[servo.id] = line.name, servo
-    return BackupFile(servos=tuple(found[servo_id][1] for servo_id in sorted(found)))
+            backups[servo.id] = line.name, servo
+    return BackupFile(servos=tuple(backups[servo_id][1] for servo_id in sorted(backups)))
 
 
 def backup_text(backup: BackupFile) -> str:
@@ -139,7 +139,9 @@ def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange,
 
 def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
     """Raw values that a person or a program may have set, by address."""
-    registers = sorted((bus.table[name] for name in bus.table), key=lambda each: each.address)
+    registers = sorted(
+        (bus.table[name] for name in bus.table), key=lambda sorted_register: sorted_register.address
+    )
     values = {}
     for register in registers:
         if register.address < bus.table.facts.ram_from and register.name not in _IDENTITY:

@@ -104,10 +104,10 @@ def named_ports(port: str) -> list[str]:
 
 
 def _is_meant(button: PressedButton, run: str) -> bool:
-    known = button.run
+    meant_run = button.run
     path = os.path.realpath(run)
-    where = None if known.folder is None else os.path.realpath(known.folder)
-    return run in (known.name, str(known.process)) or where in (path, os.path.dirname(path))
+    where = None if meant_run.folder is None else os.path.realpath(meant_run.folder)
+    return run in (meant_run.name, str(meant_run.process)) or where in (path, os.path.dirname(path))
 
 
 def stop_runs(buttons: Iterable[PressedButton], who: str) -> list[StopOutcome]:
@@ -237,25 +237,27 @@ class Stop:
         if run is not None and not outcomes:
             raise InputError(f"{run}: no such run is under way")
         devices = [] if outcomes else _free_ports(port)
-        held = stop_holders(devices, who)
-        if held:
-            outcomes = held
+        outcomes_of_holders = stop_holders(devices, who)
+        if outcomes_of_holders:
+            outcomes = outcomes_of_holders
             devices = []
         # a run that was killed, or may not be ended, leaves its servos with torque on
-        devices += [port for each in outcomes if not each.safe for port in each.ports]
+        devices += [port for outcome in outcomes if not outcome.safe for port in outcome.ports]
         is_only = not outcomes and len(devices) == 1
         outcomes += _torque_off(dict.fromkeys(devices), self.bauds, is_only=is_only)
         return self._report(outcomes)
 
     def _report(self, outcomes: Sequence[StopOutcome]) -> int:
-        stopped = {name for each in outcomes if each.safe for name in each.names}
-        safe = all(name in stopped for each in outcomes for name in each.names)
+        stopped = {name for outcome in outcomes if outcome.safe for name in outcome.names}
+        safe = all(name in stopped for outcome in outcomes for name in outcome.names)
         if self.as_json:
-            print(json.dumps({"safe": safe, "stopped": [each.to_dict() for each in outcomes]}))
+            print(
+                json.dumps({"safe": safe, "stopped": [outcome.to_dict() for outcome in outcomes]})
+            )
         else:
-            for each in outcomes:
-                after = "" if each.after_s is None else f" after {each.after_s * 1e3:.0f} ms"
-                print(plain(f"{each.what}: {each.how}{after}: {each.text}"))
+            for outcome in outcomes:
+                after = "" if outcome.after_s is None else f" after {outcome.after_s * 1e3:.0f} ms"
+                print(plain(f"{outcome.what}: {outcome.how}{after}: {outcome.text}"))
         return 0 if safe else 1
 
 

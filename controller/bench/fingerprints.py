@@ -47,29 +47,29 @@ def read_fingerprints(bus: DynamixelBus, servo_ids: Iterable[int]) -> dict[int, 
         PortError: the port is gone.
 
     """
-    found: dict[int, Fingerprint] = {}
+    fingerprints: dict[int, Fingerprint] = {}
     for servo_id in servo_ids:
         table = bus.table_of(servo_id)
         try:
             registers = bus.read_each(servo_id, [name for name in FINGERPRINT if name in table])
         except BusError:
             continue
-        found[servo_id] = fingerprint_of(registers)
-    return found
+        fingerprints[servo_id] = fingerprint_of(registers)
+    return fingerprints
 
 
 def read_all(lines: PortLines, robot: RobotConfig) -> dict[int, Fingerprint]:
     """Fingerprints of a robot's servos on all its ports; raises as ``read_fingerprints``."""
-    found: dict[int, Fingerprint] = {}
+    fingerprints: dict[int, Fingerprint] = {}
     for line, ids in lines.lines:
         bus = servo_bus(line, robot.models_on(ids), latency_s=line.latency_s)
         there = [i for i in robot.servo_ids if ids is None or i in ids]
-        found |= read_fingerprints(bus, there)
-    return found
+        fingerprints |= read_fingerprints(bus, there)
+    return fingerprints
 
 
 def fingerprint_finding(
-    file: FingerprintFile, robot: RobotConfig, found: Mapping[int, Fingerprint]
+    file: FingerprintFile, robot: RobotConfig, fingerprints: Mapping[int, Fingerprint]
 ) -> Finding | None:
     """Result of the comparison with the file; None without a file.
 
@@ -77,11 +77,11 @@ def fingerprint_finding(
         ConfigError: the file is broken.
 
     """
-    known = file.read()
-    if known is None:
+    accepted = file.read()
+    if accepted is None:
         return None
-    lines = changes(robot, known, found)
-    missing = missing_registers(known, found)
+    lines = changes(robot, accepted, fingerprints)
+    missing = missing_registers(accepted, fingerprints)
     if not lines and missing:
         text = f"{file.path} has no {', '.join(missing)}: not compared"
         return Finding("fingerprint", "warn", text, "the next run on the port completes the file")
@@ -92,19 +92,21 @@ def fingerprint_finding(
 
 
 def differences(
-    robot: RobotConfig, known: Mapping[int, Fingerprint], found: Mapping[int, Fingerprint]
+    robot: RobotConfig, accepted: Mapping[int, Fingerprint], fingerprints: Mapping[int, Fingerprint]
 ) -> list[str]:
     """Old and new value of every register that differs, one line each, by joint."""
     return [
-        f"{robot.joint_label(joint)}: {name}: {known.get(servo_id, {}).get(name, 'unknown')} -> "
+        f"{robot.joint_label(joint)}: {name}: {accepted.get(servo_id, {}).get(name, 'unknown')} -> "
         f"{value}"
         for joint, servo_id in enumerate(robot.servo_ids)
-        for name, value in found.get(servo_id, {}).items()
-        if known.get(servo_id, {}).get(name) != value
+        for name, value in fingerprints.get(servo_id, {}).items()
+        if accepted.get(servo_id, {}).get(name) != value
     ]
 
 
-def note_changes(file: FingerprintFile, servo_id: int, made: Iterable[SettingChange]) -> bool:
+def note_changes(
+    file: FingerprintFile, servo_id: int, setting_changes: Iterable[SettingChange]
+) -> bool:
     """Store changes of one servo's settings; False if the file does not have the servo.
 
     Raises:
@@ -112,18 +114,20 @@ def note_changes(file: FingerprintFile, servo_id: int, made: Iterable[SettingCha
         OSError: it cannot be written.
 
     """
-    known = file.read() or {}
-    values = known.pop(servo_id, None)
+    accepted = file.read() or {}
+    values = accepted.pop(servo_id, None)
     if values is None:
         return False
-    by_register = {change.register: change.after for change in made}
-    values |= {name: each for name, each in by_register.items() if name in values}
-    file.write({**known, by_register.get("ID", servo_id): values})
+    by_register = {change.register: change.after for change in setting_changes}
+    values |= {
+        name: register_value for name, register_value in by_register.items() if name in values
+    }
+    file.write({**accepted, by_register.get("ID", servo_id): values})
     return True
 
 
-def write_fingerprints(robot_file: Path, found: Mapping[int, Fingerprint]) -> Path:
+def write_fingerprints(robot_file: Path, fingerprints: Mapping[int, Fingerprint]) -> Path:
     """Write the fingerprint file of a robot's file; returns its path."""
     file = FingerprintFile(robot_file)
-    file.write(found)
+    file.write(fingerprints)
     return file.path

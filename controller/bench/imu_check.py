@@ -44,12 +44,14 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
     rate_dps = np.rad2deg(max(float(np.linalg.norm(s.rate_rad_s)) for s in shown))
     up = shown[-1].rotation[2]
     tilt_deg = np.rad2deg(np.arccos(np.clip(up[2], -1.0, 1.0)))
-    found = (
+    imu_text = (
         f"{name}: link {imu.link} is {tilt_deg:.0f} degrees off upright, turns at up to "
         f"{rate_dps:.1f} degrees a second"
     )
     if rate_dps > _STILL_DPS:
-        return Finding("imu", "warn", found, "does the robot lie still? is the range the board's?")
+        return Finding(
+            "imu", "warn", imu_text, "does the robot lie still? is the range the board's?"
+        )
     if tilt_deg > _LEVEL_DEG:
-        return Finding("imu", "warn", found, "if it lies flat: correct mounting_deg of [imu]")
-    return Finding("imu", "ok", found)
+        return Finding("imu", "warn", imu_text, "if it lies flat: correct mounting_deg of [imu]")
+    return Finding("imu", "ok", imu_text)

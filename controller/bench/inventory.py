@@ -55,18 +55,18 @@ def take_inventory(
         report = scan(port, bauds, on_progress)
         if report.bad_line is not None:
             on_progress(report.bad_line)
-        for found in report.servos:
-            port.setBaudRate(found.baud)
-            entries.append(InventoryEntry(found, _state(port, latency_s, found)))
+        for servo in report.servos:
+            port.setBaudRate(servo.baud)
+            entries.append(InventoryEntry(servo, _state(port, latency_s, servo)))
     finally:
         port.setBaudRate(before)
     return entries
 
 
-def _state(port: BytePort, latency_s: float, found: ScanResult) -> ServoReport | None:
+def _state(port: BytePort, latency_s: float, servo: ScanResult) -> ServoReport | None:
     try:
-        bus = servo_bus(port, found.model, latency_s=latency_s)
-        return read_report(bus, found.servo_id, found.model)
+        bus = servo_bus(port, servo.model, latency_s=latency_s)
+        return read_report(bus, servo.servo_id, servo.model)
     except (BusError, ControlTableError):
         return None
 
@@ -96,13 +96,13 @@ def robot_skeleton(
         servo["supply_v"] = volts[len(volts) // 2]
     joints: list[dict[str, object]] = []
     for entry in chain:
-        own = {} if entry.found.model == model else {"model": entry.found.model}
-        joints.append({"axis": "y", "id": entry.found.servo_id, **own})
+        model_key = {} if entry.found.model == model else {"model": entry.found.model}
+        joints.append({"axis": "y", "id": entry.found.servo_id, **model_key})
     chosen = {entry.found.servo_id for entry in chain}
     ports = [
         {"port": port, "ids": ids}
         for port, there in segments
-        if (ids := [each for each in there if each in chosen])
+        if (ids := [servo_id for servo_id in there if servo_id in chosen])
     ]
     described = {"name": name, "servo": servo, "joints": joints}
     robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)

@@ -108,43 +108,43 @@ def response(
 
 def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
     usual_ms = float(np.quantile(late_s, 0.25)) * 1e3
-    found = f"replies come {usual_ms:.1f} ms later than the wire needs"
+    response_text = f"replies come {usual_ms:.1f} ms later than the wire needs"
     if usual_ms * 1e-3 > latency_s:
-        found += f", the driver waits {latency_s * 1e3:.0f} ms: a run loses all of them"
+        response_text += f", the driver waits {latency_s * 1e3:.0f} ms: a run loses all of them"
         remedy = "lower the adapter's latency timer to 1 ms, or connect it without a hub or server"
-        return Finding("response time", "fail", found, remedy)
+        return Finding("response time", "fail", response_text, remedy)
     if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
-        return Finding("response time", "ok", found)
-    found += ": each cycle of a run is longer by that time"
+        return Finding("response time", "ok", response_text)
+    response_text += ": each cycle of a run is longer by that time"
     remedy = (
         "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer"
     )
-    return Finding("response time", "warn", found, remedy)
+    return Finding("response time", "warn", response_text, remedy)
 
 
 def _slow_servos(probes: Sequence[Probe]) -> Finding | None:
     """Servos each of whose replies is later than those of the others."""
     least_s: dict[int, float] = {}
-    for each in probes:
-        if each.late_s:
-            late_s = min(each.late_s)
-            least_s[each.servo_id] = min(late_s, least_s.get(each.servo_id, late_s))
+    for probe in probes:
+        if probe.late_s:
+            late_s = min(probe.late_s)
+            least_s[probe.servo_id] = min(late_s, least_s.get(probe.servo_id, late_s))
     if len(least_s) < _COMPARED:
         return None
     usual_s = float(np.median(list(least_s.values())))
     slow = {i: late_s - usual_s for i, late_s in least_s.items() if late_s - usual_s > _SLOW_S}
     if not slow:
         return None
-    found = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())
+    names = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())
     remedy = "update its firmware or exchange it: each cycle of a run is longer by that time"
-    return Finding("response time", "warn", f"slower than the others: {found}", remedy)
+    return Finding("response time", "warn", f"slower than the others: {names}", remedy)
 
 
 def _losing_servos(probes: Sequence[Probe]) -> str:
     """Text that names the few servos whose replies get lost; empty if none or many lose some."""
     lost: Counter[int] = Counter()
-    for each in probes:
-        lost[each.servo_id] += each.requests - each.answered
+    for probe in probes:
+        lost[probe.servo_id] += probe.requests - probe.answered
     lossy = [servo_id for servo_id, count in lost.items() if count >= _LOST]
     few = 0 < len(lossy) <= max(1, len(lost) // 4)
     return f"; replies of {shown_ids(lossy)} get lost: its plug, or the servo" if few else ""
@@ -175,18 +175,20 @@ def line_quality(
         lost += not complete
         if complete:
             longest_s = max(longest_s, port.clock.now_s() - began_s)
-    found = f"{lost} of {reads} group reads incomplete"
+    reads_text = f"{lost} of {reads} group reads incomplete"
     if cycle.counters.fast_given_up and lost == FAST_FAILURES:
-        found += ": all fast ones, but no plain one"
-        return Finding("line", "warn", found, _NO_FAST_READS)
+        reads_text += ": all fast ones, but no plain one"
+        return Finding("line", "warn", reads_text, _NO_FAST_READS)
     if lost:
         alone = ask_each()
-        if lost == reads and all(each.answered == each.requests for each in alone):
-            found += ", though each servo replies by itself"
-            return Finding("line", "fail", found, _NO_GROUP_READS)
-        found += _losing_servos(alone)
+        if lost == reads and all(
+            reply_counts.answered == reply_counts.requests for reply_counts in alone
+        ):
+            reads_text += ", though each servo replies by itself"
+            return Finding("line", "fail", reads_text, _NO_GROUP_READS)
+        reads_text += _losing_servos(alone)
         grade: Grade = "fail" if lost > _BAD_SHARE * _TEST_READS else "warn"
-        return Finding("line", grade, found, _CABLES)
+        return Finding("line", grade, reads_text, _CABLES)
     if longest_s > 2.0 * latency_s:
-        found += f"; the longest took {longest_s * 1e3:.0f} ms"
-    return Finding("line", "ok", found)
+        reads_text += f"; the longest took {longest_s * 1e3:.0f} ms"
+    return Finding("line", "ok", reads_text)

@@ -26,18 +26,18 @@ _COMPILED: Final = "snakewalk.drivers.compiling"
 
 def loop_modules(package: str) -> list[str]:
     """Names of the modules of a package with a loop; imports none."""
-    found: list[str] = []
+    modules: list[str] = []
     folder = Path(__file__).resolve().parents[2]
     for part in package.split(".")[1:]:
         folder /= part
-    for each in pkgutil.iter_modules([str(folder)], f"{package}."):
-        if each.ispkg:
-            found += loop_modules(each.name)
+    for module_info in pkgutil.iter_modules([str(folder)], f"{package}."):
+        if module_info.ispkg:
+            modules += loop_modules(module_info.name)
             continue
-        file = folder / f"{each.name.rpartition('.')[2]}.py"
+        file = folder / f"{module_info.name.rpartition('.')[2]}.py"
         if file.exists() and f"from {_COMPILED} import" in file.read_text(encoding="utf-8"):
-            found.append(each.name)
-    return found
+            modules.append(module_info.name)
+    return modules
 
 
 def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
@@ -49,7 +49,7 @@ def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
         RuntimeError: a child failed; its output is above.
 
     """
-    total = sum(len(loop_modules(f"snakewalk.{each}")) for share in _SHARES for each in share)
+    total = sum(len(loop_modules(f"snakewalk.{package}")) for share in _SHARES for package in share)
     lock = threading.Lock()
     notes: dict[str, None] = {}  # of both children, in the order of arrival
     done = 0

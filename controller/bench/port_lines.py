@@ -45,17 +45,17 @@ class PortLines:
                 return open_servo(line, servo_id, line.latency_s)
         raise InputError(f"--port {self.port}: has no ID {servo_id}; say which port it is on")
 
-    def misplaced(self, found: Iterable[tuple[str, int]]) -> list[str]:
+    def misplaced(self, servos_of_lines: Iterable[tuple[str, int]]) -> list[str]:
         """Servos that answer where ``--port`` does not have them, in words.
 
         Args:
-            found: port and ID of each servo that answered.
+            servos_of_lines: port and ID of each servo that answered.
 
         """
         there = {line.name: ids for line, ids in self.lines}
         return [
             f"{name}: servo {servo_id} answers here; --port does not say so"
-            for name, servo_id in found
+            for name, servo_id in servos_of_lines
             if (ids := there[name]) is not None and servo_id not in ids
         ]
 
@@ -88,13 +88,13 @@ def open_lines(port: str | None, baud: int) -> Iterator[PortLines]:
 
 def _check_segments(port: str, segments: Sequence[tuple[str, tuple[int, ...]]]) -> None:
     names = [name for name, _ in segments]
-    ids = [each for _, some in segments for each in some]
+    ids = [servo_id for _, some in segments for servo_id in some]
     faults = [
         f"--port {port}: {name} is named twice" for name in {n for n in names if names.count(n) > 1}
     ]
     faults += [
-        f"--port {port}: ID {each} is on more than one port"
-        for each in sorted({i for i in ids if ids.count(i) > 1})
+        f"--port {port}: ID {servo_id} is on more than one port"
+        for servo_id in sorted({i for i in ids if ids.count(i) > 1})
     ]
     if SIMULATED in names:
         faults.append(f"--port {port}: {SIMULATED} is of runs: there is nobody to serve")

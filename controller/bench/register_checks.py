@@ -276,13 +276,13 @@ class _Checks:
         ]
 
     def _not_factory(self, check: str, register: str, remedy: str) -> Finding | None:
-        found = [
+        servos = [
             f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}"
             for servo in self._servos
             if (value := servo.values.get(register)) is not None
             and (usual := self._factory[servo.joint].get(register, value)) != value
         ]
-        return Finding(check, "warn", "; ".join(found), remedy) if found else None
+        return Finding(check, "warn", "; ".join(servos), remedy) if servos else None
 
     def _watchdog(self) -> list[Finding | None]:
         return [
@@ -339,8 +339,8 @@ class _Checks:
             angles[servo.joint] = self._units.position_rad(servo.joint, raw)
         faults = pose_faults(self._robot, angles)
         if faults:
-            found = "; ".join(fault.partition(": bend")[0] for fault in faults)
-            return Finding("pose", "fail", found, faults[0].partition("limit of ")[2])
+            bend_faults = "; ".join(fault.partition(": bend")[0] for fault in faults)
+            return Finding("pose", "fail", bend_faults, faults[0].partition("limit of ")[2])
         return Finding("pose", "ok", "every joint stands within its limits")
 
     def _exchanged(self) -> Finding | None:
@@ -423,7 +423,7 @@ class _Checks:
 
     def _unusual(self, check: str, registers: Sequence[str]) -> Finding | None:
         """Registers that are neither the factory's nor the run's."""
-        found = []
+        unusual_values = []
         for servo in self._servos:
             run = {s.register: s for s in self._settings(servo)}
             for name in registers:
@@ -433,8 +433,10 @@ class _Checks:
                 if check == "operating mode":
                     usual |= {POSITION_MODE, CURRENT_POSITION_MODE}
                 if value is not None and value not in usual:
-                    found.append(f"{self._robot.joint_label(servo.joint)}: {name} {value}")
-        return Finding(check, "warn", "; ".join(found), _BY_A_RUN) if found else None
+                    unusual_values.append(f"{self._robot.joint_label(servo.joint)}: {name} {value}")
+        return (
+            Finding(check, "warn", "; ".join(unusual_values), _BY_A_RUN) if unusual_values else None
+        )
 
     def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:
         return chain_settings(self._robot, self._units, servo.joint, self._full[servo.joint])

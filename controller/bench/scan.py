@@ -60,7 +60,7 @@ def pick_port(port: str | None) -> str:
         if is_port_map(port):
             raise PortError(f"--port {port}: one port at a time: its servos are found out on one")
         return port
-    there = sorted(found.device for found in list_ports.comports() if found.vid is not None)
+    there = sorted(comport.device for comport in list_ports.comports() if comport.vid is not None)
     if len(there) == 1:
         return there[0]
     shown = f"which one? there are {', '.join(there)}" if there else "no USB serial adapter found"
@@ -79,9 +79,9 @@ def check_bauds(bauds: Sequence[int]) -> None:
         ControlTableError: a line for each.
 
     """
-    known = sorted(known_bauds())
-    shown = ", ".join(map(str, known))
-    unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in known]
+    all_bauds = sorted(known_bauds())
+    shown = ", ".join(map(str, all_bauds))
+    unknown = [f"--baud {rate}: servos have {shown}" for rate in bauds if rate not in all_bauds]
     if unknown:
         raise ControlTableError(unknown)
 
@@ -104,12 +104,14 @@ class ScanReport:
             shown = ", ".join(f"{count} at {baud} baud" for baud, count in self.noise_bytes.items())
             if len(self.noise_bytes) > _NAMED:
                 shown = f"{sum(self.noise_bytes.values())} at {len(self.noise_bytes)} baud rates"
-            found = f"bytes came damaged ({shown}): noise on the line, or two servos with one ID"
+            fault_text = (
+                f"bytes came damaged ({shown}): noise on the line, or two servos with one ID"
+            )
         elif self.lossy:
-            found = "not every servo answered each time: packets get lost"
+            fault_text = "not every servo answered each time: packets get lost"
         else:
             return None
-        return f"{found}; there may be more servos than these"
+        return f"{fault_text}; there may be more servos than these"
 
 
 def scan(
@@ -158,8 +160,8 @@ def scan(
                 tries = _TRIES if bad else None
                 results += [_result(port, baud, reply, tries) for reply in servos.values()]
         if not results and not noise:  # no servo of Protocol 2.0, and no bad line
-            found = find_feetech(port, bauds or feetech_bauds(), on_progress)
-            results = [ScanResult(s.servo_id, s.model, s.firmware, s.baud) for s in found]
+            feetech_servos = find_feetech(port, bauds or feetech_bauds(), on_progress)
+            results = [ScanResult(s.servo_id, s.model, s.firmware, s.baud) for s in feetech_servos]
     finally:
         port.setBaudRate(before)
     results.sort(key=lambda servo: (servo.servo_id, servo.baud))
@@ -207,17 +209,17 @@ def _tell_once(
     answered: a servo that is found at two rates is pinged at all others. Two servos with one ID, at
     two rates, are reported at both.
     """
-    for servo_id in sorted({each for found in replies.values() for each in found}):
-        at = [baud for baud, found in replies.items() if servo_id in found]
-        if len(at) < 2:
+    for servo_id in sorted({reported_id for ids in replies.values() for reported_id in ids}):
+        bauds = [baud for baud, ids in replies.items() if servo_id in ids]
+        if len(bauds) < 2:
             continue
-        on_progress(f"servo {servo_id} answers at {len(at)} baud rates")
-        others = [baud for baud in BAUDS if baud not in at]
+        on_progress(f"servo {servo_id} answers at {len(bauds)} baud rates")
+        others = [baud for baud in BAUDS if baud not in bauds]
         answering = sum(_pings_back(port, servo_id, baud) for baud in others)
-        if len(at) + answering > len(BAUDS) / 2:
-            kept = before if before in replies else at[0]
-            reply = replies[at[0]][servo_id]
-            for baud in at:
+        if len(bauds) + answering > len(BAUDS) / 2:
+            kept = before if before in replies else bauds[0]
+            reply = replies[bauds[0]][servo_id]
+            for baud in bauds:
                 del replies[baud][servo_id]
             replies[kept][servo_id] = reply
 

@@ -117,8 +117,8 @@ class PosePublisher:
 
     def __call__(self) -> None:
         """Send the datagrams that are due."""
-        for each in self._tracker.due(self._line_s()):
-            self._sender.send(each.data)
+        for sent_pose in self._tracker.due(self._line_s()):
+            self._sender.send(sent_pose.data)
             self.sent += 1
 
     def close(self) -> None:

@@ -45,7 +45,7 @@ def _subject(servos: Sequence[ServoReport], verb: str) -> str:
 
 def presence(
     expected: Sequence[int],
-    found: Sequence[int],
+    present_ids: Sequence[int],
     elsewhere: Mapping[int, int],
     foreign: Collection[int],
     others: Sequence[int],
@@ -56,7 +56,7 @@ def presence(
 
     Args:
         expected: IDs of the robot.
-        found: those that answered at ``baud``.
+        present_ids: those that answered at ``baud``.
         elsewhere: ID to the other baud rate at which it answered.
         foreign: silent IDs that reply in another protocol.
         others: IDs that answered at ``baud`` and are not the robot's.
@@ -77,8 +77,10 @@ def presence(
             )
         )
     if not rates:
-        findings.append(Finding("baud rate", "ok" if found or foreign else "warn", f"{baud} baud"))
-    missing = [i for i in expected if i not in found and i not in elsewhere]
+        findings.append(
+            Finding("baud rate", "ok" if present_ids or foreign else "warn", f"{baud} baud")
+        )
+    missing = [i for i in expected if i not in present_ids and i not in elsewhere]
     refusing = [i for i in missing if i in foreign]
     missing = [i for i in missing if i not in foreign]
     if refusing:
@@ -91,7 +93,7 @@ def presence(
             Finding("servo IDs", "fail", f"no answer from {shown_ids(missing)}", remedy)
         )
     elif not refusing:
-        findings.append(Finding("servo IDs", "ok", f"{len(found)} of {len(expected)} answer"))
+        findings.append(Finding("servo IDs", "ok", f"{len(present_ids)} of {len(expected)} answer"))
     return findings
 
 
@@ -115,7 +117,7 @@ def _missing_remedy(
 
 def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | None:
     """Finding for a command without ``--robot`` whose servos are not the default robot's."""
-    if all(each.check != "servo IDs" or each.grade == "ok" for each in findings):
+    if all(finding.check != "servo IDs" or finding.grade == "ok" for finding in findings):
         return None
     return Finding(
         "robot",
@@ -143,8 +145,10 @@ def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = 
         )
     requests = sum(p.requests for p in probes)
     if noisy:
-        found = f"no servo answers twice in {requests} requests; more the noise does not let see"
-        return Finding(check, "ok", found)
+        duplicates_text = (
+            f"no servo answers twice in {requests} requests; more the noise does not let see"
+        )
+        return Finding(check, "ok", duplicates_text)
     never = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
     if never:
         return Finding(
@@ -224,10 +228,12 @@ def alarms(servos: Sequence[ServoReport], robot: RobotConfig) -> Finding:
     bad = [s for s in servos if s.hardware_error]
     if not bad:
         return Finding("alarms", "ok", "none")
-    found = ", ".join(
+    alarm_texts = ", ".join(
         f"{robot.label_of_servo(s.servo_id)}: {alarm_names(s.hardware_error)}" for s in bad
     )
-    return Finding("alarms", "fail", found, "remove the cause, then switch the servo power off, on")
+    return Finding(
+        "alarms", "fail", alarm_texts, "remove the cause, then switch the servo power off, on"
+    )
 
 
 def torque(servos: Sequence[ServoReport]) -> Finding:
@@ -269,38 +275,46 @@ def unsteady_supply(bus: DynamixelBus, servos: Sequence[ServoReport]) -> list[Fi
         s.servo_id: bus.read(s.servo_id, "Present Input Voltage") * VOLTAGE_UNIT_V - s.voltage_v
         for s in servos
     }
-    servo_id = max(changed_v, key=lambda each: abs(changed_v[each]))
+    servo_id = max(changed_v, key=lambda changed_id: abs(changed_v[changed_id]))
     if abs(changed_v[servo_id]) <= _UNSTEADY_V:
         return []
-    found = f"changes by {abs(changed_v[servo_id]):.1f} V at rest, measured by servo {servo_id}"
-    return [Finding("supply", "warn", found, "a loose supply plug, or a supply that is too weak")]
+    supply_text = (
+        f"changes by {abs(changed_v[servo_id]):.1f} V at rest, measured by servo {servo_id}"
+    )
+    return [
+        Finding("supply", "warn", supply_text, "a loose supply plug, or a supply that is too weak")
+    ]
 
 
 def heat(servos: Sequence[ServoReport], robot: RobotConfig, limit_c: float) -> Finding:
     """Temperatures at rest, and sensors that cannot be right."""
     broken = [s.servo_id for s in servos if s.temperature_c > _IMPOSSIBLE_C]
     if broken:
-        found = f"{shown_subject(broken, 'report', robot.label_of_servo)} more than any motor bears"
+        heat_text = (
+            f"{shown_subject(broken, 'report', robot.label_of_servo)} more than any motor bears"
+        )
         remedy = "its sensor is broken: a run stops at once; exchange the servo"
-        return Finding("temperature", "fail", found, remedy)
+        return Finding("temperature", "fail", heat_text, remedy)
     hottest = max(servos, key=lambda s: s.temperature_c)
     label = robot.label_of_servo(hottest.servo_id)
-    found = f"{label} is the warmest: {hottest.temperature_c:.0f} C"
+    heat_text = f"{label} is the warmest: {hottest.temperature_c:.0f} C"
     if hottest.temperature_c > limit_c:
-        return Finding("temperature", "fail", found, "let it cool down")
+        return Finding("temperature", "fail", heat_text, "let it cool down")
     if hottest.temperature_c > _HOT_C:
-        return Finding("temperature", "warn", found, "it will not walk for long: let it cool down")
+        return Finding(
+            "temperature", "warn", heat_text, "it will not walk for long: let it cool down"
+        )
     dead = [s.servo_id for s in servos if s.temperature_c <= 0.0]
     if dead:
-        found = f"{shown_subject(dead, 'report', robot.label_of_servo)} 0 C or less"
+        heat_text = f"{shown_subject(dead, 'report', robot.label_of_servo)} 0 C or less"
         remedy = "its sensor is broken: it does not protect itself from heat; exchange the servo"
-        return Finding("temperature", "warn", found, remedy)
+        return Finding("temperature", "warn", heat_text, remedy)
     usual_c = median(s.temperature_c for s in servos)
     if hottest.temperature_c - usual_c > _WARMER_C:
-        found += f", the others have about {usual_c:.0f} C"
+        heat_text += f", the others have about {usual_c:.0f} C"
         remedy = "did it push against something? is its joint tight, or its sensor off?"
-        return Finding("temperature", "warn", found, remedy)
-    return Finding("temperature", "ok", found)
+        return Finding("temperature", "warn", heat_text, remedy)
+    return Finding("temperature", "ok", heat_text)
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +328,7 @@ class ServoClock:
 
 def unshared(servo_ids: Sequence[int], probes: Sequence[Probe]) -> list[int]:
     """Servos without a damaged or doubled reply: an ID of two servos has two clocks."""
-    shared = {each.servo_id for each in probes if each.doubled or each.damaged}
+    shared = {probe.servo_id for probe in probes if probe.doubled or probe.damaged}
     return [servo_id for servo_id in servo_ids if servo_id not in shared]
 
 
@@ -349,16 +363,20 @@ def restarts(
     silent = [servo_id for servo_id in before if servo_id not in after]
     findings = []
     if silent:
-        found = f"{shown_subject(silent, 'reply', robot.label_of_servo)} no more since the start"
-        findings.append(Finding("power", "fail", found, _POWER_REMEDY))
+        restart_text = (
+            f"{shown_subject(silent, 'reply', robot.label_of_servo)} no more since the start"
+        )
+        findings.append(Finding("power", "fail", restart_text, _POWER_REMEDY))
     restarted = [
         servo_id
         for servo_id, first in before.items()
         if servo_id in after and _is_restarted(first, after[servo_id])
     ]
     if restarted:
-        found = f"{shown_subject(restarted, 'restart', robot.label_of_servo)} while doctor runs"
-        findings.append(Finding("power", "fail", found, _POWER_REMEDY))
+        restart_text = (
+            f"{shown_subject(restarted, 'restart', robot.label_of_servo)} while doctor runs"
+        )
+        findings.append(Finding("power", "fail", restart_text, _POWER_REMEDY))
     return findings
 
 

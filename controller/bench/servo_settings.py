@@ -89,13 +89,13 @@ def open_servo(port: BytePort, servo_id: int, latency_s: float) -> DynamixelBus:
     if not 0 <= servo_id <= MAX_ID:
         raise InputError(f"--id {servo_id}: a bus has IDs 0 to {MAX_ID}")
     try:
-        found = DynamixelBus(port, latency_s=latency_s).ping(servo_id)
+        ping = DynamixelBus(port, latency_s=latency_s).ping(servo_id)
     except NoAnswerError:
         feetech = identify(FeetechBus(port, latency_s=latency_s), servo_id, port.getBaudRate())
         if feetech is None:
             raise
         return FeetechBus(port, feetech.model, latency_s=latency_s)
-    return DynamixelBus(port, model_of(found.model_number), latency_s=latency_s)
+    return DynamixelBus(port, model_of(ping.model_number), latency_s=latency_s)
 
 
 def plan(bus: DynamixelBus, servo_id: int, request: SettingsRequest) -> tuple[SettingChange, ...]:

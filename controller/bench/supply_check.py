@@ -76,11 +76,11 @@ def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -
         return [Finding(check, "fail", text, "see what line says: cables, plugs, a common ground")]
     lowest_v, rest_v = wiggled.voltage_v.min(axis=0), float(wiggled.rest_v.min())
     sag_v = float((wiggled.rest_v - lowest_v).max())
-    found = f"{rest_v:.1f} V at rest, {lowest_v.min():.1f} V in motion"
+    supply_text = f"{rest_v:.1f} V at rest, {lowest_v.min():.1f} V in motion"
     if sag_v > _SAG_SHARE * rest_v:
         remedy = "charge the battery; thicker or shorter cables; inject power at more places"
-        return [Finding(check, "fail", f"{found}: it sags by {sag_v:.1f} V", remedy), *cables]
-    return [Finding(check, "ok", found), *cables]
+        return [Finding(check, "fail", f"{supply_text}: it sags by {sag_v:.1f} V", remedy), *cables]
+    return [Finding(check, "ok", supply_text), *cables]
 
 
 def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
@@ -127,7 +127,7 @@ def wiggle(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> Wiggle:
 
 def _supply_block(bus: ChainBus, robot: RobotConfig, *, fast: bool) -> GroupCycle:
     ids = robot.servo_ids
-    if all(_OUTPUT in bus.table_of(each) for each in ids):
+    if all(_OUTPUT in bus.table_of(servo_id) for servo_id in ids):
         return bus.block(ids, _OUTPUT, "Present Input Voltage", fast=fast)
     return bus.slow_cycle(ids, fast=fast)
 
@@ -142,6 +142,6 @@ def _drawn_a(robot: RobotConfig, blocks: Bytes) -> Floats:
         return np.full(len(blocks), np.nan)
     output, current = np.ascontiguousarray(blocks[:, :4]).view("<i2").T
     models = robot.servo_records
-    unit_a = [math.nan if (a := each.units.current_a) is None else a for each in models]
-    full = np.array([each.units.full_pwm or math.nan for each in models])
+    unit_a = [math.nan if (a := model.units.current_a) is None else a for model in models]
+    full = np.array([model.units.full_pwm or math.nan for model in models])
     return drawn_a(robot, output / full, current * np.array(unit_a))

@@ -58,22 +58,22 @@ def torque_off(
     with opened as port:
         sent = _send(port, first)
         scan = _scan_module()
-        known = sorted(scan.known_bauds(), reverse=True)
-        others = () if bauds else tuple(rate for rate in known if rate not in _LIKELY)
+        all_bauds = sorted(scan.known_bauds(), reverse=True)
+        others = () if bauds else tuple(rate for rate in all_bauds if rate not in _LIKELY)
         sent += _send(port, others)
         rates = first + others
         # on a bad line a request gets lost: the likely rates are asked twice
         for rate in (*rates, *(rate for rate in rates if rate in _LIKELY)):
             on_progress(f"torque off is sent; waiting for replies at {rate} baud")
-            found = scan.scan(port, [rate], patient=False).servos
-            if found:
+            servos = scan.scan(port, [rate], patient=False).servos
+            if servos:
                 port.setBaudRate(rate)
                 failed = [
                     fault
-                    for servo in found
+                    for servo in servos
                     if (fault := _confirm(port, servo.servo_id, servo.model)) is not None
                 ]
-                text = f"{len(found) - len(failed)} servos confirm it at {rate} baud"
+                text = f"{len(servos) - len(failed)} servos confirm it at {rate} baud"
                 return StopOutcome(
                     device, "torque off", "; ".join([text, *failed]), not failed, ports=(device,)
                 )

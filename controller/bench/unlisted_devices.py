@@ -84,7 +84,9 @@ class ForeignReplies:
                     f"name a robot by --robot whose servos have model = {model!r}",
                 )
             )
-        there = [f"{shown_subject(i, 'reply')} at {at} baud" for at, i in self.protocol_1.items()]
+        there = [
+            f"{shown_subject(i, 'reply')} at {baud} baud" for baud, i in self.protocol_1.items()
+        ]
         if there:
             findings.append(
                 Finding(
@@ -114,7 +116,7 @@ def foreign_replies(
         return ForeignReplies({}, {})
     if feetech:
         numbers = model_numbers(2)
-        replies = {each.servo_id: each.params for each in broadcast_ping(port).replies}
+        replies = {reply.servo_id: reply.params for reply in broadcast_ping(port).replies}
         models_by_id = {
             servo_id: numbers.get(int.from_bytes(params[:2], "little"), "DYNAMIXEL")
             for servo_id, params in replies.items()
@@ -122,19 +124,19 @@ def foreign_replies(
         return ForeignReplies({}, {i: models_by_id[i] for i in missing if i in replies})
     asked = sorted({*missing[:_PROTOCOL_1_IDS], FACTORY_ID})
     before = port.getBaudRate()
-    found: dict[int, list[int]] = {}
+    ids_by_baud: dict[int, list[int]] = {}
     models: dict[int, str] = {}
     try:
         for baud in dict.fromkeys((before, *_PROTOCOL_1_BAUDS)):
             if baud != before and not port.setBaudRate(baud):
                 continue
-            found[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
-            for servo_id in found[baud] if baud == before else ():
+            ids_by_baud[baud] = [i for i in asked if _replies_in_protocol_1(port, i, latency_s)]
+            for servo_id in ids_by_baud[baud] if baud == before else ():
                 servo = identify_at(port, servo_id, latency_s)
                 models |= {} if servo is None else {servo_id: servo.model}
     finally:
         port.setBaudRate(before)
-    old = {baud: [i for i in ids if i not in models] for baud, ids in found.items()}
+    old = {baud: [i for i in ids if i not in models] for baud, ids in ids_by_baud.items()}
     return ForeignReplies({baud: ids for baud, ids in old.items() if ids}, models)
 
 
@@ -206,18 +208,20 @@ def unlisted(
         alarms += [] if alarm is None else [f"servo {servo_id}: {alarm}"]
         torque += [servo_id] if is_on else []
     if shared:
-        found = f"{shown_subject(shared, 'answer')} twice or damaged: two servos have this ID"
-        findings.append(Finding("duplicate IDs", "fail", found, _ALONE))
+        unlisted_text = (
+            f"{shown_subject(shared, 'answer')} twice or damaged: two servos have this ID"
+        )
+        findings.append(Finding("duplicate IDs", "fail", unlisted_text, _ALONE))
     if alarms:
-        found = f"{', '.join(alarms)} (not in the robot)"
+        unlisted_text = f"{', '.join(alarms)} (not in the robot)"
         remedy = "remove the cause, then switch the servo power off, on"
-        findings.append(Finding("alarms", "fail", found, remedy))
+        findings.append(Finding("alarms", "fail", unlisted_text, remedy))
     if torque:
-        found = f"on at {shown_ids(torque)} (not in the robot)"
+        unlisted_text = f"on at {shown_ids(torque)} (not in the robot)"
         remedy = (
             "a run does not switch it off: switch the power off and on, or remove them from the bus"
         )
-        findings.append(Finding("torque", "warn", found, remedy))
+        findings.append(Finding("torque", "warn", unlisted_text, remedy))
     return findings
 
 
@@ -235,7 +239,7 @@ def _state(bus: DynamixelBus, servo_id: int, reply: PingReply) -> tuple[str | No
 
 def factory_servos(
     port: BytePort,
-    found: Collection[int],
+    present_ids: Collection[int],
     missing: Sequence[int],
     *,
     noisy: bool,
@@ -245,8 +249,8 @@ def factory_servos(
 
     Args:
         port: the line.
-        found: IDs that answer at the robot's rate; if all of them answer at the factory's as well,
-            the line has no baud rates.
+        present_ids: IDs that answer at the robot's rate; if all of them answer at the factory's as
+            well, the line has no baud rates.
         missing: IDs of the robot that answer at no rate.
         noisy: damage on this line shows nothing.
         on_progress: gets the step.
@@ -261,7 +265,7 @@ def factory_servos(
     finally:
         port.setBaudRate(before)
     new = [reply.servo_id for reply in answer.replies]
-    if found and set(found) <= set(new):
+    if present_ids and set(present_ids) <= set(new):
         return None
     if not new and (noisy or not answer.noise_bytes):
         return None

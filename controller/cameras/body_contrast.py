@@ -99,27 +99,27 @@ class BodyContrast:
     def standing_out(self, shade: float) -> StandingOut:
         """Return each pixel's difference from the floor; a shadow removes ``shade`` of light."""
         now = _smooth(self.frame)
-        apart = np.full(now.shape[:2], np.inf, dtype=np.float32)
+        difference = np.full(now.shape[:2], np.inf, dtype=np.float32)
         for floor in self.floors:
-            apart = np.minimum(apart, unexplained(now, self._lit(floor), shade))
-        away = apart[self.near == 0]
-        some = away if away.size > _CALM_PX else apart.ravel()
+            difference = np.minimum(difference, unexplained(now, self._lit(floor), shade))
+        away = difference[self.near == 0]
+        some = away if away.size > _CALM_PX else difference.ravel()
         middle = float(np.median(some))
         above = some[some > middle] - middle
         spread = (1.4826 * float(np.median(above)) if above.size else 0.0) + 0.5
         clear = middle + 4.0 * spread
-        body = apart[(self.near > 0) & (apart > clear)]
+        body = difference[(self.near > 0) & (difference > clear)]
         low_level = middle + 2.0 * spread
         if body.size <= 0.2 * self.area_px:
             level = 255.0
         elif self.compression is not None:  # halos are not the body
             clear = _CLEAR_IN_BLOCKS if self.compression.quality is None else _CLEAR
-            strongest = np.sort(apart[self.near > 0])[-int(self.area_px) :]
+            strongest = np.sort(difference[self.near > 0])[-int(self.area_px) :]
             level = float(np.median(strongest))
             low_level = max(low_level, clear * level)
         else:
             level = float(np.median(body))
-        share = (apart - low_level) / max(0.7 * level - low_level, spread)
+        share = (difference - low_level) / max(0.7 * level - low_level, spread)
         share = np.clip(share, 0.0, 1.0) * (self.near > 0)
         return StandingOut(share.astype(np.float32), self.origin_px, self.to_px, self.compression)
 
@@ -159,31 +159,33 @@ class BodyContrast:
 
 
 def confirmed(
-    robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, found: TrackedPose, shade: float
+    robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, tracked: TrackedPose, shade: float
 ) -> TrackedPose:
     """Return the pose in a compressed frame, less certain if the frame with its blocks disagrees.
 
     Poses in other frames are returned as they are.
     """
     blocks = contrast.compression
-    if found.fault or blocks is None or blocks.quality is None:
-        return found
+    if tracked.fault or blocks is None or blocks.quality is None:
+        return tracked
     as_coded = replace(contrast, frame=contrast.coded, compression=Compression(None))
-    other = track_pose(robot, as_coded.standing_out(shade), prior, found.time_s)
-    turn = other.heading_rad - found.heading_rad
-    apart = np.append(other.head_m - found.head_m, np.arctan2(np.sin(turn), np.cos(turn)))
-    wider = replace(found, covariance=found.covariance + _DISAGREES * np.outer(apart, apart))
+    other = track_pose(robot, as_coded.standing_out(shade), prior, tracked.time_s)
+    turn = other.heading_rad - tracked.heading_rad
+    difference = np.append(other.head_m - tracked.head_m, np.arctan2(np.sin(turn), np.cos(turn)))
+    wider = replace(
+        tracked, covariance=tracked.covariance + _DISAGREES * np.outer(difference, difference)
+    )
     too_wide = wider.sigma_m > blocks.sigma_limit * robot.body_radius_m
     return replace(wider, fault=str(blocks)) if too_wide else wider
 
 
-def links_at(prior: BodyPrior, found: TrackedPose) -> Floats:
+def links_at(prior: BodyPrior, tracked: TrackedPose) -> Floats:
     """(L, 2) centres of the links of an expected body at the found pose."""
     ahead = prior.forward[0]
-    turn = found.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
+    turn = tracked.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
     c, s = np.cos(turn), np.sin(turn)
     away = prior.links_m - prior.links_m[0]
-    return np.asarray(found.head_m + away @ np.array([[c, s], [-s, c]]))
+    return np.asarray(tracked.head_m + away @ np.array([[c, s], [-s, c]]))
 
 
 def _smooth(image: Image) -> Image:

@@ -106,12 +106,14 @@ class CalibrationBoard:
             corners, ids, _, _ = self._detector.detectBoard(grey)
             if ids is None:
                 return None
-            seen: Ints = np.asarray(ids, dtype=int).ravel()
-            places = places[seen]
+            tag_ids: Ints = np.asarray(ids, dtype=int).ravel()
+            places = places[tag_ids]
         else:
             inner = self.squares[0] - 1, self.squares[1] - 1
-            found, corners = cv2.findChessboardCornersSB(grey, inner, flags=cv2.CALIB_CB_ACCURACY)
-            if not found:
+            is_complete, corners = cv2.findChessboardCornersSB(
+                grey, inner, flags=cv2.CALIB_CB_ACCURACY
+            )
+            if not is_complete:
                 return None
         if len(places) < 6 or _on_a_line(places):
             return None

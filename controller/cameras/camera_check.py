@@ -112,22 +112,22 @@ class CameraCheck:
 
     def _add_line(self, image: Image, time_s: float) -> None:
         """Find the body near its last place, else anywhere."""
-        whole = self._detector
-        if whole is None:
+        detector = self._detector
+        if detector is None:
             return
         rows, columns = self._window
-        (x, y), left, top = whole.model.moved_px, columns.start or 0, rows.start or 0
+        (x, y), left, top = detector.model.moved_px, columns.start or 0, rows.start or 0
         part = replace(
-            whole,
-            model=replace(whole.model, moved_px=(x - left, y - top)),
-            background=np.ascontiguousarray(whole.background[rows, columns]),
+            detector,
+            model=replace(detector.model, moved_px=(x - left, y - top)),
+            background=np.ascontiguousarray(detector.background[rows, columns]),
         )
         line = part.outline(np.ascontiguousarray(image[rows, columns]), time_s)
         self._window = slice(None), slice(None)
         if line.status is not FrameStatus.GOOD:
             return
         self._lines.append(line)
-        px = whole.model.in_image(line.line_m, whole.axis_height_m)
+        px = detector.model.in_image(line.line_m, detector.axis_height_m)
         around = 0.25 * float(np.ptp(px, axis=0).max()) + 8.0
         low, high = px.min(axis=0) - around, px.max(axis=0) + around
         (left, top), (right, below) = np.maximum(low, 0.0).astype(int), high.astype(int) + 1
@@ -149,7 +149,7 @@ class CameraCheck:
             raise InputError("the camera has handed over no frame")
         size_px = (self._latest.shape[1], self._latest.shape[0])
         times = np.array(self._frame_s)
-        apart = np.diff(times)
+        gaps_s = np.diff(times)
         places = self._camera.marker_places_m
         first = None if self._detector is None else self._detector.model
         lens = None if first is None else first.lens
@@ -178,8 +178,8 @@ class CameraCheck:
             frames=len(times),
             size_px=size_px,
             duration_s=float(times[-1] - times[0]),
-            rate_hz=float(len(apart) / apart.sum()) if apart.sum() > 0.0 else float("nan"),
-            gap_max_s=float(apart.max(initial=0.0)),
+            rate_hz=float(len(gaps_s) / gaps_s.sum()) if gaps_s.sum() > 0.0 else float("nan"),
+            gap_max_s=float(gaps_s.max(initial=0.0)),
             seen={name: count / max(self._looks, 1) for name, count in self._found.items()},
             others=tuple(sorted(set(self.markers) - set(places))),
             floor=floor,

@@ -40,33 +40,37 @@ def camera_findings(
 
 def _frames(report: CameraReport, camera: CameraConfig) -> Finding:
     wide, high = report.size_px
-    found = (
+    frames_text = (
         f"{report.frames} of {wide} x {high} pixels in {report.duration_s:.1f} s: "
         f"{report.rate_hz:.1f} a second, longest gap {1e3 * report.gap_max_s:.0f} ms"
     )
     if report.size_px != (camera.width_px, camera.height_px):
         asked = f"{camera.width_px} x {camera.height_px}"
-        return Finding("frames", "fail", found, f"asked for are {asked} pixels: correct [camera]")
+        return Finding(
+            "frames", "fail", frames_text, f"asked for are {asked} pixels: correct [camera]"
+        )
     if not report.rate_hz >= _SLOW * camera.rate_hz:
         return Finding(
             "frames",
             "warn",
-            found,
+            frames_text,
             f"asked for are {camera.rate_hz:g} a second: less exposure time, another USB port",
         )
     if report.gap_max_s > _GAP / camera.rate_hz:
-        return Finding("frames", "warn", found, "frames were lost: is the machine or USB busy?")
-    return Finding("frames", "ok", found)
+        return Finding(
+            "frames", "warn", frames_text, "frames were lost: is the machine or USB busy?"
+        )
+    return Finding("frames", "ok", frames_text)
 
 
 def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
     if not report.seen:
         extra = ", ".join(str(name) for name in report.others)
-        seen = f"; in the picture are {extra}" if extra else ""
+        extra_text = f"; in the picture are {extra}" if extra else ""
         remedy = "snakewalk pose markers, and their places in [camera.markers_m]"
-        return [Finding("markers", "warn", f"none are named{seen}", remedy)]
-    shown = ", ".join(f"{name} in {100.0 * one:.0f} %" for name, one in report.seen.items())
-    seldom = [name for name, one in report.seen.items() if one < _SEEN]
+        return [Finding("markers", "warn", f"none are named{extra_text}", remedy)]
+    shown = ", ".join(f"{name} in {100.0 * share:.0f} %" for name, share in report.seen.items())
+    seldom = [name for name, share in report.seen.items() if share < _SEEN]
     steady = len(report.seen) - len(seldom)
     if steady >= len(report.seen):
         first = Finding("markers", "ok", f"all {steady} found in every picture, or nearly")
@@ -82,34 +86,36 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         return [first, Finding("floor", "fail", report.fault, "four markers fix a floor")]
     floor = report.floor
     side = float(np.mean(list(floor.side_m.values())))
-    found = (
+    markers_text = (
         f"markers lie {1e3 * floor.rms_m:.1f} mm (rms) from their places; their side is "
         f"{1e3 * side:.0f} mm"
     )
     if floor.lens_m is not None:
         x, y, z = floor.lens_m.tolist()
-        found += f"; the lens is {z:.2f} m above ({x:.2f}, {y:.2f})"
+        markers_text += f"; the lens is {z:.2f} m above ({x:.2f}, {y:.2f})"
     worst = max(floor.residual_m, key=lambda name: floor.residual_m[name])
     if report.distortion is not None:
         error_mm = 1e3 * report.distortion.error_m
         second = Finding(
             "floor",
             "warn",
-            f"{found}; the lens distorts by up to {error_mm:.0f} mm",
+            f"{markers_text}; the lens distorts by up to {error_mm:.0f} mm",
             "calibrate the lens: snakewalk pose board, snakewalk pose calibrate",
         )
     elif floor.residual_m[worst] > MISPLACED_M:
-        second = Finding("floor", "fail", found, f"measure the place of marker {worst} again")
+        second = Finding(
+            "floor", "fail", markers_text, f"measure the place of marker {worst} again"
+        )
     elif abs(side / camera.marker_side_m - 1.0) > _SIDE:
         second = Finding(
             "floor",
             "warn",
-            found,
+            markers_text,
             f"marker_side_m is {1e3 * camera.marker_side_m:.0f} mm: was the print scaled, or are "
             "all places?",
         )
     else:
-        second = Finding("floor", "ok", found)
+        second = Finding("floor", "ok", markers_text)
     return [first, second]
 
 
@@ -134,10 +140,12 @@ def _lock(name: str, state: Lock) -> Finding:
 
 
 def _light(report: CameraReport) -> Finding:
-    found = f"brightness varies by {100.0 * report.light_spread:.1f} %"
+    brightness_text = f"brightness varies by {100.0 * report.light_spread:.1f} %"
     if report.light_spread > _LIGHT:
-        return Finding("light", "warn", found, "lamps that flicker, or exposure that is not locked")
-    return Finding("light", "ok", found)
+        return Finding(
+            "light", "warn", brightness_text, "lamps that flicker, or exposure that is not locked"
+        )
+    return Finding("light", "ok", brightness_text)
 
 
 def _latency(report: CameraReport, camera: CameraConfig) -> list[Finding]:
@@ -153,11 +161,11 @@ def _latency(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         ]
     if fit.fault:
         return [Finding("latency", "warn", f"not measured: {fit.fault}")]
-    found = (
+    latency_text = (
         f"{1e3 * fit.latency_s:.0f} ms, to {1e3 * max(fit.error_s, 1e-3):.0f} ms, from the joints' "
         f"motion (correlation {fit.correlation:.2f})"
     )
     if camera.device is not None and abs(fit.latency_s - camera.latency_s) > _RIGHT_S:
         remedy = f"[camera] latency_s = {max(fit.latency_s, 0.0):.3f}"
-        return [Finding("latency", "warn", found, remedy)]
-    return [Finding("latency", "ok", found)]
+        return [Finding("latency", "warn", latency_text, remedy)]
+    return [Finding("latency", "ok", latency_text)]

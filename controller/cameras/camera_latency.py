@@ -50,22 +50,22 @@ def fit_latency(
         joint_rad: (T, J) their angles; rows with NaN are dropped.
 
     """
-    whole = np.isfinite(joint_rad).all(axis=1)
-    joint_s, joint_rad = joint_s[whole], joint_rad[whole]
-    found = [line for line in lines if np.isfinite(line.line_m).all()]
-    if min(len(found), len(joint_s)) < _LEAST:
+    is_complete = np.isfinite(joint_rad).all(axis=1)
+    joint_s, joint_rad = joint_s[is_complete], joint_rad[is_complete]
+    finite_lines = [line for line in lines if np.isfinite(line.line_m).all()]
+    if min(len(finite_lines), len(joint_s)) < _LEAST:
         return replace(
             _NONE,
-            fault=f"the whole body was seen in {len(found)} frames, its joints were read "
+            fault=f"the whole body was seen in {len(finite_lines)} frames, its joints were read "
             f"{len(joint_s)} times; {_LEAST} are needed of each",
         )
     origin = pose_at(np.zeros(2), 0.0)
-    bodies = [body_in_world(robot, origin, one).headings_rad for one in joint_rad]
-    known = np.unwrap(np.unwrap(np.array(bodies), axis=1), axis=0)
-    known -= known.mean(axis=1, keepdims=True)
-    if float(known.std(axis=0).max()) < _LEAST_MOVED_RAD:
+    bodies = [body_in_world(robot, origin, joint_row).headings_rad for joint_row in joint_rad]
+    headings_rad = np.unwrap(np.unwrap(np.array(bodies), axis=1), axis=0)
+    headings_rad -= headings_rad.mean(axis=1, keepdims=True)
+    if float(headings_rad.std(axis=0).max()) < _LEAST_MOVED_RAD:
         return replace(_NONE, fault="the joints did not move: turn one to and fro, unevenly")
-    frame_s = np.array([line.time_s for line in found])
+    frame_s = np.array([line.time_s for line in finite_lines])
     delays = np.arange(_EARLIEST_S, _LATEST_S + 1e-9, _STEP_S)
     inside = (frame_s - _LATEST_S >= joint_s[0]) & (frame_s - _EARLIEST_S <= joint_s[-1])
     if inside.sum() < _LEAST:
@@ -73,11 +73,17 @@ def fit_latency(
     frame_s = frame_s[inside]
     expected = np.stack(
         [
-            np.stack([np.interp(frame_s - delay, joint_s, one) for one in known.T], axis=1)
+            np.stack(
+                [
+                    np.interp(frame_s - delay, joint_s, heading_column)
+                    for heading_column in headings_rad.T
+                ],
+                axis=1,
+            )
             for delay in delays
         ]
     )
-    lines_m = [line.line_m for line, used in zip(found, inside, strict=True) if used]
+    lines_m = [line.line_m for line, used in zip(finite_lines, inside, strict=True) if used]
     lines_m = _same_end_first(lines_m)
     shown, delay, likeness = max(
         (
@@ -100,11 +106,14 @@ def fit_latency(
 
 def _same_end_first(lines_m: Sequence[Floats]) -> list[Floats]:
     """Lines (P, 2) that begin at the same end as the first: tips move little."""
-    found = [lines_m[0]]
+    ordered_lines = [lines_m[0]]
     for line in lines_m[1:]:
-        off = [np.hypot(*(one[[0, -1]] - found[-1][[0, -1]]).T).sum() for one in (line, line[::-1])]
-        found.append(line if off[0] <= off[1] else line[::-1])
-    return found
+        off = [
+            np.hypot(*(line_order[[0, -1]] - ordered_lines[-1][[0, -1]]).T).sum()
+            for line_order in (line, line[::-1])
+        ]
+        ordered_lines.append(line if off[0] <= off[1] else line[::-1])
+    return ordered_lines
 
 
 def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
@@ -122,10 +131,10 @@ def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
 
 def _best(delays: Floats, expected: Floats, shown: Floats) -> tuple[float, float]:
     """Delay with the best correlation of the changes (to a fraction of a step), and that."""
-    one = (expected - expected.mean(axis=1, keepdims=True)).reshape(len(delays), -1)
+    deviation = (expected - expected.mean(axis=1, keepdims=True)).reshape(len(delays), -1)
     two = (shown - shown.mean(axis=0)).ravel()
-    size = np.sqrt((one**2).sum(axis=1) * (two**2).sum())
-    likeness = one @ two / np.maximum(size, 1e-12)
+    size = np.sqrt((deviation**2).sum(axis=1) * (two**2).sum())
+    likeness = deviation @ two / np.maximum(size, 1e-12)
     k = int(likeness.argmax())
     if not 0 < k < len(delays) - 1:
         return float(delays[k]), float(likeness[k])

@@ -58,18 +58,18 @@ class CameraPage:
             return
         self._shown_s = now_s
         blue_first = self._camera.device is not None  # OpenCV's order
-        seen = image[..., ::-1] if blue_first else image
-        self._picture.image = with_markers(seen, check.markers)
+        picture = image[..., ::-1] if blue_first else image
+        self._picture.image = with_markers(picture, check.markers)
         if now_s - self._told_s < _REPORT_S:
             return
         self._told_s = now_s
-        found = camera_findings(check.report(), self._camera, self._watch.locks)
+        camera_faults = camera_findings(check.report(), self._camera, self._watch.locks)
         rows = "".join(
-            f"<tr><td style='color:{_COLOURS[one.grade]};font-weight:600'>{one.grade}</td>"
-            f"<td style='padding:.2em .6em'>{escape(one.check)}</td><td>{escape(one.found)}"
-            + (f"<br><b>&rarr; {escape(one.remedy)}</b>" if one.remedy else "")
+            f"<tr><td style='color:{_COLOURS[finding.grade]};font-weight:600'>{finding.grade}</td>"
+            f"<td style='padding:.2em .6em'>{escape(finding.check)}</td><td>{escape(finding.found)}"
+            + (f"<br><b>&rarr; {escape(finding.remedy)}</b>" if finding.remedy else "")
             + "</td></tr>"
-            for one in found
+            for finding in camera_faults
         )
         self._rows.content = (
             f"<table style='font-size:13px;margin:.6em;vertical-align:top'>{rows}</table>"

@@ -144,22 +144,22 @@ class CameraPose:
         body = body_in_world(self._robot, believed, then.joint_rad)
         return BodyPrior(body.link_m[:, :2], body.forward[:, :2])
 
-    def _follow(self, found: TrackedPose) -> None:
+    def _follow(self, tracked: TrackedPose) -> None:
         self.frames += 1
-        if found.bump != self._bump:
-            self._bump = found.bump
-            self._on_event(str(found.bump))
-        if found.fault:
-            self._reason = found.fault
+        if tracked.bump != self._bump:
+            self._bump = tracked.bump
+            self._on_event(str(tracked.bump))
+        if tracked.fault:
+            self._reason = tracked.fault
             return
-        self._place(found, found.time_s)
+        self._place(tracked, tracked.time_s)
 
-    def _place(self, found: PoseFit | TrackedPose, time_s: float) -> None:
+    def _place(self, fitted: PoseFit | TrackedPose, time_s: float) -> None:
         """Move the drifting frame to the head's place in a frame."""
-        head_m = found.head_m
-        heading_rad = found.heading_rad
-        self.covariance = found.covariance
-        self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(found.covariance[:2, :2])[-1])))
+        head_m = fitted.head_m
+        heading_rad = fitted.heading_rad
+        self.covariance = fitted.covariance
+        self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(fitted.covariance[:2, :2])[-1])))
         then = self._at(time_s)
         self.used += 1
         self._fixed_s = time_s
@@ -180,8 +180,8 @@ class CameraPose:
 
     def _head_end(self, fits: tuple[PoseFit, PoseFit], then: _Moment) -> PoseFit:
         better, worse = sorted(fits, key=lambda fit: fit.error_m)
-        apart = worse.error_m > MISFIT * self._robot.mean_link_length_m
-        if apart and better.error_m < DECISIVE * worse.error_m:
+        is_separate = worse.error_m > MISFIT * self._robot.mean_link_length_m
+        if is_separate and better.error_m < DECISIVE * worse.error_m:
             return better
         believed = _in_world(self._offset, then.place)
         c, s = np.cos(believed[2]), np.sin(believed[2])
@@ -192,13 +192,15 @@ class CameraPose:
             return self._history[0]
         times = np.array([moment.time_s for moment in self._history])
         k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1))
-        one = self._history[k - 1]
+        earlier_head = self._history[k - 1]
         two = self._history[k]
-        part = float(np.clip((time_s - one.time_s) / (two.time_s - one.time_s), 0.0, 1.0))
-        change = two.place - one.place
+        part = float(
+            np.clip((time_s - earlier_head.time_s) / (two.time_s - earlier_head.time_s), 0.0, 1.0)
+        )
+        change = two.place - earlier_head.place
         change[2] = np.arctan2(np.sin(change[2]), np.cos(change[2]))
-        joints = one.joint_rad + part * (two.joint_rad - one.joint_rad)
-        return _Moment(time_s, one.place + part * change, joints)
+        joints = earlier_head.joint_rad + part * (two.joint_rad - earlier_head.joint_rad)
+        return _Moment(time_s, earlier_head.place + part * change, joints)
 
     def _report_gap(self, now_s: float) -> None:
         blind_s = now_s - (self._fixed_s or 0.0)

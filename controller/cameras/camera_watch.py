@@ -151,10 +151,10 @@ class CameraWatch:
 
             def take() -> None:
                 while not stop.is_set():
-                    whole, frame = device.read()
+                    is_read, frame = device.read()
                     shown_s = 1e-3 * device.get(cv2.CAP_PROP_POS_MSEC) if film else clock.now_s()
-                    frames.put((in_colour(frame) if whole else None, shown_s))
-                    if not whole:
+                    frames.put((in_colour(frame) if is_read else None, shown_s))
+                    if not is_read:
                         return
 
             thread = threading.Thread(target=take, name="camera check", daemon=True)

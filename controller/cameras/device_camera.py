@@ -99,15 +99,15 @@ class DeviceCamera:
         if self._gone is not None:
             raise self._gone
         try:
-            found = self._found.get(timeout=PATIENCE_S)
+            first_detection = self._found.get(timeout=PATIENCE_S)
         except queue.Empty:
             raise InputError(f"{self._name}: no frame came in {PATIENCE_S:g} s") from None
-        if isinstance(found, InputError):
-            self._gone = found
-            raise found
-        if isinstance(found, TrackedPose):
+        if isinstance(first_detection, InputError):
+            self._gone = first_detection
+            raise first_detection
+        if isinstance(first_detection, TrackedPose):
             return self.first()
-        return found
+        return first_detection
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
         """Return the detections since the last call, up to ``now_s``."""
@@ -116,14 +116,14 @@ class DeviceCamera:
         return self._collect(now_s)
 
     def _collect(self, now_s: float) -> list[LineDetection | TrackedPose]:
-        found: list[LineDetection | TrackedPose] = []
+        detections: list[LineDetection | TrackedPose] = []
         while not self._found.empty():
-            one = self._found.get_nowait()
-            if isinstance(one, InputError):
-                self._gone = one
-            elif one.time_s <= now_s:
-                found.append(one)
-        return found
+            detection = self._found.get_nowait()
+            if isinstance(detection, InputError):
+                self._gone = detection
+            elif detection.time_s <= now_s:
+                detections.append(detection)
+        return detections
 
     def close(self) -> None:
         """Stop the thread and release the camera."""
@@ -142,15 +142,15 @@ class DeviceCamera:
             prior = None
         if prior is None:
             return self.detector.detect(frame, time_s)
-        found = self.detector.track(frame, time_s, prior, self._robot)
-        self.detector = self._learning.after(self.detector, frame, prior, found)
-        return found
+        detection = self.detector.track(frame, time_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, frame, prior, detection)
+        return detection
 
     def _watch(self) -> None:
         taken = 0
         while not self._stop.is_set():
-            whole, frame = self._device.read()
-            if not whole:
+            is_read, frame = self._device.read()
+            if not is_read:
                 self._found.put(InputError(f"{self._name}: hands over no more frames"))
                 return
             taken += 1

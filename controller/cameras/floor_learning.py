@@ -37,7 +37,7 @@ class FloorLearning:
         self._last_s: float | None = None
 
     def after(
-        self, detector: OverheadDetector, image: Image, prior: BodyPrior, found: TrackedPose
+        self, detector: OverheadDetector, image: Image, prior: BodyPrior, tracked: TrackedPose
     ) -> OverheadDetector:
         """Return the detector for the next frames.
 
@@ -45,25 +45,25 @@ class FloorLearning:
             detector: that of this frame.
             image: (H, W[, 3]) the frame.
             prior: the body's shape, and its expected place.
-            found: its found place.
+            tracked: its found place.
 
         """
         if self._learn_s == 0.0:
             return detector
-        good = not found.fault and found.error_m < _FITS * self._robot.body_radius_m
+        good = not tracked.fault and tracked.error_m < _FITS * self._robot.body_radius_m
         if not good:
             self._last_s = None
             return detector
         if self._last_s is None:
-            self._last_s = found.time_s
-        passed_s = found.time_s - self._last_s
+            self._last_s = tracked.time_s
+        passed_s = tracked.time_s - self._last_s
         if passed_s < LEARN_EVERY_S:
             return detector
-        self._last_s = found.time_s
+        self._last_s = tracked.time_s
         if self._floor is None or detector.background is not self._shown:  # or the camera moved
             self._floor = detector.background.astype(np.float32)
         clear = cv2.inRange(image, (0.0,) * 3, (_BLEACHED,) * 3)
-        free = cv2.subtract(clear, _body(detector, prior, found, self._robot))
+        free = cv2.subtract(clear, _body(detector, prior, tracked, self._robot))
         part = 1.0 - float(np.exp(-min(passed_s, _LONGEST_S) / self._learn_s))
         cv2.accumulateWeighted(in_light_of(image, detector.background), self._floor, part, free)
         self._shown = shown = np.asarray(cv2.convertScaleAbs(self._floor), dtype=np.uint8)
@@ -72,10 +72,10 @@ class FloorLearning:
 
 
 def _body(
-    detector: OverheadDetector, prior: BodyPrior, found: TrackedPose, robot: RobotConfig
+    detector: OverheadDetector, prior: BodyPrior, tracked: TrackedPose, robot: RobotConfig
 ) -> Image:
     """(H, W) 255 at the body and its surroundings."""
-    links_px = detector.model.in_image(links_at(prior, found), detector.axis_height_m)
+    links_px = detector.model.in_image(links_at(prior, tracked), detector.axis_height_m)
     length_px = float(np.hypot(*np.diff(links_px, axis=0).T).sum())
     metre = length_px / robot.centre_distance_m
     mask = np.zeros(detector.background.shape[:2], dtype=np.uint8)

@@ -55,10 +55,13 @@ def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
     """
     size = image.shape[1], image.shape[0]
     small = max(size[0] // _COARSE, 1), max(size[1] // _COARSE, 1)
-    now, then = (cv2.resize(one, small, interpolation=cv2.INTER_AREA) for one in (image, floor))
+    now, then = (
+        cv2.resize(level_picture, small, interpolation=cv2.INTER_AREA)
+        for level_picture in (image, floor)
+    )
     light = _light(np.asarray(now, np.uint8), np.asarray(then, np.uint8), small[0] // 3)
-    whole = cv2.resize(np.maximum(light, 1), size, interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.divide(image, whole, scale=_ONE, dtype=cv2.CV_32F), dtype=np.float32)
+    full_light = cv2.resize(np.maximum(light, 1), size, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.divide(image, full_light, scale=_ONE, dtype=cv2.CV_32F), dtype=np.float32)
 
 
 def _light(image: Image, floor: Image, side_px: int) -> Image:
@@ -76,20 +79,20 @@ def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
     Shadow and light scale all channels equally. A pixel that is darker by up to ``shade`` or
     slightly brighter in all channels is floor; from others this part is subtracted.
     """
-    now, floor = (np.atleast_3d(one).astype(np.float32) for one in (image, lit))
+    now, floor = (np.atleast_3d(levels).astype(np.float32) for levels in (image, lit))
     ratio = now / np.maximum(floor, 1.0)
     channels = [ratio[..., k] for k in range(ratio.shape[2])]
     most, least = channels[0], channels[0]
-    for one in channels[1:]:
-        most, least = np.maximum(most, one), np.minimum(least, one)
+    for channel in channels[1:]:
+        most, least = np.maximum(most, channel), np.minimum(least, channel)
     shadow = np.clip(most, 1.0 - shade, 1.0)
     glare = np.clip(least, 1.0, 1.0 + _GLARE)
-    apart = np.zeros(most.shape, dtype=np.float32)
+    excess = np.zeros(most.shape, dtype=np.float32)
     for k in range(ratio.shape[2]):
-        here = now[..., k]
+        level = now[..., k]
         ground = floor[..., k]
-        np.maximum(apart, np.maximum(shadow * ground - here, here - glare * ground), out=apart)
-    return apart
+        np.maximum(excess, np.maximum(shadow * ground - level, level - glare * ground), out=excess)
+    return excess
 
 
 def grey_of(image: Image) -> Image:

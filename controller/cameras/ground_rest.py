@@ -25,9 +25,9 @@ def heights_of(ground: HeightField | None) -> Heights | None:
         return None
 
     def heights(places_m: Floats) -> Floats:
-        known = np.asarray(np.isfinite(places_m).all(axis=-1))
-        at = np.where(known[..., None], places_m, 0.0)
-        return np.where(known, ground.elevation_m(at[..., 0], at[..., 1]), np.nan)
+        is_known = np.asarray(np.isfinite(places_m).all(axis=-1))
+        filled_m = np.where(is_known[..., None], places_m, 0.0)
+        return np.where(is_known, ground.elevation_m(filled_m[..., 0], filled_m[..., 1]), np.nan)
 
     return heights
 

@@ -44,18 +44,18 @@ class Lens:
     def undistorted(self, points_px: Floats) -> Floats:
         """(..., 2) pixels (..., 2) without distortion."""
         flat = np.ascontiguousarray(points_px, dtype=float).reshape(-1, 1, 2)
-        found = cv2.undistortImagePoints(flat, self.matrix, self.distortion, arg1=_STEPS)
-        return np.asarray(found, dtype=float).reshape(points_px.shape)
+        undistorted_px = cv2.undistortImagePoints(flat, self.matrix, self.distortion, arg1=_STEPS)
+        return np.asarray(undistorted_px, dtype=float).reshape(points_px.shape)
 
     def distorted(self, points_px: Floats) -> Floats:
         """(..., 2) pixels with distortion of pixels (..., 2) without it."""
         flat = np.asarray(points_px, dtype=float).reshape(-1, 2)
         rays = np.linalg.solve(self.matrix, np.column_stack([flat, np.ones(len(flat))]).T).T
         none = np.zeros(3)
-        found, _ = cv2.projectPoints(
+        distorted_px, _ = cv2.projectPoints(
             np.ascontiguousarray(rays), none, none, self.matrix, self.distortion
         )
-        return np.asarray(found, dtype=float).reshape(points_px.shape)
+        return np.asarray(distorted_px, dtype=float).reshape(points_px.shape)
 
     @classmethod
     def read(cls, file: Path) -> Self:
@@ -69,17 +69,17 @@ class Lens:
             raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
         if not file.is_file():
             raise InputError(why_no_file(file))
-        size, held = _stored(file)
+        size, matrices = _stored(file)
         faults = [
             f"{file}: holds no {name}"
-            for name, value in zip(_MATRICES, held, strict=True)
+            for name, value in zip(_MATRICES, matrices, strict=True)
             if value is None
         ]
         if not all(1.0 <= side <= 100_000.0 for side in size):
             faults.append(f"{file}: image_width and image_height are needed, whole and above 0")
         if faults:
             raise InputError(faults)
-        matrix, distortion = (_numbers(value) for value in held)
+        matrix, distortion = (_numbers(value) for value in matrices)
         if matrix.size == 9:
             matrix = matrix.reshape(3, 3)
         if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
@@ -131,11 +131,11 @@ def _stored(file: Path) -> tuple[list[float], list[Any]]:
     try:
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
         stored = [store.getNode(side).real() for side in sides]
-        held = [store.getNode(name).mat() for name in _MATRICES]
+        matrices = [store.getNode(name).mat() for name in _MATRICES]
         store.release()
     except (cv2.error, SystemError) as error:
         raise InputError(
             f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
             "file"
         ) from None
-    return stored, held
+    return stored, matrices

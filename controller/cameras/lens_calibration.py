@@ -40,27 +40,27 @@ class LensCalibration:
     def remarks(self) -> tuple[str, ...]:
         """Proposals for improvement; empty if all is well."""
         focal = float(self.lens.matrix[0, 0])
-        found = []
+        remark_list = []
         if self.rms_px > 1.0:
-            found.append(
+            remark_list.append(
                 f"the residual of {self.rms_px:.2f} px is large; check that the board is flat, "
                 "the size of its squares, and the focus"
             )
         if self.coverage < 0.6:
-            found.append(
+            remark_list.append(
                 f"corners lie in {100.0 * self.coverage:.0f} % of the picture: hold the board into "
                 "its corners too, where distortion is largest"
             )
         if self.tilt_deg < 15.0:
-            found.append(
+            remark_list.append(
                 f"the board was never tilted by more than {self.tilt_deg:.0f} degrees, which "
                 "does not separate distance from focal length; tilt it more"
             )
         if self.focal_error_px > 0.01 * focal:
-            found.append(
+            remark_list.append(
                 f"the focal length is known to {self.focal_error_px:.1f} of {focal:.0f} px only"
             )
-        return tuple(found)
+        return tuple(remark_list)
 
 
 def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) -> LensCalibration:
@@ -79,13 +79,15 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
             "needed and 15 are better; check pattern, squares, focus and light"
         )
     while True:
-        found = _calibrated(used, size_px, len(views))
-        usual = float(np.nanmedian(found.view_rms_px))
+        calibrated = _calibrated(used, size_px, len(views))
+        usual = float(np.nanmedian(calibrated.view_rms_px))
         keep = {
-            k: view for k, view in used.items() if found.view_rms_px[k] <= _OUTLIER * usual + 0.1
+            k: view
+            for k, view in used.items()
+            if calibrated.view_rms_px[k] <= _OUTLIER * usual + 0.1
         }
         if len(keep) in (len(used), *range(FEWEST_VIEWS)):
-            return found
+            return calibrated
         used = keep
 
 

@@ -125,11 +125,11 @@ class CameraModel:
         if lens is not None:
             px = lens.undistorted(px.astype(float)).astype(np.float32)
         floor = np.array(camera.corners_m, dtype=np.float32)
-        for name, corners, whole in (
+        for name, corners, area in (
             ("corners_px", px, float(camera.width_px * camera.height_px)),
             ("corners_m", floor, float(np.ptp(floor, axis=0).prod())),
         ):
-            if _least_triangle(corners) < _LEAST_AREA * whole or whole == 0.0:
+            if _least_triangle(corners) < _LEAST_AREA * area or area == 0.0:
                 raise InputError(f"camera: {name}: three of the four places lie on a line")
         found = np.asarray(cv2.getPerspectiveTransform(px, floor), dtype=float)
         return cls(found, np.array(centre_m, dtype=float), camera.height_m, lens)
@@ -306,7 +306,7 @@ class OverheadDetector:
         return self._moved_by_texture(image)
 
     def _moved_by_markers(self, first: Self, move: PictureMove, size_px: tuple[int, int]) -> Self:
-        known = self.bump or Bump((0.0, 0.0))
+        reference = self.bump or Bump((0.0, 0.0))
         now = move.bump
         corners = np.array(
             [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
@@ -314,7 +314,7 @@ class OverheadDetector:
         floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.now_from_then)
         back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
         off = np.hypot(*(projected(back, corners) - corners + self.model.moved_px).T)
-        same = known.left_out == now.left_out and known.undone == now.undone
+        same = reference.left_out == now.left_out and reference.undone == now.undone
         if same and off.max() < (_MOVED_PX if now.undone else np.inf):
             return self
         if not now.undone:
@@ -326,12 +326,12 @@ class OverheadDetector:
         then = projected(
             np.linalg.inv(move.now_from_then), grid if lens is None else lens.undistorted(grid)
         )
-        at = (then if lens is None else lens.distorted(then)).astype(np.float32)
+        places_px = (then if lens is None else lens.distorted(then)).astype(np.float32)
         ground = np.asarray(
             cv2.remap(
                 first.background,
-                at[..., 0],
-                at[..., 1],
+                places_px[..., 0],
+                places_px[..., 1],
                 cv2.INTER_LINEAR,
                 borderMode=cv2.BORDER_REPLICATE,
             ),
@@ -345,7 +345,7 @@ class OverheadDetector:
         Moving objects cover parts of the picture, so the move must improve three parts more than it
         worsens.
         """
-        floor, now = (_texture(one) for one in (self.background, image))
+        floor, now = (_texture(picture) for picture in (self.background, image))
         far = _FURTHEST_PX // _HALF
         likeness = cv2.matchTemplate(now, floor[far:-far, far:-far], cv2.TM_CCOEFF_NORMED)
         _, best, _, (column, row) = cv2.minMaxLoc(likeness)
@@ -393,25 +393,29 @@ class OverheadDetector:
         floors = [self.background] if self.pictured is None else [self.background, self.pictured]
         to_px = self.model.projection(self.axis_height_m)
         contrast = BodyContrast.around(image, floors, to_px, prior, robot)
-        found = track_pose(robot, contrast.standing_out(self.shade), prior, time_s)
-        shadow = contrast.hard_shadow(links_at(prior, found), self.shade)
+        tracked_pose = track_pose(robot, contrast.standing_out(self.shade), prior, time_s)
+        shadow = contrast.hard_shadow(links_at(prior, tracked_pose), self.shade)
         if shadow > _SHADOW:
-            found = _next_to_shadow(robot, contrast, prior, found, shadow)
-        found = confirmed(robot, contrast, prior, found, self.shade)
+            tracked_pose = _next_to_shadow(robot, contrast, prior, tracked_pose, shadow)
+        tracked_pose = confirmed(robot, contrast, prior, tracked_pose, self.shade)
         if self.bump is not None and not self.bump.undone:
-            return replace(found, fault=str(self.bump), bump=self.bump)
+            return replace(tracked_pose, fault=str(self.bump), bump=self.bump)
         px = self.model.in_image(prior.links_m, self.axis_height_m)
         within = (px >= 0.0) & (px <= np.array(image.shape[1::-1]) - 1.0)
-        fault = str(FrameStatus.CUT) if found.fault and not within.all() else found.fault
-        covariance = found.covariance
+        fault = (
+            str(FrameStatus.CUT) if tracked_pose.fault and not within.all() else tracked_pose.fault
+        )
+        covariance = tracked_pose.covariance
         if self.model.distortion is not None:
             covariance = covariance + self.model.distortion.covariance
-        return replace(found, fault=fault, bump=self.bump, covariance=covariance)
+        return replace(tracked_pose, fault=fault, bump=self.bump, covariance=covariance)
 
     def _check_size(self, image: Image) -> None:
         floor = self.background
         if image.shape != floor.shape:
-            sizes = " and ".join(f"{one.shape[1]} x {one.shape[0]}" for one in (image, floor))
+            sizes = " and ".join(
+                f"{picture.shape[1]} x {picture.shape[0]}" for picture in (image, floor)
+            )
             raise InputError(f"frame and background must be alike, they are {sizes} pixels")
 
     def detect_px(self, image: Image) -> Detection:
@@ -421,8 +425,8 @@ class OverheadDetector:
             InputError: the frame's size differs from the background's.
 
         """
-        apart = self._apart(image)
-        return BodyDetector(np.zeros_like(apart), Polarity.BOTH, "given").detect(apart)
+        difference = self._apart(image)
+        return BodyDetector(np.zeros_like(difference), Polarity.BOTH, "given").detect(difference)
 
     def outline(self, image: Image, time_s: float) -> LineDetection:
         """Find the body in one frame (H, W[, 3]) by its outline only, in a tenth of the time.
@@ -431,8 +435,8 @@ class OverheadDetector:
             InputError: the frame's size differs from the background's.
 
         """
-        apart = self._apart(image)
-        body = silhouette_of(apart, np.zeros_like(apart), Polarity.BOTH)
+        difference = self._apart(image)
+        body = silhouette_of(difference, np.zeros_like(difference), Polarity.BOTH)
         good = body.status is FrameStatus.GOOD
         skeleton = skeleton_of(body.mask) if good else no_skeleton(body.status)
         points = skeleton.points_px + body.origin_px
@@ -448,20 +452,24 @@ class OverheadDetector:
 
 
 def _next_to_shadow(
-    robot: RobotConfig, contrast: BodyContrast, prior: BodyPrior, found: TrackedPose, shadow: float
+    robot: RobotConfig,
+    contrast: BodyContrast,
+    prior: BodyPrior,
+    tracked: TrackedPose,
+    shadow: float,
 ) -> TrackedPose:
     """Find a body next to a hard shadow by its colour.
 
     A colourless body may be the shadow, so its place is rejected.
     """
-    by_colour = track_pose(robot, contrast.standing_out(DEEP_SHADE), prior, found.time_s)
+    by_colour = track_pose(robot, contrast.standing_out(DEEP_SHADE), prior, tracked.time_s)
     if not by_colour.fault:
         compressed = contrast.compression is not None  # blocks of colour may look like a shadow
-        better = compressed and not found.fault and found.error_m < by_colour.error_m
-        return found if better else by_colour
-    if found.fault or shadow < _LARGE_SHADOW:
-        return found
-    return replace(found, fault="a hard shadow near the body has its colour; soften the light")
+        better = compressed and not tracked.fault and tracked.error_m < by_colour.error_m
+        return tracked if better else by_colour
+    if tracked.fault or shadow < _LARGE_SHADOW:
+        return tracked
+    return replace(tracked, fault="a hard shadow near the body has its colour; soften the light")
 
 
 def _texture(image: Image) -> NDArray[np.float32]:
@@ -478,8 +486,8 @@ def _parts_explained(
 ) -> int:
     far = _FURTHEST_PX // _HALF
     before, after = (
-        cv2.resize(((now - one) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA)
-        for one in (floor, moved)
+        cv2.resize(((now - texture) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA)
+        for texture in (floor, moved)
     )
     better = after < _BETTER * before
     worse = before < _BETTER * after

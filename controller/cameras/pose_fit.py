@@ -76,12 +76,12 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     )
 
 
-def _along(line_m: Floats, arc: Floats, at: Floats) -> tuple[Floats, Floats]:
+def _along(line_m: Floats, arc: Floats, along: Floats) -> tuple[Floats, Floats]:
     """Places (L, 2) on the line and its directions; straight beyond its ends."""
-    k = np.clip(np.searchsorted(arc, at), 1, len(arc) - 1)
+    k = np.clip(np.searchsorted(arc, along), 1, len(arc) - 1)
     step = line_m[k] - line_m[k - 1]
     ahead = step / np.maximum(arc[k] - arc[k - 1], 1e-9)[:, None]
-    return line_m[k - 1] + (at - arc[k - 1])[:, None] * ahead, ahead
+    return line_m[k - 1] + (along - arc[k - 1])[:, None] * ahead, ahead
 
 
 def _shift_along(
@@ -100,11 +100,11 @@ def _shift_along(
 def _motions(links: Floats, ahead: Floats, weight: Floats) -> Floats:
     """(2 L + 1, 4) weighted motion of the links for a shift, a turn and a slide."""
     count = len(links)
-    one = np.ones(count)
+    ones = np.ones(count)
     none = np.zeros(count)
     columns = [
-        np.stack([one, none], axis=1),
-        np.stack([none, one], axis=1),
+        np.stack([ones, none], axis=1),
+        np.stack([none, ones], axis=1),
         np.stack([-links[:, 1], links[:, 0]], axis=1),
         -ahead,
     ]

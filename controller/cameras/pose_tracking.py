@@ -109,30 +109,30 @@ class StandingOut:
         """(...,) share at places (..., 2)."""
         px = (self.to_px(places_m) - self.origin_px).astype(np.float32)
         flat = px.reshape(-1, 1, 2)
-        found = cv2.remap(
+        values = cv2.remap(
             self.share, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
         )
-        return np.asarray(found, dtype=float).reshape(places_m.shape[:-1])
+        return np.asarray(values, dtype=float).reshape(places_m.shape[:-1])
 
 
 def track_pose(
-    robot: RobotConfig, seen: StandingOut, prior: BodyPrior, time_s: float
+    robot: RobotConfig, standing_out: StandingOut, prior: BodyPrior, time_s: float
 ) -> TrackedPose:
     """Find the chain near its expected place.
 
     The expectation is usually close, so a search is made only if a fit from it fails.
     """
     chain = _chain(robot, prior)
-    found = _fit(robot, seen, chain, time_s, (np.zeros(2), 0.0))
-    if not found.fault:
-        return found
-    start = _search(seen, chain.places_m, chain.middle_m, robot.body_radius_m)
-    found = _fit(robot, seen, chain, time_s, start)
-    blocks = seen.compression
-    if found.fault and blocks is not None and blocks.explains_faults:
-        own = found.fault == str(blocks)
-        return replace(found, fault=str(blocks) if own else f"{found.fault}; {blocks}")
-    return found
+    fit = _fit(robot, standing_out, chain, time_s, (np.zeros(2), 0.0))
+    if not fit.fault:
+        return fit
+    start = _search(standing_out, chain.places_m, chain.middle_m, robot.body_radius_m)
+    fit = _fit(robot, standing_out, chain, time_s, start)
+    blocks = standing_out.compression
+    if fit.fault and blocks is not None and blocks.explains_faults:
+        is_blocked = fit.fault == str(blocks)
+        return replace(fit, fault=str(blocks) if is_blocked else f"{fit.fault}; {blocks}")
+    return fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +195,7 @@ class _Look:
 
 def _look(
     robot: RobotConfig,
-    seen: StandingOut,
+    standing_out: StandingOut,
     chain: _Chain,
     place: tuple[Floats, float, float],
     hidden: NDArray[np.bool_],
@@ -204,14 +204,16 @@ def _look(
     (shift, turn, wide), radius_m = place, robot.body_radius_m
     c, s = np.cos(turn), np.sin(turn)
     spin = np.array([[c, s], [-s, c]])
-    at = chain.middle_m + shift
-    here = (chain.places_m - chain.middle_m) @ spin
+    middle_m = chain.middle_m + shift
+    spun_m = (chain.places_m - chain.middle_m) @ spin
     forward = chain.ahead @ spin
     ends_m = (chain.tips_m - chain.middle_m) @ spin
     out = chain.out @ spin
-    section_spots, off = _section_spots(here + at, forward, wide * radius_m)
-    tip_spots, off_tip = _tip_spots(ends_m + at, out, radius_m)
-    value = seen.at(np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)]))
+    section_spots, off = _section_spots(spun_m + middle_m, forward, wide * radius_m)
+    tip_spots, off_tip = _tip_spots(ends_m + middle_m, out, radius_m)
+    value = standing_out.at(
+        np.concatenate([section_spots.reshape(-1, 2), tip_spots.reshape(-1, 2)])
+    )
     count = section_spots.shape[0] * section_spots.shape[1]
     across, width = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
     along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
@@ -219,12 +221,12 @@ def _look(
     ends = ends & ~hidden
     free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
     used = sections & free
-    if wide != _NARROW or used.mean() < _LEAST_FREE or seen.compression is not None:
+    if wide != _NARROW or used.mean() < _LEAST_FREE or standing_out.compression is not None:
         used = sections
-    tip_m = _TIP_M if seen.compression is None else _TIP_IN_BLOCKS_M
+    tip_m = _TIP_M if standing_out.compression is None else _TIP_IN_BLOCKS_M
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
     rows = np.concatenate(
-        [_rows(here, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m]
+        [_rows(spun_m, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m]
     )
     target = np.concatenate([across[used] / _SECTION_M, along[ends] / tip_m])
     return _Look(across, sections, used, along, ends, rows, target)
@@ -232,7 +234,7 @@ def _look(
 
 def _fit(
     robot: RobotConfig,
-    seen: StandingOut,
+    standing_out: StandingOut,
     chain: _Chain,
     time_s: float,
     start: tuple[Floats, float],
@@ -241,17 +243,17 @@ def _fit(
 
     If only one tip is off its place, it counts as hidden.
     """
-    found = _fit_tips(robot, seen, chain, time_s, start, _BOTH)
-    if found.fault != _NO_TIP:
-        return found
-    tries = (_fit_tips(robot, seen, chain, time_s, start, hidden) for hidden in _ONE_HIDDEN)
-    good = [one for one in tries if not one.fault and one.sigma_m < _SURE_M]
-    return min(good, key=lambda one: one.error_m, default=found)
+    first_fit = _fit_tips(robot, standing_out, chain, time_s, start, _BOTH)
+    if first_fit.fault != _NO_TIP:
+        return first_fit
+    tries = (_fit_tips(robot, standing_out, chain, time_s, start, hidden) for hidden in _ONE_HIDDEN)
+    good = [other_fit for other_fit in tries if not other_fit.fault and other_fit.sigma_m < _SURE_M]
+    return min(good, key=lambda candidate_fit: candidate_fit.error_m, default=first_fit)
 
 
 def _fit_tips(
     robot: RobotConfig,
-    seen: StandingOut,
+    standing_out: StandingOut,
     chain: _Chain,
     time_s: float,
     start: tuple[Floats, float],
@@ -261,7 +263,7 @@ def _fit_tips(
     wide = _WIDE
     for left in range(_ROUNDS, 0, -1):
         wide = _NARROW if left <= _ROUNDS // 2 else wide
-        look = _look(robot, seen, chain, (shift, turn, wide), hidden)
+        look = _look(robot, standing_out, chain, (shift, turn, wide), hidden)
         if look.sections.sum() < 3:
             break
         size = np.abs(look.target)
@@ -280,9 +282,9 @@ def _fit_tips(
     heading = chain.heading_rad + turn
     off_m = look.across[look.used]
     error_m = float(np.sqrt(np.mean(off_m**2))) if off_m.size else np.inf
-    blocks = seen.compression
+    blocks = standing_out.compression
     alike = _ALIKE if blocks is None else _ALIKE_IN_BLOCKS * blocks.widening**2
-    found = TrackedPose(
+    tracked = TrackedPose(
         time_s,
         head,
         float(np.arctan2(np.sin(heading), np.cos(heading))),
@@ -290,11 +292,11 @@ def _fit_tips(
         _covariance(robot, look, head - chain.middle_m - shift, alike),
         _fault(robot, look, error_m, shift),
     )
-    if blocks is None or found.fault:
-        return found
+    if blocks is None or tracked.fault:
+        return tracked
     radius_m = robot.body_radius_m
-    vague = error_m > _OFF_IN_BLOCKS * radius_m or found.sigma_m > blocks.sigma_limit * radius_m
-    return replace(found, fault=str(blocks)) if vague else found
+    vague = error_m > _OFF_IN_BLOCKS * radius_m or tracked.sigma_m > blocks.sigma_limit * radius_m
+    return replace(tracked, fault=str(blocks)) if vague else tracked
 
 
 def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -> Floats:
@@ -302,9 +304,9 @@ def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -
     size = np.abs(look.target)
     usual = max(1.0, 1.4826 * float(np.median(size))) if size.size else 1.0
     weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))
-    known = look.rows.T @ (look.rows * weight[:, None]) + np.diag(1.0 / np.square(_UNKNOWN))
+    information = look.rows.T @ (look.rows * weight[:, None]) + np.diag(1.0 / np.square(_UNKNOWN))
     spread = float((weight * size * size).sum()) / max(float(weight.sum()), 1e-9)
-    middle = max(1.0, spread) * alike * np.linalg.inv(known)
+    middle = max(1.0, spread) * alike * np.linalg.inv(information)
     carry = np.array([[1.0, 0.0, -head_m[1]], [0.0, 1.0, head_m[0]], [0.0, 0.0, 1.0]])
     least = (_SHAPE * robot.body_radius_m) ** 2
     turn = least / (robot.length_m**2 / 12.0)
@@ -312,22 +314,22 @@ def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -
 
 
 def _search(
-    seen: StandingOut, places: Floats, middle: Floats, radius_m: float
+    standing_out: StandingOut, places: Floats, middle: Floats, radius_m: float
 ) -> tuple[Floats, float]:
     """Shift (2,) and turn with the chain's axis best on a ridge."""
-    px = seen.to_px(middle + np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]]))
+    px = standing_out.to_px(middle + np.array([[0.0, 0.0], [0.01, 0.0], [0.0, 0.01]]))
     grow = (px[1:] - px[0]) / 0.01  # (2, 2) rows: pixels per metre of x, of y
     radius = radius_m * float(np.sqrt(abs(np.linalg.det(grow))))
-    ridge = cv2.GaussianBlur(seen.share, (0, 0), 0.5 * radius) - cv2.GaussianBlur(
-        seen.share, (0, 0), 1.5 * radius
+    ridge = cv2.GaussianBlur(standing_out.share, (0, 0), 0.5 * radius) - cv2.GaussianBlur(
+        standing_out.share, (0, 0), 1.5 * radius
     )
-    at = seen.to_px(places) - seen.origin_px
+    places_px = standing_out.to_px(places) - standing_out.origin_px
     side = np.arange(-REACH_M, REACH_M + 1e-9, _STEP_M)
     turns = np.arange(-_TURN_RAD, _TURN_RAD + 1e-9, _STEP_RAD)
-    x, y = (one.ravel() for one in np.meshgrid(side, side))
+    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
     moves = np.stack([x, y], axis=1) @ grow
     best = -np.inf
-    found = (np.zeros(2), 0.0)
+    best_move = (np.zeros(2), 0.0)
     rows, columns = ridge.shape
     for turn in turns:
         r = places - middle
@@ -341,7 +343,7 @@ def _search(
             )
             @ grow
         )
-        spots = np.rint((at + swung)[None] + moves[:, None]).astype(np.int32)
+        spots = np.rint((places_px + swung)[None] + moves[:, None]).astype(np.int32)
         inside = (
             (spots[..., 0] >= 0)
             & (spots[..., 0] < columns)
@@ -353,15 +355,15 @@ def _search(
         k = int(score.argmax())
         if score[k] > best:
             best = float(score[k])
-            found = (np.array([x[k], y[k]]), float(turn))
-    return found
+            best_move = (np.array([x[k], y[k]]), float(turn))
+    return best_move
 
 
-def _section_spots(here: Floats, forward: Floats, wide_m: float) -> tuple[Floats, Floats]:
+def _section_spots(places_m: Floats, forward: Floats, wide_m: float) -> tuple[Floats, Floats]:
     """Places (S, N, 2) across the chain, and their offsets (N,) to the left."""
     off = np.linspace(-wide_m, wide_m, _SAMPLES)
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
-    return here[:, None] + off[:, None] * normal[:, None], off
+    return places_m[:, None] + off[:, None] * normal[:, None], off
 
 
 def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floats]:
@@ -393,8 +395,8 @@ def _tips(value: Floats, off: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Distances (2,) of the body's ends beyond the chain's tips, and whether they are visible."""
     value = value.max(axis=2)
     end = off[0] + value.sum(axis=1) * (off[1] - off[0])
-    told = (value[:, :4].mean(axis=1) > 0.5) & (value[:, -4:].mean(axis=1) < 0.3)
-    return end, told
+    is_reported = (value[:, :4].mean(axis=1) > 0.5) & (value[:, -4:].mean(axis=1) < 0.3)
+    return end, is_reported
 
 
 def _rows(r: Floats, direction: Floats) -> Floats:
@@ -407,7 +409,7 @@ def _fault(robot: RobotConfig, look: _Look, error_m: float, shift: Floats) -> st
     half = len(look.sections) // 2
     share = float(look.sections.mean())
     halves = look.sections[:half], look.sections[half:]
-    if share < _LEAST_SEEN or min(float(one.mean()) for one in halves) < _LEAST_HALF:
+    if share < _LEAST_SEEN or min(float(body_half.mean()) for body_half in halves) < _LEAST_HALF:
         return f"{100.0 * share:.0f} % of the body is seen where it must be"
     if error_m > _OFF * robot.body_radius_m:
         return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"

@@ -35,13 +35,13 @@ from snakewalk.sim.rendering.top_view import TopView
 
 def floor_prints(camera: CameraConfig) -> list[FloorPrint]:
     """The printed markers of a simulated floor, each with a white margin of a cell."""
-    found = []
+    prints = []
     for number, place_m in camera.marker_places_m.items():
         drawn = marker_picture(number, 96)
         cell = len(drawn) // 6
         sheet = np.pad(drawn, cell, constant_values=255)
-        found.append(FloorPrint(place_m, camera.marker_side_m * len(sheet) / len(drawn), sheet))
-    return found
+        prints.append(FloorPrint(place_m, camera.marker_side_m * len(sheet) / len(drawn), sheet))
+    return prints
 
 
 def top_view(
@@ -110,10 +110,10 @@ class RenderedCamera:
             self._coming.append(self._track(now_s, prior_at(now_s)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)
             self._next_s += (missed + 1) * self._period_s
-        found: list[LineDetection | TrackedPose] = []
+        detections: list[LineDetection | TrackedPose] = []
         while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
-            found.append(self._coming.popleft())
-        return found
+            detections.append(self._coming.popleft())
+        return detections
 
     def close(self) -> None:
         """Free the frame buffer."""
@@ -127,9 +127,9 @@ class RenderedCamera:
             self.detector = self.detector.registered(picture)
         if prior is None:
             return self.detector.detect(picture, now_s)
-        found = self.detector.track(picture, now_s, prior, self._robot)
-        self.detector = self._learning.after(self.detector, picture, prior, found)
-        return found
+        detection = self.detector.track(picture, now_s, prior, self._robot)
+        self.detector = self._learning.after(self.detector, picture, prior, detection)
+        return detection
 
     def _detect(self, now_s: float) -> LineDetection:
         return self.detector.detect(self._view.picture(self._qpos()), now_s)

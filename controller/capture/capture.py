@@ -48,7 +48,9 @@ class UnusableFilmError(InputError):
 
     def __init__(self, name: str, skeletons: Sequence[Skeleton]) -> None:
         """Find the commonest status of the frames of the film called ``name``."""
-        reasons = [one.status for one in skeletons if one.status is not FrameStatus.GOOD]
+        reasons = [
+            skeleton.status for skeleton in skeletons if skeleton.status is not FrameStatus.GOOD
+        ]
         self.reason: FrameStatus | None = None
         """None: the film is too short."""
         if not reasons:
@@ -91,7 +93,7 @@ class Capture:
     @property
     def good(self) -> Bools:
         """(T,) frames whose points are expected within a hundredth of the length."""
-        return np.array([one is FrameStatus.GOOD for one in self.status])
+        return np.array([frame_status is FrameStatus.GOOD for frame_status in self.status])
 
     @property
     def used(self) -> Bools:
@@ -134,16 +136,16 @@ def capture(
         InputError: fewer than 2 frames can be used, or nothing moves.
 
     """
-    found = Detections()
+    detections = Detections()
     for frame in frames:
-        found.add(frame, detector.detect(frame))
+        detections.add(frame, detector.detect(frame))
         if on_progress is not None:
             on_progress()
-    return captured_from(found, rate_hz, name=name, head_px=head_px, fixed=fixed)
+    return captured_from(detections, rate_hz, name=name, head_px=head_px, fixed=fixed)
 
 
 def captured_from(
-    found: Detections,
+    detections: Detections,
     rate_hz: float,
     *,
     name: str = "recording",
@@ -155,52 +157,52 @@ def captured_from(
 
     A ``part`` of a film may be without motion or without any body.
     """
-    seen = mark_empty(found.skeletons, np.array(found.contrast))
-    checked = mark_outliers(align_ends(seen).skeletons, np.array(found.area_px))
-    if sum(one.status is FrameStatus.GOOD for one in checked) < 2:
+    marked = mark_empty(detections.skeletons, np.array(detections.contrast))
+    checked = mark_outliers(align_ends(marked).skeletons, np.array(detections.area_px))
+    if sum(skeleton.status is FrameStatus.GOOD for skeleton in checked) < 2:
         if part:
-            return _without_body(found, checked, rate_hz, fixed=fixed)
+            return _without_body(detections, checked, rate_hz, fixed=fixed)
         raise UnusableFilmError(name, checked)
     aligned = align_ends(checked)
-    coils = solve_coils(aligned.skeletons, found.outlines, np.array(found.axis_error_px))
-    if sum(one.status.has_points for one in coils.skeletons) < 2:
+    coils = solve_coils(aligned.skeletons, detections.outlines, np.array(detections.axis_error_px))
+    if sum(skeleton.status.has_points for skeleton in coils.skeletons) < 2:
         if part:
-            return _without_body(found, coils.skeletons, rate_hz, fixed=fixed)
+            return _without_body(detections, coils.skeletons, rate_hz, fixed=fixed)
         raise UnusableFilmError(name, coils.skeletons)
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
-    points = np.stack([one.points_px for one in aligned.skeletons])
-    radius = np.stack([one.radius_px for one in aligned.skeletons])
+    points = np.stack([skeleton.points_px for skeleton in aligned.skeletons])
+    radius = np.stack([skeleton.radius_px for skeleton in aligned.skeletons])
     if not part and _change(points) < _STILL:
         raise InputError(
             f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
             f"{len(points)} frames"
         )
     score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)
-    skeletons = [one.reversed() if score < 0.0 else one for one in aligned.skeletons]
+    skeletons = [skeleton.reversed() if score < 0.0 else skeleton for skeleton in aligned.skeletons]
     solved = np.isfinite(coils.expected_px)
-    expected = np.where(solved, coils.expected_px, found.expected_px)
-    crops = found.crops.without(set(np.flatnonzero(solved).tolist()))
+    expected = np.where(solved, coils.expected_px, detections.expected_px)
+    crops = detections.crops.without(set(np.flatnonzero(solved).tolist()))
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
-    fitted = with_tip_errors(fitted, found.ends_px, solved)
-    fitted = with_least_errors(fitted, found.least_error_px)
-    skeletons = verified(fitted.skeletons, found.store)
-    if not part and sum(one.status.has_points for one in skeletons) < 2:
+    fitted = with_tip_errors(fitted, detections.ends_px, solved)
+    fitted = with_least_errors(fitted, detections.least_error_px)
+    skeletons = verified(fitted.skeletons, detections.store)
+    if not part and sum(skeleton.status.has_points for skeleton in skeletons) < 2:
         raise UnusableFilmError(name, skeletons)
     usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
     expected = fitted.expected_px.copy()
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
-    expected[[not one.status.has_points for one in skeletons]] = np.nan
-    goes_on = not found.shows_tips(skeletons) and goes_on_faintly(skeletons, found.store)
-    if goes_on or found.is_unclear(skeletons):
+    expected[[not skeleton.status.has_points for skeleton in skeletons]] = np.nan
+    goes_on = not detections.shows_tips(skeletons) and goes_on_faintly(skeletons, detections.store)
+    if goes_on or detections.is_unclear(skeletons):
         skeletons, expected = _without_tail(skeletons, expected)
     return Capture(
-        points_px=np.stack([one.points_px for one in skeletons]),
-        radius_px=np.stack([one.radius_px for one in skeletons]),
-        length_px=np.array([one.length_px for one in skeletons]),
-        status=tuple(one.status for one in skeletons),
+        points_px=np.stack([skeleton.points_px for skeleton in skeletons]),
+        radius_px=np.stack([skeleton.radius_px for skeleton in skeletons]),
+        length_px=np.array([skeleton.length_px for skeleton in skeletons]),
+        status=tuple(skeleton.status for skeleton in skeletons),
         expected_px=expected,
-        distractors=np.array(found.distractors),
+        distractors=np.array(detections.distractors),
         margin=margins(skeletons),
         rate_hz=rate_hz,
         time_s=np.arange(len(points)) / rate_hz,
@@ -212,29 +214,30 @@ def captured_from(
 
 def _without_tail(bodies: Sequence[Skeleton], error_px: Floats) -> tuple[list[Skeleton], Floats]:
     """The bodies and their expected errors (T,) if something faint goes on beyond a tip."""
-    least = _FAINT_TAIL * np.array([one.length_px for one in bodies])
+    least = _FAINT_TAIL * np.array([body.length_px for body in bodies])
     rough = [
-        replace(one, status=FrameStatus.ROUGH) if one.status is FrameStatus.GOOD else one
-        for one in bodies
+        replace(body, status=FrameStatus.ROUGH) if body.status is FrameStatus.GOOD else body
+        for body in bodies
     ]
     return rough, np.asarray(np.fmax(error_px, least))
 
 
 def _without_body(
-    found: Detections, checked: Sequence[Skeleton], rate_hz: float, *, fixed: bool
+    detections: Detections, checked: Sequence[Skeleton], rate_hz: float, *, fixed: bool
 ) -> Capture:
     """Return a part of a film in which no body is seen well."""
     bodies = [
-        no_skeleton(FrameStatus.BLOB if one.status.has_points else one.status) for one in checked
+        no_skeleton(FrameStatus.BLOB if skeleton.status.has_points else skeleton.status)
+        for skeleton in checked
     ]
     nan = np.full(len(bodies), np.nan)
     return Capture(
-        points_px=np.stack([one.points_px for one in bodies]),
-        radius_px=np.stack([one.radius_px for one in bodies]),
+        points_px=np.stack([body.points_px for body in bodies]),
+        radius_px=np.stack([body.radius_px for body in bodies]),
         length_px=nan,
-        status=tuple(one.status for one in bodies),
+        status=tuple(body.status for body in bodies),
         expected_px=nan.copy(),
-        distractors=np.array(found.distractors),
+        distractors=np.array(detections.distractors),
         margin=nan.copy(),
         rate_hz=rate_hz,
         time_s=np.arange(len(bodies)) / rate_hz,
@@ -265,7 +268,7 @@ class CaptureFile:
         return hashlib.sha256(points.tobytes()).hexdigest()[:16]
 
 
-def save_capture(path: Path, held: CaptureFile) -> None:
+def save_capture(path: Path, file: CaptureFile) -> None:
     """Write an .npz that ``load_track`` reads, with the track and the data of every frame.
 
     The track consists of ``points`` (T, 101, 2) head first, m (pixels without a scale), y upwards;
@@ -277,10 +280,10 @@ def save_capture(path: Path, held: CaptureFile) -> None:
     ``head_sure``, ``places_recorded``, and if the film shows several animals
     ``identity_uncertain_after``: frames after which it may be another animal.
     """
-    captured = held.captured
-    scale = 1.0 if held.m_per_px is None else held.m_per_px
-    length_m = np.nan if held.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
-    doubts = held.identity_uncertain_after
+    captured = file.captured
+    scale = 1.0 if file.m_per_px is None else file.m_per_px
+    length_m = np.nan if file.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
+    doubts = file.identity_uncertain_after
     more: dict[str, Any] = {"identity_uncertain_after": np.array(doubts)} if doubts else {}
     with path.open("wb") as stream:
         np.savez_compressed(
@@ -288,19 +291,19 @@ def save_capture(path: Path, held: CaptureFile) -> None:
             points=scaled(captured.points_px, (scale, -scale), (0.0, 0.0), path.parent),
             rate_hz=captured.rate_hz,
             time_s=captured.time_s,
-            rate_assumed=held.rate_assumed,
+            rate_assumed=file.rate_assumed,
             length_m=length_m,
-            name=held.name,
-            source=held.source,
-            licence=held.licence,
-            verdict=np.array([str(one) for one in captured.status]),
+            name=file.name,
+            source=file.source,
+            licence=file.licence,
+            verdict=np.array([str(frame_status) for frame_status in captured.status]),
             points_px=captured.points_px,
             radius_px=captured.radius_px,
             length_px=captured.length_px,
             head_margin=captured.margin,
             expected_px=captured.expected_px,
             company=captured.distractors,
-            m_per_px=np.nan if held.m_per_px is None else held.m_per_px,
+            m_per_px=np.nan if file.m_per_px is None else file.m_per_px,
             head_by=captured.head_by,
             head_sure=captured.head_sure,
             places_recorded=captured.places_recorded,
@@ -316,59 +319,59 @@ def load_capture(path: Path) -> CaptureFile:
 
     """
     try:
-        held, _ = read_arrays(path)
+        arrays, _ = read_arrays(path)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except ValueError:
         raise InputError(
             f"{path}: is no .npz; a track that `animal capture` wrote is needed"
         ) from None
-    frames = len(held["verdict"]) if "verdict" in held and held["verdict"].ndim == 1 else 0
+    frames = len(arrays["verdict"]) if "verdict" in arrays and arrays["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
     shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
     shapes |= dict.fromkeys(("rate_hz", "m_per_px", "head_sure", "rate_assumed"), ())
     shapes |= {"points_px": (frames, SEGMENTS + 1, 2), "radius_px": (frames, SEGMENTS + 1)}
-    known = {str(one) for one in FrameStatus}
-    whole = (
+    verdicts = {str(frame_status) for frame_status in FrameStatus}
+    is_complete = (
         frames > 0
-        and {str(one) for one in held["verdict"]} <= known
+        and {str(verdict) for verdict in arrays["verdict"]} <= verdicts
         and all(
-            name in held and held[name].shape == shape and held[name].dtype.kind in "biuf"
+            name in arrays and arrays[name].shape == shape and arrays[name].dtype.kind in "biuf"
             for name, shape in shapes.items()
         )
-        and {"name", "source", "licence", "head_by"} <= held.keys()
+        and {"name", "source", "licence", "head_by"} <= arrays.keys()
     )
-    if not whole:
+    if not is_complete:
         raise InputError(
             f"{path}: is not a track that `animal capture` wrote: data of its frames are "
             "missing; choose another file"
         )
-    scale = float(held["m_per_px"])
-    rate_hz = float(held["rate_hz"])
+    scale = float(arrays["m_per_px"])
+    rate_hz = float(arrays["rate_hz"])
     even_s = np.arange(frames) / rate_hz  # files of before held no times
-    time_s = np.asarray(held.get("time_s", even_s), dtype=float)
+    time_s = np.asarray(arrays.get("time_s", even_s), dtype=float)
     return CaptureFile(
         Capture(
-            points_px=np.asarray(held["points_px"], dtype=float),
-            radius_px=np.asarray(held["radius_px"], dtype=float),
-            length_px=np.asarray(held["length_px"], dtype=float),
-            status=tuple(FrameStatus(str(one)) for one in held["verdict"]),
-            expected_px=np.asarray(held["expected_px"], dtype=float),
-            distractors=np.asarray(held["company"], dtype=float),
-            margin=np.asarray(held["head_margin"], dtype=float),
+            points_px=np.asarray(arrays["points_px"], dtype=float),
+            radius_px=np.asarray(arrays["radius_px"], dtype=float),
+            length_px=np.asarray(arrays["length_px"], dtype=float),
+            status=tuple(FrameStatus(str(verdict)) for verdict in arrays["verdict"]),
+            expected_px=np.asarray(arrays["expected_px"], dtype=float),
+            distractors=np.asarray(arrays["company"], dtype=float),
+            margin=np.asarray(arrays["head_margin"], dtype=float),
             rate_hz=rate_hz,
             time_s=time_s if time_s.shape == (frames,) else even_s,
-            head_by=str(held["head_by"]),
-            head_sure=float(held["head_sure"]),
-            places_recorded=bool(np.all(held.get("places_recorded", True))),
+            head_by=str(arrays["head_by"]),
+            head_sure=float(arrays["head_sure"]),
+            places_recorded=bool(np.all(arrays.get("places_recorded", True))),
         ),
-        name=str(held["name"]),
+        name=str(arrays["name"]),
         m_per_px=scale if np.isfinite(scale) else None,
-        rate_assumed=bool(held["rate_assumed"]),
-        source=str(held["source"]),
-        licence=str(held["licence"]),
+        rate_assumed=bool(arrays["rate_assumed"]),
+        source=str(arrays["source"]),
+        licence=str(arrays["licence"]),
         identity_uncertain_after=tuple(
-            int(one) for one in np.ravel(held.get("identity_uncertain_after", ()))
+            int(number) for number in np.ravel(arrays.get("identity_uncertain_after", ()))
         ),
     )
 

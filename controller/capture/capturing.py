@@ -138,10 +138,10 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
         raise InputError(f"{options.output}: a track is an .npz")
     refuse_to_overwrite([options.output], options.force)
     said = read_corrections(options.corrections)
-    held = apply_corrections(load_capture(options.recording), said, str(options.corrections))
+    corrected = apply_corrections(load_capture(options.recording), said, str(options.corrections))
     with atomic_write(options.output) as part:
-        save_capture(part, held)
-    captured = held.captured
+        save_capture(part, corrected)
+    captured = corrected.captured
     return CorrectionFacts(
         corrected=str(options.recording),
         track=str(options.output),
@@ -190,15 +190,15 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         captured = in_whole_film(options, film, captured)
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
-        held = CaptureFile(
+        capture_file = CaptureFile(
             captured,
             name=options.recording.stem,
             m_per_px=m_per_px,
             rate_assumed=footage.rate_assumed,
             source=f"captured from {options.recording.name}",
         )
-        write_captures(options.output, [held], wide=options.wide)
-        _write_pictures(options, film, detector, held, bar, scale)
+        write_captures(options.output, [capture_file], wide=options.wide)
+        _write_pictures(options, film, detector, capture_file, bar, scale)
     if parts.folder is not None:
         parts.folder.clear()
     facts = facts_of(options, footage, detector, captured, m_per_px, options.output)
@@ -222,8 +222,8 @@ def _parts(
     options: CaptureOptions, film: OpenedFilm, folder: PartFolder, finished: list[FinishedPart]
 ) -> FilmParts:
     """Return the film in parts, with those that an interrupted capture has finished."""
-    for one in finished:
-        film.stated_s.extend(one.time_s)
+    for part in finished:
+        film.stated_s.extend(part.time_s)
     return FilmParts(
         film.footage.rate_hz,
         film.footage.count,
@@ -265,7 +265,7 @@ def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
     """Reject a film in which a few rough frames are all that is found of an unclear outline."""
     used = int(captured.used.sum())
     good = int(captured.good.sum())
-    unclear = [one for one in captured.status if one in _UNCLEAR]
+    unclear = [frame_status for frame_status in captured.status if frame_status in _UNCLEAR]
     if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
         reason = max(dict.fromkeys(unclear), key=unclear.count)
         raise InputError(
@@ -282,7 +282,7 @@ def in_doubt(captured: Capture) -> Capture:
     varies and most other frames are not solved, two animals in contact may be taken for one.
     """
     used = int(captured.used.sum())
-    broken = sum(one in _BROKEN for one in captured.status)
+    broken = sum(frame_status in _BROKEN for frame_status in captured.status)
     unsolved = len(_shown(captured)) - used
     low, usual, high = np.nanpercentile(captured.length_px, (5.0, 50.0, 95.0))
     varies = float((high - low) / usual)
@@ -294,13 +294,17 @@ def in_doubt(captured: Capture) -> Capture:
     return replace(
         captured,
         expected_px=np.fmax(captured.expected_px, least_px),
-        status=tuple(rough.get(one, one) for one in captured.status),
+        status=tuple(rough.get(frame_status, frame_status) for frame_status in captured.status),
     )
 
 
 def _shown(captured: Capture) -> list[FrameStatus]:
     """Statuses of the frames in which a whole animal is expected."""
-    return [one for one in captured.status if one.has_points or one not in _EXPLAINED]
+    return [
+        frame_status
+        for frame_status in captured.status
+        if frame_status.has_points or frame_status not in _EXPLAINED
+    ]
 
 
 def _captured(
@@ -340,12 +344,12 @@ def _write_pictures(
     options: CaptureOptions,
     film: OpenedFilm,
     detector: BodyDetector,
-    held: CaptureFile,
+    file: CaptureFile,
     bar: ProgressBar,
     scale: float,
 ) -> None:
     """Write what the options ask for to look at; ``scale`` is that of the review page."""
-    captured = held.captured
+    captured = file.captured
     footage = film.footage
     region = film.region
     if options.trail is not None:
@@ -356,7 +360,7 @@ def _write_pictures(
         image = film.cut(shot)
         line = captured.points_px[number] - np.array(region.origin_px)
         step_picture(options.steps, image, detector, line)
-    write_looks(options, film, [held], [options.output], bar, scale)
+    write_looks(options, film, [file], [options.output], bar, scale)
 
 
 def facts_of(
@@ -369,8 +373,8 @@ def facts_of(
 ) -> CaptureFacts:
     """Return the counts and sizes of a captured animal."""
     length_px = float(np.nanmedian(captured.length_px))
-    known = captured.expected_px[np.isfinite(captured.expected_px)]
-    error_px = float(np.median(known)) if known.size else float("nan")
+    finite_values = captured.expected_px[np.isfinite(captured.expected_px)]
+    error_px = float(np.median(finite_values)) if finite_values.size else float("nan")
     return CaptureFacts(
         recording=str(options.recording),
         track=str(track),
@@ -391,7 +395,7 @@ def facts_of(
         frames_with_unsure_head=_unsure_heads(captured),
         frames_missing=footage.missing,
         places_recorded=captured.places_recorded,
-        frames_rejected=sum(one in REJECTED for one in captured.status),
+        frames_rejected=sum(frame_status in REJECTED for frame_status in captured.status),
         warning=warning_of(options, captured),
     )
 
@@ -411,9 +415,9 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
             f"{len(unused)} of {len(captured.status)} frames are not used, mostly because "
             f"({reason}); look at --sheet"
         )
-    known = np.isfinite(captured.expected_px)
-    if known.any():
-        share = float(np.median(captured.expected_px[known] / captured.length_px[known]))
+    is_known = np.isfinite(captured.expected_px)
+    if is_known.any():
+        share = float(np.median(captured.expected_px[is_known] / captured.length_px[is_known]))
         if share > _INACCURATE:
             doubts.append(
                 f"the points are expected to be off by {share:.1%} of the body in most frames; "
@@ -425,7 +429,11 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
 
 def _unexplained(captured: Capture) -> list[FrameStatus]:
     """Statuses of the frames that should show an animal and have no points."""
-    return [one for one in captured.status if not one.has_points and one not in _EXPLAINED]
+    return [
+        frame_status
+        for frame_status in captured.status
+        if not frame_status.has_points and frame_status not in _EXPLAINED
+    ]
 
 
 def _unsure_heads(captured: Capture) -> int:

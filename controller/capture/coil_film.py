@@ -96,14 +96,14 @@ def solve_coils(
     if len(good) < _FEWEST or not coils:
         return CoilFilm(tuple(out), expected)
     film = _Film.of(out, outlines, good)
-    known = expected_px[good]
-    own_px = float(np.nanmedian(known)) if np.isfinite(known).any() else 0.0
+    known_errors_px = expected_px[good]
+    own_px = float(np.nanmedian(known_errors_px)) if np.isfinite(known_errors_px).any() else 0.0
     for stretch in _stretches(coils, set(good)):
         if len(stretch) > _LONGEST:
             continue
         solved = film.solved(stretch, out, own_px)
         if solved.turned:  # the later frames have the other end first
-            out[stretch[-1] + 1 :] = [one.reversed() for one in out[stretch[-1] + 1 :]]
+            out[stretch[-1] + 1 :] = [skeleton.reversed() for skeleton in out[stretch[-1] + 1 :]]
         for k, body, error in zip(stretch, solved.skeletons, solved.expected_px, strict=True):
             out[k], expected[k] = body, error
     return CoilFilm(tuple(out), expected)
@@ -207,16 +207,18 @@ class _Film:
         best, turned = self._solution(shapes, before, after)
         out = _Solved([], [], turned)
         for n, k in enumerate(stretch):
-            own, status, error = skeletons[k], *self._check(n, best)
-            body = _unsolved(own, status)
+            solved_skeleton, status, error = skeletons[k], *self._check(n, best)
+            body = _unsolved(solved_skeleton, status)
             error_px = np.nan
             if status is FrameStatus.COIL:
                 line = self.body.line(best.values[n], shapes[n], 4 * SEGMENTS)
                 body = self._skeleton(shapes[n].to_px(line))
                 error_px = float(np.hypot(error / self.body.scale, own_px))
-            beside = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
-            if own.status is FrameStatus.GOOD and (beside or _apart(own, body) < error_px):
-                body = own
+            is_beside_end = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
+            if solved_skeleton.status is FrameStatus.GOOD and (
+                is_beside_end or _apart(solved_skeleton, body) < error_px
+            ):
+                body = solved_skeleton
                 error_px = np.nan  # the medial axis was right
             out.skeletons.append(body)
             out.expected_px.append(error_px)
@@ -226,10 +228,10 @@ class _Film:
         if not 0 <= k < len(skeletons) or skeletons[k].status is not FrameStatus.GOOD:
             return None
         shape = Shape.of(self.outlines[k], self.body.scale)
-        one, other = (
+        first, other = (
             self.body.values_of(body, shape) for body in (skeletons[k], skeletons[k].reversed())
         )
-        return _End(one, other)
+        return _End(first, other)
 
     def _solution(
         self, shapes: Sequence[Shape], before: "_End", after: "_End"
@@ -247,15 +249,15 @@ class _Film:
             back = self._followed(shapes[::-1], last)[::-1]
         chains = [ahead, back]
         both = first, last
-        found = [self._as_a_whole(chain, shapes, both) for chain in chains]
-        tried = [*chains, *(one.values for one in found)]
+        whole_paths = [self._as_a_whole(chain, shapes, both) for chain in chains]
+        tried = [*chains, *(path.values for path in whole_paths)]
         choice = np.argmin(self._ways(tried, shapes, both), axis=1)
-        joined = np.array([tried[one][n] for n, one in enumerate(choice)])
-        found.append(self._as_a_whole(joined, shapes, both))
-        found.sort(key=lambda one: one.cost)
-        others = [*chains, *(one.values for one in found[1:])]
-        apart = self._rivals([found[0].values, *others], shapes, both)
-        return replace(found[0], apart=apart), turned
+        joined = np.array([tried[source][n] for n, source in enumerate(choice)])
+        whole_paths.append(self._as_a_whole(joined, shapes, both))
+        whole_paths.sort(key=lambda whole_path: whole_path.cost)
+        others = [*chains, *(path.values for path in whole_paths[1:])]
+        rivals = self._rivals([whole_paths[0].values, *others], shapes, both)
+        return replace(whole_paths[0], apart=rivals), turned
 
     def _rivals(
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
@@ -285,8 +287,10 @@ class _Film:
         cost[0] += [self._step_cost(ends[0], chain[0]) for chain in chains]
         cost[-1] += [self._step_cost(chain[-1], ends[1]) for chain in chains]
         steps = [
-            np.array([[self._step_cost(one, other) for other in later] for one in here])
-            for here, later in pairwise(np.stack(chains, axis=1))
+            np.array(
+                [[self._step_cost(shape, other) for other in later] for shape in current_shapes]
+            )
+            for current_shapes, later in pairwise(np.stack(chains, axis=1))
         ]
         before, after = [cost[0]], [cost[-1]]
         for n, step in enumerate(steps):
@@ -295,31 +299,31 @@ class _Film:
             after.append((steps[n] + after[-1]).min(axis=1) + cost[n])
         return np.asarray(np.array(before) + np.array(after[::-1]) - cost)
 
-    def _step_cost(self, one: Floats, other: Floats) -> float:
-        step = _near(other, one) - one
+    def _step_cost(self, shape: Floats, other: Floats) -> float:
+        step = _near(other, shape) - shape
         return float(step @ self.change @ step)
 
-    def _distance(self, one: Floats, other: Floats) -> float:
+    def _distance(self, shape: Floats, other: Floats) -> float:
         """Mean distance of two bodies, relative to the middles of their silhouettes."""
-        at = np.zeros(2)
-        lines = [curve(values, self.body.length, at) for values in (one, other)]
+        ends = np.zeros(2)
+        lines = [curve(values, self.body.length, ends) for values in (shape, other)]
         return float(np.hypot(*(lines[0] - lines[1]).T).mean())
 
     def _followed(self, shapes: Sequence[Shape], start: Floats) -> Floats:
         """(K, PARAMETERS) each frame fitted from the one before it."""
         before = start
-        here = start
+        shape_now = start
         out = []
         for shape in shapes:
             tried = []
-            for first in (here, here + 0.7 * (here - before)):
+            for first in (shape_now, shape_now + 0.7 * (shape_now - before)):
                 values, normal = fit_coil(
-                    first, self.body, shape, self.squares, (here, self.change)
+                    first, self.body, shape, self.squares, (shape_now, self.change)
                 )
-                off = values - here
+                off = values - shape_now
                 tried.append((normal.cost + float(off @ self.change @ off), values))
-            before, here = here, min(tried, key=lambda one: one[0])[1]
-            out.append(here)
+            before, shape_now = shape_now, min(tried, key=lambda trial: trial[0])[1]
+            out.append(shape_now)
         return np.array(out)
 
     def _as_a_whole(
@@ -330,29 +334,34 @@ class _Film:
         best = np.inf
         kept = chain
         damp = 1e-2
-        held: tuple[list[Normal], Floats] | None = None
+        best_path: tuple[list[Normal], Floats] | None = None
         for _ in range(_ROUNDS):
             normals = [
                 normal_of(row, self.body, shape, self.squares)
                 for row, shape in zip(values, shapes, strict=True)
             ]
-            cost = sum(one.cost for one in normals) + float(self._ties(values, ends).sum())
+            cost = sum(normal.cost for normal in normals) + float(self._ties(values, ends).sum())
             if cost < best:
                 done = best - cost < 1e-4 * cost
                 best = cost
                 kept = values
-                held = (normals, values)
+                best_path = (normals, values)
                 damp = 0.3 * damp
                 if done:
                     break
             else:
                 damp *= 8.0
-            assert held is not None
-            step, _ = self._step(held[0], held[1], ends, damp)
+            assert best_path is not None
+            step, _ = self._step(best_path[0], best_path[1], ends, damp)
             values = kept + step
-        assert held is not None
-        _, covariance = self._step(held[0], kept, ends, 0.0)
-        error = np.array([self._error(row, own) for row, own in zip(kept, covariance, strict=True)])
+        assert best_path is not None
+        _, covariance = self._step(best_path[0], kept, ends, 0.0)
+        error = np.array(
+            [
+                self._error(row, row_covariance)
+                for row, row_covariance in zip(kept, covariance, strict=True)
+            ]
+        )
         left = np.array(
             [left_over(row, self.body, shape) for row, shape in zip(kept, shapes, strict=True)]
         )
@@ -373,36 +382,38 @@ class _Film:
         others.
         """
         count = len(values)
-        own = [one.information + damp * np.diag(np.diag(one.information)) for one in normals]
-        push = [one.push.copy() for one in normals]
+        systems = [
+            normal.information + damp * np.diag(np.diag(normal.information)) for normal in normals
+        ]
+        push = [normal.push.copy() for normal in normals]
         tie = self.change
         for n, end in ((0, ends[0]), (count - 1, ends[1])):
-            own[n] = own[n] + tie
+            systems[n] = systems[n] + tie
             push[n] = push[n] + tie @ (_near(end, values[n]) - values[n])
         for n in range(count - 1):
             off = tie @ (values[n + 1] - values[n])
             push[n] = push[n] + off
             push[n + 1] = push[n + 1] - off
-        before = self._eliminated(own, push)
-        after = self._eliminated(own[::-1], push[::-1])[::-1]
+        before = self._eliminated(systems, push)
+        after = self._eliminated(systems[::-1], push[::-1])[::-1]
         steps = []
         covariance = []
         for n in range(count):
-            full = own[n] + before[n][0] + after[n][0]
+            full = systems[n] + before[n][0] + after[n][0]
             inverse = np.linalg.inv(full)
             covariance.append(inverse)
             steps.append(inverse @ (push[n] + before[n][1] + after[n][1]))
         return np.array(steps), np.array(covariance)
 
     def _eliminated(
-        self, own: Sequence[Floats], push: Sequence[Floats]
+        self, systems: Sequence[Floats], push: Sequence[Floats]
     ) -> list[tuple[Floats, Floats]]:
         """Information and push that the frames before each frame add."""
         tie = self.change
         nothing = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
         out = [nothing]
-        for n in range(len(own) - 1):
-            full = own[n] + out[n][0] + tie
+        for n in range(len(systems) - 1):
+            full = systems[n] + out[n][0] + tie
             ahead = np.linalg.solve(full, np.column_stack([tie, push[n] + out[n][1]]))
             out.append((tie - tie @ ahead[:, :-1], tie @ ahead[:, -1]))
         return out
@@ -417,18 +428,18 @@ class _Film:
         strange = best.left > max(_LEFT_OVER, _OF_USUAL * self.left)
         if strange[n]:
             return FrameStatus.COIL_UNLIKE, np.nan
-        beside = best.apart[max(0, n - _BESIDE) : n + _BESIDE + 1]
+        neighbour_gaps = best.apart[max(0, n - _BESIDE) : n + _BESIDE + 1]
         leaps = best.steps > _STEP
         leaps[:-1] |= strange
         tied = not leaps[: n + 1].any() or not leaps[n + 1 :].any()
-        if beside.max() > _AGREE * self.body.length or not tied:
+        if neighbour_gaps.max() > _AGREE * self.body.length or not tied:
             return FrameStatus.COIL_TWO_WAYS, np.nan
-        own = np.hypot(_OF_FIT * best.error[n], _OF_MODEL * self.misfit)
-        return FrameStatus.COIL, float(np.hypot(own, best.apart[n]))
+        frame_error_px = np.hypot(_OF_FIT * best.error[n], _OF_MODEL * self.misfit)
+        return FrameStatus.COIL, float(np.hypot(frame_error_px, best.apart[n]))
 
     def _skeleton(self, line_px: Floats) -> Skeleton:
-        at = np.linspace(0.0, len(self.body.half_width) - 1.0, SEGMENTS + 1)
-        radius = np.interp(at, np.arange(len(self.body.half_width)), self.body.half_width)
+        place = np.linspace(0.0, len(self.body.half_width) - 1.0, SEGMENTS + 1)
+        radius = np.interp(place, np.arange(len(self.body.half_width)), self.body.half_width)
         try:
             points = equipartition(line_px, SEGMENTS).points
         except (NoEquipartitionError, ValueError):
@@ -437,14 +448,14 @@ class _Film:
         return Skeleton(points, radius / self.body.scale, length, FrameStatus.COIL)
 
 
-def _unsolved(own: Skeleton, status: FrameStatus) -> Skeleton:
+def _unsolved(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
     """Skeleton of a frame that is not solved, with its own reason if it may not be a coil."""
-    return own if own.status in _OTHERS else no_skeleton(status)
+    return skeleton if skeleton.status in _OTHERS else no_skeleton(status)
 
 
-def _apart(one: Skeleton, other: Skeleton) -> float:
+def _apart(skeleton: Skeleton, other: Skeleton) -> float:
     """Mean distance of corresponding points, px."""
-    return float(np.hypot(*(one.points_px - other.points_px).T).mean())
+    return float(np.hypot(*(skeleton.points_px - other.points_px).T).mean())
 
 
 def _near(values: Floats, reference: Floats) -> Floats:

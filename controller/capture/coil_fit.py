@@ -128,11 +128,11 @@ class CoilBody:
     @classmethod
     def of(cls, skeletons: Sequence[Skeleton]) -> "CoilBody":
         """Median length and widths of good skeletons, the same end first in all."""
-        radius = np.median(np.stack([one.radius_px for one in skeletons]), axis=0)
+        radius = np.median(np.stack([skeleton.radius_px for skeleton in skeletons]), axis=0)
         scale = WIDTH_PX / (2.0 * float(np.percentile(radius, 95.0)))
-        length = float(np.median([one.length_px for one in skeletons]))
-        at = np.linspace(0.0, SEGMENTS, _DISCS)
-        wide = np.interp(at, np.arange(SEGMENTS + 1), radius)
+        length = float(np.median([skeleton.length_px for skeleton in skeletons]))
+        place = np.linspace(0.0, SEGMENTS, _DISCS)
+        wide = np.interp(place, np.arange(SEGMENTS + 1), radius)
         return cls(length * scale, wide * scale, scale)
 
     def line(self, values: Floats, shape: Shape, pieces: int = _DISCS - 1) -> Floats:
@@ -144,17 +144,17 @@ class CoilBody:
         line = shape.from_px(skeleton.points_px)
         step = -np.diff(line, axis=0)
         angle = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-        at = (np.arange(len(angle)) + 0.5) / len(angle)
-        bends = np.linalg.lstsq(coil_basis(at), angle, rcond=None)[0]
+        place = (np.arange(len(angle)) + 0.5) / len(angle)
+        bends = np.linalg.lstsq(coil_basis(place), angle, rcond=None)[0]
         off = line.mean(axis=0) - shape.middle
         size = np.log(skeleton.length_px * self.scale / self.length)
         return np.concatenate([off, [size], bends])
 
 
-def coil_basis(at: Floats) -> Floats:
-    """(P, COIL_BENDS) cubic B-splines of the tangent angle at ``at`` (P,), 0 the head."""
+def coil_basis(place: Floats) -> Floats:
+    """(P, COIL_BENDS) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head."""
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, COIL_BENDS - 2), [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(at, knots, 3).toarray(), dtype=float)
+    return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
 
 
 _BASIS = coil_basis((np.arange(_DISCS - 1) + 0.5) / (_DISCS - 1))
@@ -210,9 +210,9 @@ def _draw_discs(
         left, right = max(0, int(np.ceil(x - far))), min(columns - 1, int(np.floor(x + far)))
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
-                here = wide - np.sqrt((column - x) ** 2 + (row - y) ** 2)
-                if here > depth[row, column]:
-                    depth[row, column] = here
+                depth_here = wide - np.sqrt((column - x) ** 2 + (row - y) ** 2)
+                if depth_here > depth[row, column]:
+                    depth[row, column] = depth_here
                     nearest[row, column] = k
 
 
@@ -245,8 +245,8 @@ def normal_of(
     line = body.line(values, shape)
     low, high = (v * WIDTH_PX for v in (_COARSE if coarse else _FINE))
     depth, nearest = body_depth(line, body.half_width, shape, low)
-    seen = np.clip(shape.depth, -low, high)
-    rest = seen - np.clip(depth, -low, high)
+    clipped = np.clip(shape.depth, -low, high)
+    rest = clipped - np.clip(depth, -low, high)
     near = (shape.depth > -low) | (depth > -low)
     y, x = np.nonzero((depth > -low) & (depth < high))
     disc = nearest[y, x]
@@ -256,9 +256,9 @@ def normal_of(
     jacobian = (away[:, :, None] * slopes).sum(axis=1)
     heavy = 1.0 / (squares * _TOGETHER)
     mean = float((rest[near] ** 2).mean())
-    own, target = _own_prior(values)
-    information = heavy * (jacobian.T @ jacobian) + own.T @ own
-    push = heavy * (jacobian.T @ rest[y, x]) + own.T @ target
+    prior, target = _own_prior(values)
+    information = heavy * (jacobian.T @ jacobian) + prior.T @ prior
+    push = heavy * (jacobian.T @ rest[y, x]) + prior.T @ target
     cost = heavy * float((rest[near] ** 2).sum()) + float(target @ target)
     return Normal(information, push, cost, mean)
 
@@ -291,8 +291,8 @@ def fit_coil(
         best = np.inf
         values = kept
         for _ in range(_ROUNDS):
-            here = normal_of(values, body, shape, squares, coarse=far)
-            cost = here.cost
+            trial = normal_of(values, body, shape, squares, coarse=far)
+            cost = trial.cost
             if prior is not None:
                 off = prior[0] - values
                 cost += float(off @ prior[1] @ off)
@@ -300,7 +300,7 @@ def fit_coil(
                 done = best - cost < _SETTLED * cost
                 best = cost
                 kept = values
-                normal = here
+                normal = trial
                 damp = 0.3 * damp
                 if done:
                     break

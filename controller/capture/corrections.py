@@ -68,7 +68,7 @@ def read_corrections(path: Path) -> Corrections:
 
 
 def _check_frames(corrections: Corrections, count: int, name: str) -> None:
-    redrawn = [one.frame for one in corrections.redrawn]
+    redrawn = [redrawn_body.frame for redrawn_body in corrections.redrawn]
     lists = {"flipped": corrections.flipped, "left_out": corrections.left_out, "redrawn": redrawn}
     for key, frames in lists.items():
         beyond = [k for k in frames if not 0 <= k < count]
@@ -81,11 +81,11 @@ def _check_frames(corrections: Corrections, count: int, name: str) -> None:
             raise InputError(f"{name}: {key}: frame {twice[0]} stands there twice")
 
 
-def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
+def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
     """Return the recording with corrections; frames left out override all others.
 
     Args:
-        held: as it was captured.
+        file: as it was captured.
         corrections: of this recording.
         name: of the corrections, for errors.
 
@@ -94,15 +94,15 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
             cannot be a body; fewer than two frames left.
 
     """
-    captured = held.captured
+    captured = file.captured
     count = len(captured.status)
-    if corrections.track != held.fingerprint or corrections.frames != count:
+    if corrections.track != file.fingerprint or corrections.frames != count:
         raise InputError(
-            f"{name}: these corrections belong to another track than {held.name}, or were applied "
+            f"{name}: these corrections belong to another track than {file.name}, or were applied "
             "to it already; give the track of which the page was made"
         )
     _check_frames(corrections, count, name)
-    drawn = {one.frame: one for one in corrections.redrawn}
+    drawn = {redrawn.frame: redrawn for redrawn in corrections.redrawn}
     usual_px = float(np.nanmedian(captured.length_px))
     usual_radius = np.nanmedian(captured.radius_px, axis=0)
     flipped = set(corrections.flipped)
@@ -122,25 +122,25 @@ def apply_corrections(held: CaptureFile, corrections: Corrections, name: str) ->
         if k in left_out or k in drawn:
             expected[k] = np.nan
         skeletons.append(after)
-    length = np.array([one.length_px for one in skeletons])
+    length = np.array([skeleton.length_px for skeleton in skeletons])
     if np.isfinite(length).sum() < 2:
         raise InputError(f"{name}: fewer than 2 frames with points stay; no motion is left")
     corrected = replace(
         captured,
-        points_px=np.stack([one.points_px for one in skeletons]),
-        radius_px=np.stack([one.radius_px for one in skeletons]),
+        points_px=np.stack([skeleton.points_px for skeleton in skeletons]),
+        radius_px=np.stack([skeleton.radius_px for skeleton in skeletons]),
         length_px=length,
-        status=tuple(one.status for one in skeletons),
+        status=tuple(skeleton.status for skeleton in skeletons),
         expected_px=expected,
         margin=margins(skeletons),
         head_by="given" if flipped else captured.head_by,
         head_sure=1.0 if flipped else captured.head_sure,
     )
-    told = (
+    source_text = (
         f"; corrected by a person: {len(flipped)} frames flipped, {len(left_out)} left out, "
         f"{len(drawn)} redrawn"
     )
-    return replace(held, captured=corrected, source=held.source + told)
+    return replace(file, captured=corrected, source=file.source + source_text)
 
 
 def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats) -> Skeleton:

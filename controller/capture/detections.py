@@ -77,8 +77,8 @@ class Detections:
         self.skeletons.append(body)
         self.area_px.append(silhouette.area_px)
         self.contrast.append(silhouette.threshold)
-        seen = silhouette.area_px > 0.0
-        self.noise.append(silhouette.noise_level / silhouette.threshold if seen else 0.0)
+        is_visible = silhouette.area_px > 0.0
+        self.noise.append(silhouette.noise_level / silhouette.threshold if is_visible else 0.0)
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
@@ -123,17 +123,17 @@ class Detections:
             skeletons: of all frames, at the end.
 
         """
-        used = sum(one.status.has_points for one in skeletons)
+        used = sum(skeleton.status.has_points for skeleton in skeletons)
         noise = [
             level
-            for level, one in zip(self.noise, skeletons, strict=True)
-            if one.status not in _WITHOUT_OUTLINE
+            for level, skeleton in zip(self.noise, skeletons, strict=True)
+            if skeleton.status not in _WITHOUT_OUTLINE
         ]
         return used < _CLEAR_FRAMES * len(noise) and float(np.median(noise)) > _NOISY
 
     def shows_tips(self, skeletons: Sequence[Skeleton]) -> bool:
         """Whether most tips are those of followed tails: nothing is seen beyond them."""
-        return self.tails > 0.5 * sum(one.status.has_points for one in skeletons)
+        return self.tails > 0.5 * sum(skeleton.status.has_points for skeleton in skeletons)
 
     @property
     def least_error_px(self) -> dict[int, float]:
@@ -167,8 +167,8 @@ class Detections:
 def _longest_band_px(body: Skeleton, detection: Detection) -> float:
     """Length of the longest faint part of a body that has stronger parts on both sides."""
     level = detection.silhouette.level
-    at = np.rint(body.points_px - np.asarray(detection.silhouette.origin_px)).astype(int)
-    column, row = np.clip(at, 0, np.subtract(level.shape[::-1], 1)).T
+    pixel = np.rint(body.points_px - np.asarray(detection.silhouette.origin_px)).astype(int)
+    column, row = np.clip(pixel, 0, np.subtract(level.shape[::-1], 1)).T
     strong = np.flatnonzero(level[row, column] >= detection.contrast_threshold)
     chord = body.length_px / (len(body.points_px) - 1)
     return float(np.diff(strong).max(initial=1) - 1) * chord

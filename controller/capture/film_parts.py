@@ -50,7 +50,7 @@ class FilmParts:
 
     def __post_init__(self) -> None:
         """Count the frames of parts that were finished before."""
-        self._done = sum(one.frames for one in self.finished)
+        self._done = sum(part.frames for part in self.finished)
 
     @property
     def done_frames(self) -> int:
@@ -73,16 +73,21 @@ class FilmParts:
         bodies = self._found.skeletons
         if len(bodies) < self.part_frames or self.count - self._done < self.part_frames // 2:
             return
-        calm = all(one.status is FrameStatus.GOOD for one in bodies[-_CALM:])
+        calm = all(body.status is FrameStatus.GOOD for body in bodies[-_CALM:])
         if calm or len(bodies) >= max(_LONGEST_PART, 2 * self.part_frames):
             self._finish()
 
     def _finish(self) -> None:
-        found = self._found
+        detections = self._found
         part = captured_from(
-            found, self.rate_hz, name=self.name, head_px=self._head(), fixed=self.fixed, part=True
+            detections,
+            self.rate_hz,
+            name=self.name,
+            head_px=self._head(),
+            fixed=self.fixed,
+            part=True,
         )
-        part = replace(part, time_s=np.array(found.stated_s))
+        part = replace(part, time_s=np.array(detections.stated_s))
         number = len(self.finished)
         kept = FinishedPart.of(part) if self.folder is None else self.folder.add(number, part)
         self.finished.append(kept)
@@ -90,8 +95,8 @@ class FilmParts:
 
     def _head(self) -> tuple[float, float] | None:
         """The given place of the head, in the first part with a body only."""
-        seen = any(one.used for one in self.finished)
-        return None if seen else self.head_px
+        has_bodies = any(part.used for part in self.finished)
+        return None if has_bodies else self.head_px
 
     def done(self) -> Capture:
         """Capture of all frames.
@@ -127,20 +132,20 @@ def joined(
     """
     sign = _signs(parts)
     score, by = _head_of(parts, sign)
-    if sum(one.used for one in parts) < 2:
+    if sum(film_part.used for film_part in parts) < 2:
         raise InputError(f"{name}: the body is never seen whole; look at --sheet")
-    count = sum(one.frames for one in parts)
+    count = sum(film_part.frames for film_part in parts)
     arrays: dict[str, Floats] = {}
     status: list[FrameStatus] = []
     fixed = True
-    for one, s in zip(parts, sign, strict=True):
-        part = _reversed(one.read()) if s * score < 0.0 else one.read()
+    for film_part, s in zip(parts, sign, strict=True):
+        part = _reversed(film_part.read()) if s * score < 0.0 else film_part.read()
         fixed = part.places_recorded
-        for each in _ARRAYS:
-            values = getattr(part, each)
+        for array_name in _ARRAYS:
+            values = getattr(part, array_name)
             if not status:
-                arrays[each] = large_array((count, *values.shape[1:]), folder)
-            arrays[each][len(status) : len(status) + one.frames] = values
+                arrays[array_name] = large_array((count, *values.shape[1:]), folder)
+            arrays[array_name][len(status) : len(status) + film_part.frames] = values
         status += part.status
     bodies = map(
         Skeleton, arrays["points_px"], arrays["radius_px"], arrays["length_px"].tolist(), status
@@ -162,26 +167,28 @@ def _signs(parts: Sequence[FinishedPart]) -> list[int]:
     out = []
     sign = 1
     before: Skeleton | None = None
-    for one in parts:
-        if one.first is not None and before is not None and margin_of(one.first, before) < 0.0:
+    for part in parts:
+        if part.first is not None and before is not None and margin_of(part.first, before) < 0.0:
             sign = -sign
-        before = before if one.last is None else one.last
+        before = before if part.last is None else part.last
         out.append(sign)
     return out
 
 
 def _head_of(parts: Sequence[FinishedPart], sign: Sequence[int]) -> tuple[float, str]:
     """Whether the first end of the first part is the head: the mean log-odds of all parts."""
-    weights = [one.used * (one.head_by != "given" or _GIVEN) for one in parts]
+    weights = [part.used * (part.head_by != "given" or _GIVEN) for part in parts]
     if not any(weights):
         return 0.0, "taper"
     odds = [
-        weight * s * float(np.arctanh(min(one.head_sure, _SUREST)))
-        for weight, one, s in zip(weights, parts, sign, strict=True)
+        weight * s * float(np.arctanh(min(part.head_sure, _SUREST)))
+        for weight, part, s in zip(weights, parts, sign, strict=True)
     ]
     strongest = int(np.argmax(np.abs(odds)))
     return float(np.tanh(sum(odds) / sum(weights))), parts[strongest].head_by
 
 
-def _reversed(one: Capture) -> Capture:
-    return replace(one, points_px=one.points_px[:, ::-1], radius_px=one.radius_px[:, ::-1])
+def _reversed(capture: Capture) -> Capture:
+    return replace(
+        capture, points_px=capture.points_px[:, ::-1], radius_px=capture.radius_px[:, ::-1]
+    )

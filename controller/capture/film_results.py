@@ -46,10 +46,10 @@ def write_looks(
     footage = film.footage
     region = film.region
     if options.sheet is not None:
-        contact_sheet(options.sheet, footage.read(), [one.captured for one in animals])
+        contact_sheet(options.sheet, footage.read(), [animal.captured for animal in animals])
     if options.overlay is not None:
         bar.update(0, footage.count, description="overlay film")
-        captures = [one.captured for one in animals]
+        captures = [animal.captured for animal in animals]
         overlay_film(options.overlay, footage.read(), captures, bar.advance)
     if options.review is not None:
         bar.update(0, footage.count, description="review page")

@@ -48,10 +48,10 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
 
     Places count, not only shapes, but a common shift of all points does not.
     """
-    here = body.points_px - body.points_px.mean(axis=0)
+    point = body.points_px - body.points_px.mean(axis=0)
     there = before.points_px - before.points_px.mean(axis=0)
-    same = float(np.sqrt(((here - there) ** 2).sum(axis=1)).mean())
-    other = float(np.sqrt(((here[::-1] - there) ** 2).sum(axis=1)).mean())
+    same = float(np.sqrt(((point - there) ** 2).sum(axis=1)).mean())
+    other = float(np.sqrt(((point[::-1] - there) ** 2).sum(axis=1)).mean())
     return (other - same) / max(other + same, 1e-9)
 
 
@@ -63,18 +63,18 @@ def aligned_to(body: Skeleton, before: Skeleton) -> Skeleton:
 def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
     """Put the same end first in every frame; the end of the first skeleton is kept."""
     out = list(skeletons)
-    good = [k for k, one in enumerate(out) if one.status is FrameStatus.GOOD]
+    good = [k for k, skeleton in enumerate(out) if skeleton.status is FrameStatus.GOOD]
     profile = np.zeros(0)
     for number, k in enumerate(good):
         if number == 0:
             profile = _asymmetry(out[k])
             continue
         before = good[number - 1]
-        here = margin_of(out[k], out[before])
-        if abs(here) < _SURE or k - before > _GAP:
+        margin = margin_of(out[k], out[before])
+        if abs(margin) < _SURE or k - before > _GAP:
             thick = _agreement(_asymmetry(out[k]), profile)
-            here = here if abs(here) > 2.0 * abs(thick) else thick
-        if here < 0.0:
+            margin = margin if abs(margin) > 2.0 * abs(thick) else thick
+        if margin < 0.0:
             out[k] = out[k].reversed()
         profile = profile + (_asymmetry(out[k]) - profile) / min(number + 1, 200)
     return AlignedSkeletons(tuple(out), margins(out))
@@ -87,12 +87,12 @@ def margins(skeletons: Iterable[Skeleton]) -> Floats:
 
 def _margins(skeletons: Iterable[Skeleton]) -> Iterator[float]:
     before: Skeleton | None = None
-    for one in skeletons:
-        if not np.isfinite(one.length_px):
+    for skeleton in skeletons:
+        if not np.isfinite(skeleton.length_px):
             yield float("nan")
             continue
-        yield 1.0 if before is None else margin_of(one, before)
-        before = one
+        yield 1.0 if before is None else margin_of(skeleton, before)
+        before = skeleton
 
 
 def _asymmetry(body: Skeleton) -> Floats:
@@ -101,15 +101,17 @@ def _asymmetry(body: Skeleton) -> Floats:
     return np.asarray((radius - radius[::-1])[:50])
 
 
-def _agreement(one: Floats, other: Floats) -> float:
+def _agreement(vector: Floats, other: Floats) -> float:
     """-1 to 1: whether two asymmetries have the same sign; about 0 where there is hardly one."""
     scale = float(np.abs(other).mean())
-    product = float((one * other).sum() / max(np.hypot(*_norms(one, other)) ** 2 / 2.0, 1e-12))
+    product = float(
+        (vector * other).sum() / max(np.hypot(*_norms(vector, other)) ** 2 / 2.0, 1e-12)
+    )
     return product * min(1.0, scale / 0.1)
 
 
-def _norms(one: Floats, other: Floats) -> tuple[float, float]:
-    return float(np.linalg.norm(one)), float(np.linalg.norm(other))
+def _norms(vector: Floats, other: Floats) -> tuple[float, float]:
+    return float(np.linalg.norm(vector)), float(np.linalg.norm(other))
 
 
 def travel_score(points_px: Floats, step: int) -> float:
@@ -128,9 +130,9 @@ def travel_score(points_px: Floats, step: int) -> float:
     middle = points_px.mean(axis=1)
     moved = middle[step:] - middle[:-step]
     along = (moved * unit[:-step]).sum(axis=1)
-    whole = np.hypot(*moved.T)
-    use = np.isfinite(along) & (whole > 0.01 * median_length(points_px))
-    return float(along[use].sum() / whole[use].sum()) if use.any() else 0.0
+    distance = np.hypot(*moved.T)
+    use = np.isfinite(along) & (distance > 0.01 * median_length(points_px))
+    return float(along[use].sum() / distance[use].sum()) if use.any() else 0.0
 
 
 def usual_travel(points_px: Floats, step: int) -> float:
@@ -149,8 +151,8 @@ def taper_score(radius_px: Floats) -> float:
     """How much thicker the first fifth (without the tip) is than the last one, of the mean."""
     mean = np.nanmean(radius_px, axis=0)
     count = len(mean)
-    one, other = mean[count // 20 : count // 5], mean[::-1][count // 20 : count // 5]
-    return float((one.mean() - other.mean()) / mean.mean())
+    head_half, other = mean[count // 20 : count // 5], mean[::-1][count // 20 : count // 5]
+    return float((head_half.mean() - other.mean()) / mean.mean())
 
 
 def head_end(
@@ -181,8 +183,8 @@ def head_end(
     good = np.isfinite(points[:, 0, 0])
     if head_px is not None:
         first = points[np.argmax(good)]
-        one, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
-        return (1.0 if one <= other else -1.0), "given"
+        first_px, other = (float(np.hypot(*(first[k] - head_px))) for k in (0, -1))
+        return (1.0 if first_px <= other else -1.0), "given"
     wave = None
     if int(good.sum()) >= _WAVE_FRAMES:
         wave = measure_wave(track_from_points("", points, rate_hz))
@@ -207,10 +209,10 @@ def _weighed(motion: float, taper: float, signs: dict[str, float]) -> tuple[floa
     by_taper = np.copysign(min(_BY_TAPER * max(abs(taper) - _EVEN, 0.0), _MOST_BY_TAPER), taper)
     total = motion + float(by_taper)
     signs = {**signs, "taper": float(by_taper)}
-    agreeing = {by: abs(one) for by, one in signs.items() if one * total > 0.0}
+    agreeing = {by: abs(sign) for by, sign in signs.items() if sign * total > 0.0}
     if not agreeing:
         return taper, "taper"
-    clear = (by for by, one in agreeing.items() if one >= _DECIDES)
+    clear = (by for by, strength in agreeing.items() if strength >= _DECIDES)
     by = next(clear, max(agreeing, key=lambda name: agreeing[name]))
     score = float(np.tanh(0.5 * total))
     if motion * taper < 0.0 and abs(taper) >= _CONTRARY:

@@ -65,24 +65,24 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
     """
     footage = open_footage(options.recording, options.rate_hz)
     head_px = None if options.head is None else place_of(options.head)
-    whole = footage.spread(_SAMPLE)
-    one_size = len({frame.shape[:2] for frame in whole}) == 1
+    sample = footage.spread(_SAMPLE)
+    one_size = len({frame.shape[:2] for frame in sample}) == 1
     if (options.roi or options.mask) and not one_size:
         raise InputError(
             f"{options.recording}: --roi and --mask need images of one size; these differ"
         )
-    region = region_of(options.roi, options.mask, whole[0].shape)
+    region = region_of(options.roi, options.mask, sample[0].shape)
     if head_px is not None:
-        _refuse_outside(head_px, region, whole, str(options.head))
-    in_colour = any(frame.ndim == 3 for frame in whole)
+        _refuse_outside(head_px, region, sample, str(options.head))
+    in_colour = any(frame.ndim == 3 for frame in sample)
     background = None
     if options.background is not None:
         background = region.cut(_of_kind(footage.image(options.background), in_colour))
     return OpenedFilm(
         footage,
         region,
-        whole[0],
-        tuple(region.cut(_of_kind(frame, in_colour)) for frame in whole),
+        sample[0],
+        tuple(region.cut(_of_kind(frame, in_colour)) for frame in sample),
         one_size,
         in_colour,
         background,

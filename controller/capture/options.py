@@ -116,9 +116,11 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
         "--steps": options.steps,
         "--trail": options.trail,
     }
-    one = [name for name, value in given.items() if value is not None]
-    if one:
-        raise InputError(f"--animals and {one[0]}: this option is for one animal; leave it out")
+    given_names = [name for name, value in given.items() if value is not None]
+    if given_names:
+        raise InputError(
+            f"--animals and {given_names[0]}: this option is for one animal; leave it out"
+        )
     if options.cropped:
         raise InputError("--animals and --cropped: several animals need a camera that stands still")
 
@@ -128,11 +130,13 @@ def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool |
     film = options.recording
     names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold", "animals")
     values = {name: getattr(options, name) for name in names}
-    held = {name: str(one) if isinstance(one, Path) else one for name, one in values.items()}
+    texts = {
+        name: str(value) if isinstance(value, Path) else value for name, value in values.items()
+    }
     size = 0
     if film.exists():
         size = sum(1 for _ in film.iterdir()) if film.is_dir() else film.stat().st_size
-    return {"recording": film.name, "size": size, **held}
+    return {"recording": film.name, "size": size, **texts}
 
 
 def track_files(options: CaptureOptions, count: int) -> list[Path]:

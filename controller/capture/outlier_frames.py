@@ -34,12 +34,14 @@ def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton
         contrast: (T,) of the clearest region in each frame.
 
     """
-    good = [k for k, one in enumerate(skeletons) if one.status is FrameStatus.GOOD]
+    good = [k for k, skeleton in enumerate(skeletons) if skeleton.status is FrameStatus.GOOD]
     least = _FAINT * float(np.median(contrast[good])) if len(good) >= _FEWEST else 0.0
     several = {FrameStatus.SEVERAL, FrameStatus.BLOB}
     return [
-        no_skeleton(FrameStatus.NOTHING) if one.status in several and level < least else one
-        for one, level in zip(skeletons, contrast.tolist(), strict=True)
+        no_skeleton(FrameStatus.NOTHING)
+        if skeleton.status in several and level < least
+        else skeleton
+        for skeleton, level in zip(skeletons, contrast.tolist(), strict=True)
     ]
 
 
@@ -52,7 +54,7 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
 
     """
     out = list(skeletons)
-    good = [k for k, one in enumerate(out) if one.status is FrameStatus.GOOD]
+    good = [k for k, skeleton in enumerate(out) if skeleton.status is FrameStatus.GOOD]
     if len(good) < _FEWEST:
         return out
     length = _deviation(np.array([out[k].length_px for k in good]), _LENGTH)
@@ -63,7 +65,10 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     spread = 1.4826 * np.median(np.abs(radius / median - 1.0), axis=0)
     most = np.maximum(_THICK, _SPREADS * spread)
     # after a coil the other end may be first, which makes no body thick
-    ways = [((way / median - 1.0) / most).max(axis=1) for way in (radius, radius[:, ::-1])]
+    ways = [
+        ((radius_order / median - 1.0) / most).max(axis=1)
+        for radius_order in (radius, radius[:, ::-1])
+    ]
     thick = np.minimum(*ways)
     for n, k in enumerate(good):
         if thick[n] > 1.0 or length[n] < -1.0 or area[n] < -1.0:

@@ -127,8 +127,8 @@ class PartFolder:
         """Keep a finished part."""
         if number == 0:
             self._begin()
-        values = {one.name: getattr(part, one.name) for one in fields(part)}
-        values["status"] = np.array([str(one) for one in part.status])
+        values = {field.name: getattr(part, field.name) for field in fields(part)}
+        values["status"] = np.array([str(frame_status) for frame_status in part.status])
         path = self.path / f"{number:05d}.npz"
         with atomic_write(path) as file, file.open("wb") as stream:
             np.savez(stream, **values)
@@ -169,19 +169,19 @@ class PartFolder:
 
 def _read_part(file: Path) -> Capture:
     try:
-        held, _ = read_arrays(file)
+        part_arrays, _ = read_arrays(file)
         arrays: dict[str, Floats] = {
-            one.name: np.asarray(held[one.name], dtype=float)
-            for one in fields(Capture)
-            if one.type in {Floats, "Floats"}
+            field.name: np.asarray(part_arrays[field.name], dtype=float)
+            for field in fields(Capture)
+            if field.type in {Floats, "Floats"}
         }
         return Capture(
             **arrays,
-            status=tuple(FrameStatus(str(one)) for one in held["status"]),
-            rate_hz=float(held["rate_hz"]),
-            head_by=str(held["head_by"]),
-            head_sure=float(held["head_sure"]),
-            places_recorded=bool(held["places_recorded"]),
+            status=tuple(FrameStatus(str(verdict)) for verdict in part_arrays["status"]),
+            rate_hz=float(part_arrays["rate_hz"]),
+            head_by=str(part_arrays["head_by"]),
+            head_sure=float(part_arrays["head_sure"]),
+            places_recorded=bool(part_arrays["places_recorded"]),
         )
     except (OSError, ValueError, KeyError):
         raise InputError(f"{file}: is damaged; start again with --force") from None

@@ -80,8 +80,8 @@ class RecordingFacts:
 
     def to_dict(self) -> dict[str, object]:
         """Return all facts for JSON, those of the pace included."""
-        own = {name: getattr(self, name) for name in RecordingFacts.__slots__ if name != "pace"}
-        return own | {name: getattr(self.pace, name) for name in PaceFacts.__slots__}
+        values = {name: getattr(self, name) for name in RecordingFacts.__slots__ if name != "pace"}
+        return values | {name: getattr(self.pace, name) for name in PaceFacts.__slots__}
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,15 +27,15 @@ def write_captures(path: Path, animals: Sequence[CaptureFile], *, wide: bool = F
             save_capture(part, only)
         else:
             unit = "px" if animals[0].m_per_px is None else "m"
-            tracks = [_track(one) for one in animals]
+            tracks = [_track(animal) for animal in animals]
             write_tracks(part, tracks, path.suffix, wide=wide, unit=unit)
 
 
-def _track(held: CaptureFile) -> Track:
+def _track(capture_file: CaptureFile) -> Track:
     """The track of a captured animal; in pixels without a scale."""
-    if held.m_per_px is None:
-        held = replace(held, m_per_px=1.0)
+    if capture_file.m_per_px is None:
+        capture_file = replace(capture_file, m_per_px=1.0)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "track.npz"
-        save_capture(file, held)
+        save_capture(file, capture_file)
         return load_file(file)

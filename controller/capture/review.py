@@ -29,7 +29,7 @@ _SMALLEST_PX: Final = 320
 _MOST_BYTES: Final = 150_000_000
 """Limit for all pictures together (ours): a browser opens such a page in seconds."""
 _QUALITY: Final = 85
-_WORDS: Final = [str(one) for one in FrameStatus]
+_WORDS: Final = [str(frame_status) for frame_status in FrameStatus]
 
 
 def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
@@ -92,20 +92,20 @@ def review_page(
         "origin": list(origin_px),
         "sizes": sizes,
         "words": _WORDS,
-        "animals": [_of_animal(one, file) for one, file in zip(animals, tracks, strict=True)],
+        "animals": [_of_animal(animal, file) for animal, file in zip(animals, tracks, strict=True)],
         "images": pictures[: len(captured.status)],
     }
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return _TEMPLATE.read_text(encoding="utf-8").replace("__DATA__", text, 1)
 
 
-def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
-    captured = held.captured
+def _of_animal(file: CaptureFile, track: Path) -> dict[str, Any]:
+    captured = file.captured
     corrections = f"{track.stem}-corrections.json"
     corrected = track.with_name(f"{track.stem}-corrected.npz")
     return {
-        "name": held.name,
-        "track": held.fingerprint,
+        "name": file.name,
+        "track": file.fingerprint,
         "corrections": corrections,
         "command": shlex.join(
             [
@@ -120,13 +120,13 @@ def _of_animal(held: CaptureFile, track: Path) -> dict[str, Any]:
             ]
         ),
         "length": round(float(np.nanmedian(captured.length_px)), 2),
-        "status": [_WORDS.index(str(one)) for one in captured.status],
+        "status": [_WORDS.index(str(frame_status)) for frame_status in captured.status],
         "points": [
             np.round(line, 2).ravel().tolist() if np.isfinite(line).all() else None
             for line in captured.points_px
         ],
         "margin": [round(float(m), 3) if np.isfinite(m) else None for m in captured.margin],
-        "unsure_after": list(held.identity_uncertain_after),
+        "unsure_after": list(file.identity_uncertain_after),
     }
 
 

@@ -49,10 +49,10 @@ def scale_of_marker(marker: str, image: Image) -> float:
             "X0,Y0,X1,Y1,METRES for two places in the image"
         )
     if len(numbers) == 5:
-        apart = float(np.hypot(numbers[2] - numbers[0], numbers[3] - numbers[1]))
-        if apart < 1.0:
+        distance_px = float(np.hypot(numbers[2] - numbers[0], numbers[3] - numbers[1]))
+        if distance_px < 1.0:
             raise InputError(f"--marker {marker}: the two places must be apart")
-        return numbers[4] / apart
+        return numbers[4] / distance_px
     sides = _sides(image)
     if not sides:
         raise InputError(f"--marker {marker}: no ArUco or AprilTag marker in the image")

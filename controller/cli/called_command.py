@@ -57,8 +57,8 @@ class CalledCommand(TyperCommand):
                 if order.count(option) > 1 and _takes_one_value(option):
                     fault = f"given {order.count(option)} times, but has one value; leave one"
                     raise typer.BadParameter(fault, ctx=ctx, param=option)
-            for each in self.params:
-                _check_finite(ctx, each)
+            for param in self.params:
+                _check_finite(ctx, param)
         return rest
 
 
@@ -97,9 +97,13 @@ def _check_finite(ctx: Any, parameter: Any) -> None:
     """
     value = ctx.params.get(parameter.name)
     words = (getattr(parameter, "help", None) or "").replace(":", " ").split()
-    for each in value if isinstance(value, list | tuple) else (value,):
-        if isinstance(each, float) and not math.isfinite(each) and f"{abs(each)}" not in words:
-            fault = f"must be a finite number (got {each:g})"
+    for element in value if isinstance(value, list | tuple) else (value,):
+        if (
+            isinstance(element, float)
+            and not math.isfinite(element)
+            and f"{abs(element)}" not in words
+        ):
+            fault = f"must be a finite number (got {element:g})"
             raise typer.BadParameter(fault, ctx=ctx, param=parameter)
 
 
@@ -119,12 +123,14 @@ def called(
     """
     signature = inspect.signature(declared, eval_str=True)
     groups: dict[str, Any] = {
-        name: one.annotation
-        for name, one in signature.parameters.items()
-        if _is_model(one.annotation)
+        name: parameter.annotation
+        for name, parameter in signature.parameters.items()
+        if _is_model(parameter.annotation)
     }
-    given = [each for one in signature.parameters.values() for each in _options(one)]
-    defaults = {one.name: one.default for one in given}
+    given = [
+        option for parameter in signature.parameters.values() for option in _options(parameter)
+    ]
+    defaults = {option.name: option.default for option in given}
     info = command_info(declared)
 
     @wraps(declared)
@@ -157,8 +163,8 @@ def called(
         )
     ]
     paragraphs = (inspect.getdoc(declared) or "").split("\n\n")
-    command.__doc__ = "\n\n".join(" ".join(each.split()) for each in paragraphs)
-    command.__annotations__ = {one.name: one.annotation for one in (*given, *shared)}
+    command.__doc__ = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+    command.__annotations__ = {option.name: option.annotation for option in (*given, *shared)}
     command.__signature__ = signature.replace(parameters=[*given, *shared])  # type: ignore[attr-defined]
     return command
 
@@ -170,7 +176,7 @@ def _is_model(annotation: Any) -> bool:
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
     """Return the options of a parameter: of Typer, of a key's named type, or of a model."""
     kind = given.annotation
-    if any(isinstance(each, ParameterInfo) for each in getattr(kind, "__metadata__", ())):
+    if any(isinstance(metadata, ParameterInfo) for metadata in getattr(kind, "__metadata__", ())):
         return [given.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
     option = _option_module()
     return [*option.parameters(kind)] if _is_model(kind) else [option.key_parameter(given)]

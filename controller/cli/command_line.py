@@ -63,7 +63,7 @@ class CommandGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the words that may follow."""
-        words = dict.fromkeys(_next_word(each, self.prefix) for each in _listed(self.prefix))
+        words = dict.fromkeys(_next_word(plugin, self.prefix) for plugin in _listed(self.prefix))
         return [*words]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
@@ -94,10 +94,10 @@ class CommandGroup(TyperGroup):
     def _suggestion(self, ctx: Any, word: str) -> str:
         """Return the commands of a similar name: those below this prefix, else any other."""
         near = get_close_matches(word, self.list_commands(ctx), 2, 0.7)
-        meant = [f"{self.prefix} {each}".strip() for each in near]
+        meant = [f"{self.prefix} {suggestion}".strip() for suggestion in near]
         if not meant:
-            names = {each.name.split()[-1]: each.name for each in reversed(_listed(""))}
-            meant = [names[each] for each in get_close_matches(word, names, 1, 0.8)]
+            names = {plugin.name.split()[-1]: plugin.name for plugin in reversed(_listed(""))}
+            meant = [names[close_match] for close_match in get_close_matches(word, names, 1, 0.8)]
         return f"; did you mean {' or '.join(meant)}?" if meant else ""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
@@ -152,7 +152,7 @@ class CommandGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Read the words of a command line; a former name of a command becomes the current one."""
-        names = {each.name for each in _listed("")}
+        names = {plugin.name for plugin in _listed("")}
         renamed = None if self.prefix else former_name(args, names)
         if renamed is not None:
             old, new = renamed
@@ -190,43 +190,43 @@ def _print_fault(error: Any) -> None:
 def _listed(prefix: str) -> list[Plugin]:
     """Return the commands below a prefix in the order of ``--help``."""
     commands: dict[str, Plugin] = {}
-    for each in plugins("command"):
-        if not prefix or each.name.startswith(f"{prefix} "):
-            commands.setdefault(each.name, each)
+    for plugin in plugins("command"):
+        if not prefix or plugin.name.startswith(f"{prefix} "):
+            commands.setdefault(plugin.name, plugin)
 
-    def order(each: Plugin) -> tuple[int, str]:
-        first = each.name.split()[0]
-        return _FIRST.index(first) if first in _FIRST else len(_FIRST), each.name
+    def order(plugin: Plugin) -> tuple[int, str]:
+        first = plugin.name.split()[0]
+        return _FIRST.index(first) if first in _FIRST else len(_FIRST), plugin.name
 
     return sorted(commands.values(), key=order)
 
 
-def _panel(each: Plugin) -> str | None:
+def _panel(plugin: Plugin) -> str | None:
     """Return the group of a command, or of its family, in ``--help`` of the first level."""
-    first = each.name.split()[0]
+    first = plugin.name.split()[0]
     if first in _FIRST:
         return EVERY_DAY if first in VERBS else SUBJECTS
-    return each.group or OTHERS
+    return plugin.group or OTHERS
 
 
-def _next_word(each: Plugin, prefix: str) -> str:
-    return each.name.removeprefix(prefix).split()[0]
+def _next_word(plugin: Plugin, prefix: str) -> str:
+    return plugin.name.removeprefix(prefix).split()[0]
 
 
 def _family(path: str, commands: list[Plugin]) -> Any:
     """Return the group of the commands that begin with the same word."""
     about = FAMILIES.get(path, f"Commands of {commands[0].package}")
-    about += f": {', '.join(dict.fromkeys(_next_word(each, path) for each in commands))}."
+    about += f": {', '.join(dict.fromkeys(_next_word(command, path) for command in commands))}."
     group_class = type("Family", (CommandGroup,), {"prefix": path})
     family = typer.Typer(
         cls=group_class, help=about, rich_markup_mode="rich", context_settings=_CONTEXT
     )
     panel = None if " " in path else _panel(commands[0])
     family.callback(no_args_is_help=True, help=about, rich_help_panel=panel)(_nothing)
-    made = typer.main.get_group(family)
-    made.name = path.rsplit(maxsplit=1)[-1]
-    made.rich_help_panel = panel
-    return made
+    group = typer.main.get_group(family)
+    group.name = path.rsplit(maxsplit=1)[-1]
+    group.rich_help_panel = panel
+    return group
 
 
 def _nothing() -> None: ...
@@ -244,9 +244,9 @@ def _full_command(name: str, listed: Plugin) -> Any:
     info = command_info(function)
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich", context_settings=_CONTEXT)
     alone.command(name, cls=CalledCommand, epilog=_examples(info))(called(function, listed.load))
-    made = typer.main.get_command(alone)
-    _group_options(made)
-    return made
+    click_command = typer.main.get_command(alone)
+    _group_options(click_command)
+    return click_command
 
 
 def _group_options(command: Any) -> None:

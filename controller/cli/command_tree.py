@@ -96,5 +96,9 @@ def _below(words: str, names: Collection[str]) -> list[str]:
 
 def _is_argument(rest: Sequence[str], kinds: Sequence[str]) -> bool:
     """Whether words follow that are neither a request for help nor, with an error, a kind."""
-    known = [kind.split()[0] for kind in kinds]
-    return bool(rest) and rest[0] not in ("-h", "--help") and not get_close_matches(rest[0], known)
+    kind_names = [kind.split()[0] for kind in kinds]
+    return (
+        bool(rest)
+        and rest[0] not in ("-h", "--help")
+        and not get_close_matches(rest[0], kind_names)
+    )

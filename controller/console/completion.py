@@ -18,8 +18,10 @@ def names(*kinds: str, files: tuple[str, ...] = (".toml",)) -> Complete:
     """
 
     def complete(incomplete: str) -> list[str]:
-        found = [name for kind in kinds for name in _shipped(kind) if name.startswith(incomplete)]
-        return [*found, *_files(incomplete, files)]
+        shipped_names = [
+            name for kind in kinds for name in _shipped(kind) if name.startswith(incomplete)
+        ]
+        return [*shipped_names, *_files(incomplete, files)]
 
     return complete
 
@@ -54,9 +56,9 @@ def _files(incomplete: str, endings: tuple[str, ...]) -> list[str]:
     if not place.is_dir():
         return []
     return sorted(
-        f"{folder}{slash}{found.name}"
-        for found in place.iterdir()
-        if found.name.startswith(start) and found.suffix in endings and found.is_file()
+        f"{folder}{slash}{path.name}"
+        for path in place.iterdir()
+        if path.name.startswith(start) and path.suffix in endings and path.is_file()
     )
 
 

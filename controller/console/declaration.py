@@ -49,7 +49,7 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
         if node not in needed:
             waiting += _used(node)
         needed.setdefault(node, set()).add(name)
-    for node in sorted(needed, key=lambda each: each.lineno):
+    for node in sorted(needed, key=lambda import_node: import_node.lineno):
         namespace |= _imported(node, needed[node])
         if not isinstance(node, ast.Import | ast.ImportFrom):
             code = ast.fix_missing_locations(ast.Module([node], []))
@@ -60,12 +60,12 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
 def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
     namespace: dict[str, Any] = {}
     if isinstance(node, ast.ImportFrom):
-        needed = [each for each in node.names if (each.asname or each.name) in names]
+        needed = [alias for alias in node.names if (alias.asname or alias.name) in names]
         values = None
         if _COMMANDS in (node.module or ""):
-            values = _names(node.module or "", {each.name for each in needed})
+            values = _names(node.module or "", {alias.name for alias in needed})
         if values is not None:
-            return {each.asname or each.name: values[each.name] for each in needed}
+            return {alias.asname or alias.name: values[alias.name] for alias in needed}
         node = ast.ImportFrom(node.module, needed, node.level)
     if isinstance(node, ast.Import | ast.ImportFrom):
         code = ast.fix_missing_locations(ast.Module([node], []))
@@ -77,18 +77,22 @@ def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
 def _defined(node: ast.stmt) -> Iterator[str]:
     """Yield the names that a statement of a module defines."""
     if isinstance(node, ast.Import | ast.ImportFrom):
-        for each in node.names:
-            yield each.asname or each.name.partition(".")[0]
+        for alias in node.names:
+            yield alias.asname or alias.name.partition(".")[0]
     elif isinstance(node, ast.FunctionDef | ast.ClassDef):
         yield node.name
     elif isinstance(node, ast.Assign | ast.AnnAssign):
         for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
-            yield from (each.id for each in ast.walk(target) if isinstance(each, ast.Name))
+            yield from (
+                target_node.id
+                for target_node in ast.walk(target)
+                if isinstance(target_node, ast.Name)
+            )
 
 
 def _used(node: ast.stmt) -> set[str]:
     return {
-        each.id
-        for each in ast.walk(node)
-        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)
+        used_node.id
+        for used_node in ast.walk(node)
+        if isinstance(used_node, ast.Name) and isinstance(used_node.ctx, ast.Load)
     }

@@ -52,10 +52,10 @@ def _fault(name: str) -> str | None:
             "again"
         )
     try:
-        found = path.stat()
+        facts = path.stat()
     except (OSError, ValueError):
         return None
-    if stat.S_ISCHR(found.st_mode) and _is_terminal(found.st_rdev):
+    if stat.S_ISCHR(facts.st_mode) and _is_terminal(facts.st_rdev):
         return None
     return f"{name}: is not a serial device; name one such as /dev/ttyUSB0"
 

@@ -52,7 +52,7 @@ def shown_subject(
         **{"have": "has", "are": "is", "reply": "replies", "switch": "switches"},
         **{"do not reply": "does not reply", "cannot": "cannot"},
     }
-    one = irregular.get(verb, f"{verb}s")
+    verb_form = irregular.get(verb, f"{verb}s")
     if len(servo_ids) > 1:
         return f"{shown_ids(servo_ids)} {verb}"
-    return f"{shown_ids(servo_ids) if label is None else label(servo_ids[0])} {one}"
+    return f"{shown_ids(servo_ids) if label is None else label(servo_ids[0])} {verb_form}"

@@ -42,21 +42,21 @@ class Pad:
 
     def keys(self, data: bytes) -> list[str]:
         """Key names of ``data``, any number of bytes."""
-        found: list[str] = []
+        pressed: list[str] = []
         data = self._rest + data
-        whole = len(data) - len(data) % _EVENT.size
-        self._rest = data[whole:]
-        for _, value, kind, number in _EVENT.iter_unpack(data[:whole]):
+        complete_bytes = len(data) - len(data) % _EVENT.size
+        self._rest = data[complete_bytes:]
+        for _, value, kind, number in _EVENT.iter_unpack(data[:complete_bytes]):
             if kind & ~_AT_START == _BUTTON and number in DEAD_MAN:
                 (self._down.add if value else self._down.discard)(number)
             elif kind == _BUTTON and value and number in BUTTONS:
-                found.append(BUTTONS[number])
+                pressed.append(BUTTONS[number])
             elif kind & ~_AT_START == _AXIS and number in AXES:
                 side = int(value > _HALF) - int(value < -_HALF)
                 if side and side != self._out.get(number, 0) and not kind & _AT_START:
-                    found.append(AXES[number][side > 0])
+                    pressed.append(AXES[number][side > 0])
                 self._out[number] = side
-        return found
+        return pressed
 
 
 class Gamepad:

@@ -35,18 +35,18 @@ _READS_MAX = 16
 
 def names(text: str) -> list[str]:
     """Names of the keys in terminal characters; arrows are three characters each."""
-    found: list[str] = []
-    at = 0
-    while at < len(text):
-        arrow = _NAMES.get(text[at : at + 3])
-        if arrow is not None and text[at] == "\x1b":
-            found.append(arrow)
-            at += 3
+    keys: list[str] = []
+    position = 0
+    while position < len(text):
+        arrow = _NAMES.get(text[position : position + 3])
+        if arrow is not None and text[position] == "\x1b":
+            keys.append(arrow)
+            position += 3
             continue
-        if text[at] != "\x1b":
-            found.append(_NAMES.get(text[at], text[at]))
-        at += 1
-    return found
+        if text[position] != "\x1b":
+            keys.append(_NAMES.get(text[position], text[position]))
+        position += 1
+    return keys
 
 
 class Keyboard:

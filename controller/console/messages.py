@@ -116,9 +116,9 @@ def stderr_console() -> "Console":
     """Standard error for bars; silent if ``info`` is not shown."""
     from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415  a program starts without it
 
-    screens = [one for one in LOGGER.handlers if isinstance(one, _Screen)]
+    screens = [handler for handler in LOGGER.handlers if isinstance(handler, _Screen)]
     return PlainConsole(
-        stderr=True, emoji=False, quiet=any(one.level > logging.INFO for one in screens)
+        stderr=True, emoji=False, quiet=any(screen.level > logging.INFO for screen in screens)
     )
 
 

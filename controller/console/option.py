@@ -51,12 +51,12 @@ def numbers(form: str, *counts: int) -> BeforeValidator:
         if not isinstance(given, str):
             return given
         try:
-            found = tuple(float(part) for part in given.split(","))
+            values = tuple(float(part) for part in given.split(","))
         except ValueError:
-            found = ()
-        if len(found) not in counts or not all(map(math.isfinite, found)):
+            values = ()
+        if len(values) not in counts or not all(map(math.isfinite, values)):
             raise ValueError(form)
-        return found
+        return values
 
     return BeforeValidator(split)
 
@@ -100,7 +100,7 @@ def from_words(model: type[M], values: Mapping[str, Any]) -> M:
     try:
         return model(**given)
     except ValidationError as error:
-        raise InputError([_fault(model, dict(each)) for each in error.errors()]) from None
+        raise InputError([_fault(model, dict(fault)) for fault in error.errors()]) from None
 
 
 def _pairs(name: str, field: FieldInfo, value: Any) -> Any:
@@ -109,7 +109,7 @@ def _pairs(name: str, field: FieldInfo, value: Any) -> Any:
         return value
     of_text = get_args(field.annotation)[1] is str
     pairs = key_values(_names(name, _flag(field))[0], value)
-    return {key: str(each) if of_text else each for key, each in pairs.items()}
+    return {key: str(item) if of_text else item for key, item in pairs.items()}
 
 
 def _fault(model: type[Strict], fault: dict[str, Any]) -> str:
@@ -127,7 +127,7 @@ def _fault(model: type[Strict], fault: dict[str, Any]) -> str:
 
 
 def _flag(field: FieldInfo) -> Flag:
-    return next((each for each in field.metadata if isinstance(each, Flag)), Flag())
+    return next((metadata for metadata in field.metadata if isinstance(metadata, Flag)), Flag())
 
 
 def _names(name: str, flag: Flag) -> tuple[str, ...]:
@@ -135,7 +135,9 @@ def _names(name: str, flag: Flag) -> tuple[str, ...]:
 
 
 def _typer_info(name: str, field: FieldInfo, kind: Any) -> ParameterInfo:
-    ready = next((each for each in field.metadata if isinstance(each, ParameterInfo)), None)
+    ready = next(
+        (metadata for metadata in field.metadata if isinstance(metadata, ParameterInfo)), None
+    )
     if ready is not None:  # an option that plain signatures share
         return ready
     flag = _flag(field)
@@ -158,7 +160,7 @@ def _typer_info(name: str, field: FieldInfo, kind: Any) -> ParameterInfo:
 
 def _type_of_words(field: FieldInfo) -> Any:
     """Return the type that Typer reads: text for a value with a validator of its words."""
-    if any(isinstance(each, BeforeValidator) for each in field.metadata):
+    if any(isinstance(metadata, BeforeValidator) for metadata in field.metadata):
         return str | None if type(None) in get_args(field.annotation) else str
     if get_origin(field.annotation) is dict:
         return list[str] | None
@@ -171,9 +173,9 @@ def _type_of_words(field: FieldInfo) -> Any:
 def _word(annotation: Any) -> Any:
     if get_origin(annotation) is Annotated:
         inner, *rules = get_args(annotation)
-        return str if any(isinstance(each, BeforeValidator) for each in rules) else _word(inner)
+        return str if any(isinstance(rule, BeforeValidator) for rule in rules) else _word(inner)
     if get_origin(annotation) in {Union, UnionType}:
-        return Union[tuple(_word(each) for each in get_args(annotation))]  # noqa: UP007  a list of types
+        return Union[tuple(_word(arg) for arg in get_args(annotation))]  # noqa: UP007  a list of types
     return str if get_origin(annotation) is tuple else annotation
 
 
@@ -182,5 +184,5 @@ def _default(field: FieldInfo, kind: Any) -> Any:
     if field.default in ((), {}):
         return None
     if kind is str and isinstance(field.default, tuple):
-        return ",".join(f"{each:g}" for each in field.default)
+        return ",".join(f"{number:g}" for number in field.default)
     return field.default

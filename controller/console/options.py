@@ -208,18 +208,18 @@ def check_files(run: str | None, robot: str | None, world: str | None) -> None:
     """
     from snakewalk.config.loader import load_robot, load_run, load_world, place_of  # noqa: PLC0415  --help stays quick
 
-    beside = None
+    parent = None
     if run is not None and run.endswith(".toml"):
-        beside = Path(run).parent
+        parent = Path(run).parent
         given = load_run(run)
         robot = robot or given.robot
         world = world or given.world
         if given.pose is not None:
             require("pose", given.pose.partition(":")[0], place_of(Path(run), "pose"))
     if robot is not None and robot.endswith(".toml"):
-        load_robot(robot, beside)
+        load_robot(robot, parent)
     if world is not None and world.endswith(".toml"):
-        load_world(world, beside)
+        load_world(world, parent)
 
 
 def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) -> None:
@@ -293,7 +293,7 @@ def labelled(key: str, value: object) -> tuple[str, str]:
 
 def _is_number(value: object) -> bool:
     if isinstance(value, list | tuple):
-        return all(_is_number(each) for each in value)
+        return all(_is_number(element) for element in value)
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -304,9 +304,9 @@ def _text(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.{_DIGITS}g}" if abs(value) < 10.0**_DIGITS else f"{value:.0f}"
     if isinstance(value, dict):
-        return ", ".join(" ".join(labelled(key, one)) for key, one in value.items())
+        return ", ".join(" ".join(labelled(key, part)) for key, part in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(_text(one) for one in value)
+        return ", ".join(_text(part) for part in value)
     return "-" if value is None else str(value)
 
 

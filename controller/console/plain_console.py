@@ -24,7 +24,9 @@ class PlainConsole(Console):
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Print objects; a table fits the width."""
-        shown = [_fitted(one, self) if isinstance(one, Table) else one for one in objects]
+        shown = [
+            _fitted(printed, self) if isinstance(printed, Table) else printed for printed in objects
+        ]
         super().print(*shown, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:
@@ -55,11 +57,11 @@ def _fitted(table: Table, console: Console) -> RenderableType:
     total = Measurement.get(console, unlimited, table).maximum
     for sentence in _SENTENCE:
         columns = [_widths(column, console, sentence) for column in table.columns]
-        wanted = sum(most - least for least, most in columns)
-        spare = console.width - total + wanted
+        flexible_width = sum(most - least for least, most in columns)
+        spare = console.width - total + flexible_width
         if spare >= 0:
             for column, (least, most) in zip(table.columns, columns, strict=True):
-                column.width = min(least + spare * (most - least) // max(wanted, 1), most)
+                column.width = min(least + spare * (most - least) // max(flexible_width, 1), most)
                 column.no_wrap = False
             return table
     return _blocks(table)
@@ -70,12 +72,12 @@ def _widths(column: Column, console: Console, sentence: int) -> tuple[int, int]:
     unlimited = console.options.update(width=_UNLIMITED)
     cells = [Measurement.get(console, unlimited, cell) for cell in column.cells]
     head = Measurement.get(console, unlimited, column.header)
-    most = max(each.maximum for each in (head, *cells))
+    most = max(cell.maximum for cell in (head, *cells))
     if column.no_wrap:
         return most, most
     breaks_words = column.overflow == "fold"
     heading = min(head.minimum, _HEAD) if breaks_words else head.minimum
-    readable = [max(each.minimum, min(each.maximum, sentence)) for each in cells]
+    readable = [max(cell.minimum, min(cell.maximum, sentence)) for cell in cells]
     return max(heading, *readable, 1), most
 
 

@@ -89,22 +89,22 @@ class Plugin:
 def plugins(kind: str | None = None) -> tuple[Plugin, ...]:
     """Return all plug-ins, or those of one kind, snakewalk's own first."""
     return tuple(
-        each for each in (*builtin_plugins(), *foreign_plugins()) if kind in (None, each.kind)
+        plugin for plugin in (*builtin_plugins(), *foreign_plugins()) if kind in (None, plugin.kind)
     )
 
 
 def find(kind: str, name: str) -> Plugin | None:
     """Return a plug-in; snakewalk's own have priority."""
     for offered in (builtin_plugins, foreign_plugins):
-        for each in offered():
-            if each.kind == kind and each.name == name:
-                return each
+        for plugin in offered():
+            if plugin.kind == kind and plugin.name == name:
+                return plugin
     return None
 
 
 def names(kind: str) -> list[str]:
     """Return the names of all plug-ins of a kind."""
-    return list(dict.fromkeys(each.name for each in plugins(kind)))
+    return list(dict.fromkeys(plugin.name for plugin in plugins(kind)))
 
 
 def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Plugin:
@@ -116,10 +116,10 @@ def require(kind: str, name: str, option: str, others: Iterable[str] = ()) -> Pl
         InputError: the plug-in does not exist; lists the valid values.
 
     """
-    found = find(kind, name)
-    if found is None:
+    plugin = find(kind, name)
+    if plugin is None:
         raise InputError(unknown(option, name, [*others, *names(kind)]))
-    return found
+    return plugin
 
 
 def unknown(option: str, name: str, valid: Iterable[str]) -> str:
@@ -171,9 +171,9 @@ def take_problems() -> list[str]:
 
 
 def _read(rows: Iterable[tuple[str, ...]], package: str) -> list[Plugin]:
-    found = []
+    declared = []
     for kind, name, about, target, *group in rows:
         if kind not in KINDS:
             raise ValueError(f"unknown kind {kind!r}; valid: {', '.join(KINDS)}")
-        found.append(Plugin(kind, name, about, target, "".join(group), package))
-    return found
+        declared.append(Plugin(kind, name, about, target, "".join(group), package))
+    return declared

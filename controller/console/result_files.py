@@ -183,7 +183,7 @@ def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
 
     """
     logs = [folder / name for name in RUN_FILES[:2] if (folder / name).exists()]
-    if any(one.samefile(log) for one in logs):
+    if any(earlier_log.samefile(log) for earlier_log in logs):
         return
     if logs:
         raise InputError(f"{logs[0]}: is another run's log; give another --out")

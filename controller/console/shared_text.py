@@ -22,9 +22,9 @@ def without_folders(text: str) -> str:
     """
     text = plain(text)
     option, equals, value = text.rpartition("=") if "://" not in text else ("", "", text)
-    whole = _PATH.fullmatch(value)
-    if whole is not None and not any(c in option for c in " /\\"):
-        return option + equals + whole[1]
+    path_match = _PATH.fullmatch(value)
+    if path_match is not None and not any(c in option for c in " /\\"):
+        return option + equals + path_match[1]
     return _FOLDERS.sub("", text)
 
 
@@ -33,7 +33,7 @@ def shared(value: Any) -> Any:
     if isinstance(value, str):
         return without_folders(value)
     if isinstance(value, Mapping):
-        return {without_folders(str(key)): shared(one) for key, one in value.items()}
+        return {without_folders(str(key)): shared(element) for key, element in value.items()}
     if isinstance(value, list | tuple):
-        return [shared(one) for one in value]
+        return [shared(element) for element in value]
     return value

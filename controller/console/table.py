@@ -28,11 +28,11 @@ def read_csv_table(
         text = read_text(path)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
-    whole = text[: text.rfind("\n") + 1]
-    rows = csv.DictReader(io.StringIO(whole))
+    complete_text = text[: text.rfind("\n") + 1]
+    rows = csv.DictReader(io.StringIO(complete_text))
     there = tuple(rows.fieldnames or ())
-    lacking = [each for each in optional if each not in there]
-    if not whole or there != tuple(each for each in columns if each not in lacking):
+    lacking = [column for column in optional if column not in there]
+    if not complete_text or there != tuple(column for column in columns if column not in lacking):
         raise InputError(
             f"{path}: is not a table of `snakewalk {command}` of this version; choose another file"
         )
@@ -70,9 +70,9 @@ class CsvTable:
     def __enter__(self) -> Self:
         """Cut off a torn last line and open for appending."""
         if self._path.exists():
-            whole = self._path.read_bytes()
-            if not whole.endswith(b"\n"):
-                os.truncate(self._path, whole.rfind(b"\n") + 1)
+            content = self._path.read_bytes()
+            if not content.endswith(b"\n"):
+                os.truncate(self._path, content.rfind(b"\n") + 1)
         self._file = self._path.open("a", newline="")
         self._writer = csv.DictWriter(
             self._file, self._columns, restval="", extrasaction="ignore", lineterminator="\n"

@@ -43,11 +43,11 @@ def body_frames(record: RunRecord) -> BodyFrames:
     robot = record.header.robot
     pose = record.pose
     cycle = record.cycle
-    known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
-    if known.any():
-        time_s = pose.time_s[known]
-        head_m = pose.head_m[known]
-        turn = pose.rotation[known]
+    is_known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
+    if is_known.any():
+        time_s = pose.time_s[is_known]
+        head_m = pose.head_m[is_known]
+        turn = pose.rotation[is_known]
     else:
         time_s = cycle.time_s
         head_m = np.zeros((len(time_s), 3))
@@ -88,7 +88,7 @@ def _joints(robot: RobotConfig) -> Iterator[tuple[Floats, Floats]]:
 
 def _at(time_s: Floats, sampled_s: Floats, angle_rad: Floats) -> Floats:
     """(T,) angle at other times; zero where it is never known."""
-    known = np.isfinite(angle_rad)
-    if not known.any():
+    is_known = np.isfinite(angle_rad)
+    if not is_known.any():
         return np.zeros(len(time_s))
-    return np.interp(time_s, sampled_s[known], angle_rad[known])
+    return np.interp(time_s, sampled_s[is_known], angle_rad[is_known])

@@ -108,11 +108,11 @@ def _columns(table: Table, joints: Sequence[str], marks: Sequence[str]) -> dict[
         if column.kind == "points":
             cells = _points(cells, values, 3 if column.shape[1] == ANY else 2)
         elif column.kind == "joints":
-            cells[name] = [" ".join(marks[k] for k in each) for each in values]
+            cells[name] = [" ".join(marks[k] for k in indices) for indices in values]
         elif column.shape:
             flat = values.reshape(len(values), -1)
             names = cell_names(name, column, flat.shape[1], joints)
-            cells |= {each: flat[:, k] for k, each in enumerate(names)}
+            cells |= {column_name: flat[:, k] for k, column_name in enumerate(names)}
         else:
             cells[name] = values
     return cells
@@ -160,7 +160,9 @@ def cell_names(name: str, column: Column, width: int, joints: Sequence[str]) -> 
 def _points(cells: Mapping[str, Cells], lists: Sequence[Floats], width: int) -> dict[str, Cells]:
     """A row for each point, counted from 1 in its list; a point without a height has NaN."""
     counts = [len(points) for points in lists]
-    points = np.concatenate([np.zeros((0, width)), *(_widened(each, width) for each in lists)])
+    points = np.concatenate(
+        [np.zeros((0, width)), *(_widened(row_list, width) for row_list in lists)]
+    )
     return {
         **{name: np.repeat(np.asarray(values), counts) for name, values in cells.items()},
         "number": np.concatenate([np.zeros(0, int), *(np.arange(1, n + 1) for n in counts)]),

@@ -147,7 +147,8 @@ def _others(record: RunRecord) -> Iterator[Row]:
     for table, columns in remaining_fields(record, SHOWN):
         for k, time_s in enumerate(table.time_s.tolist()):
             values = {
-                name: json_value(each, getattr(table, name)[k]) for name, each in columns.items()
+                name: json_value(column, getattr(table, name)[k])
+                for name, column in columns.items()
             }
             yield time_s, table.topic.name, {TIME: time_s, **values}
 
@@ -163,10 +164,10 @@ def _frames(record: RunRecord) -> Iterator[Row]:
                 "timestamp": now,
                 "parent_frame_id": parent,
                 "child_frame_id": name,
-                "translation": _xyz(at),
+                "translation": _xyz(place),
                 "rotation": _quaternion(turn),
             }
-            for parent, name, at, turn in zip(
+            for parent, name, place, turn in zip(
                 frames.parents, frames.names, ats, rotations, strict=True
             )
         ]
@@ -185,8 +186,8 @@ def _imu(record: RunRecord) -> Iterator[Row]:
         floats(readings.quaternion),
         strict=True,
     )
-    for time_s, at, turn in rows:
-        pose = _pose(at, turn)
+    for time_s, place, turn in rows:
+        pose = _pose(place, turn)
         yield time_s, IMU, {"timestamp": _time(time_s), "frame_id": WORLD, "pose": pose}
 
 
@@ -263,7 +264,7 @@ def _ground(record: RunRecord) -> Json:
         "pose": _pose([0.0, 0.0, 0.0], _UPRIGHT),
         "points": _points(corners_m),
         "color": _color(_GROUND[1]),
-        "colors": [_color(one) for one in floats(low + share[:, None] * (high - low))],
+        "colors": [_color(level) for level in floats(low + share[:, None] * (high - low))],
         "indices": faces.ravel().tolist(),
     }
     return _entity("ground", 0.0, triangles=[triangles])
@@ -303,9 +304,9 @@ def _drawn_ground(record: RunRecord) -> HeightField:
     if record.header.ground is not None:
         return record.header.ground
     places = [points[:, :2] for _, points in record.paths] + [record.pose.head_m[:, :2]]
-    seen = np.concatenate([*places, np.zeros((1, 2))])
-    low = np.nanmin(seen, axis=0) - _MARGIN_M
-    size_m = float(np.max(np.nanmax(seen, axis=0) + _MARGIN_M - low))
+    places_m = np.concatenate([*places, np.zeros((1, 2))])
+    low = np.nanmin(places_m, axis=0) - _MARGIN_M
+    size_m = float(np.max(np.nanmax(places_m, axis=0) + _MARGIN_M - low))
     return HeightField(np.zeros((2, 2)), size_m, float(low[0]), float(low[1]))
 
 
@@ -313,11 +314,11 @@ def _waypoints(record: RunRecord, time_s: float, points_m: Floats) -> Json:
     size_m = 2.0 * (number(record.header.plan.waypoint_radius_m) or 0.0)
     spheres = [
         {
-            "pose": _pose(at, _UPRIGHT),
+            "pose": _pose(place, _UPRIGHT),
             "size": _xyz([size_m, size_m, size_m]),
             "color": _color(_WAYPOINT),
         }
-        for at in floats(_on_ground(record, points_m))
+        for place in floats(_on_ground(record, points_m))
     ]
     return _entity("waypoints", time_s, spheres=spheres)
 
@@ -381,8 +382,8 @@ def _quaternion(values: Any) -> Json:
     return {"x": x, "y": y, "z": z, "w": w}
 
 
-def _pose(at: Any, turn: Any) -> Json:
-    return {"position": _xyz(at), "orientation": _quaternion(turn)}
+def _pose(place: Any, turn: Any) -> Json:
+    return {"position": _xyz(place), "orientation": _quaternion(turn)}
 
 
 def _points(values: Floats) -> list[Json]:

@@ -40,8 +40,8 @@ def _is_optional(field: Any) -> bool:
 
 def _field(field: Any) -> Schema:
     if field.message_type is not None:
-        one = _message(field.message_type)
+        message = _message(field.message_type)
     else:
         names = {getattr(field, f"CPPTYPE_{name}"): kind for name, kind in _KINDS.items()}
-        one = {"type": names.get(field.cpp_type, "integer")}
-    return {"type": "array", "items": one} if field.is_repeated else one
+        message = {"type": names.get(field.cpp_type, "integer")}
+    return {"type": "array", "items": message} if field.is_repeated else message

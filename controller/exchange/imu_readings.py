@@ -41,9 +41,9 @@ def imu_readings(record: RunRecord) -> ImuReadings:
     link_m = np.zeros((int(fresh.sum()), 3))
     if len(pose.time_s):
         seen_m = pose.links_m[:, link]
-        known = np.isfinite(seen_m).all(axis=1)
-        for axis in range(3) if known.any() else ():
-            link_m[:, axis] = np.interp(time_s, pose.time_s[known], seen_m[known, axis])
+        is_known = np.isfinite(seen_m).all(axis=1)
+        for axis in range(3) if is_known.any() else ():
+            link_m[:, axis] = np.interp(time_s, pose.time_s[is_known], seen_m[is_known, axis])
     turn = table.rotation[fresh]
     quaternion = Rotation.from_matrix(turn).as_quat() if len(turn) else np.zeros((0, 4))
     return ImuReadings(f"link{link}", time_s, quaternion, table.rate_rad_s[fresh], link_m)

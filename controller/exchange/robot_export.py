@@ -112,11 +112,11 @@ def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -
     )
     for joint, (limit, number, facts, gain) in enumerate(rows):
         senses = facts.measures_current
-        each = ET.SubElement(system, "joint", name=robot.joint_names[joint])
-        command = ET.SubElement(each, "command_interface", name="position")
+        joint_element = ET.SubElement(system, "joint", name=robot.joint_names[joint])
+        command = ET.SubElement(joint_element, "command_interface", name="position")
         _add_params(command, {"min": repr(-limit), "max": repr(limit)})
         for what in ("position", "velocity", *(("effort",) if senses else ())):
-            ET.SubElement(each, "state_interface", name=what)
+            ET.SubElement(joint_element, "state_interface", name=what)
         if kind == "topic":
             continue
         servo = ET.SubElement(system, "gpio", name=f"dxl{number}")
@@ -224,7 +224,7 @@ def _add_friction(
             if geom.get("name", "").startswith("belly"):
                 geom.attrib.update(grip)
         return
-    bodies = {each.get("name"): each for each in root.iter("body")}
+    bodies = {body.get("name"): body for body in root.iter("body")}
     rows = zip(
         robot.link_lengths_m,
         robot.link_radii_m,
@@ -237,8 +237,8 @@ def _add_friction(
             continue
         radius_m = belly_m + _ROLLER_OUT_M
         roller_kg = _ROLLER_SHARE * mass_kg
-        for own in bodies[f"link{link}"].findall("inertial"):
-            own.set("mass", repr(float(own.get("mass", "0")) - roller_kg))
+        for inertial in bodies[f"link{link}"].findall("inertial"):
+            inertial.set("mass", repr(float(inertial.get("mass", "0")) - roller_kg))
         place = f"{0.0 if link == 0 else -0.5 * length_m!r} 0 0"
         roller = ET.SubElement(bodies[f"link{link}"], "body", name=f"roller{link}", pos=place)
         hinge = ET.SubElement(roller, "joint", name=f"roller{link}", axis="0 1 0")
@@ -271,12 +271,12 @@ def _add_dc_motors(root: ET.Element, robot: RobotConfig) -> None:
         constant = math.sqrt(k_t * k_e)
         most_v = robot.servo.supply_v * k_t / constant
         stiff = float(p_gain_per_rad(gain, motor)) * robot.servo.supply_v * k_t / ohm
-        each = ET.SubElement(parent, "dcmotor", name=name, joint=name, input="pos")
-        each.set("motorconst", f"{constant!r} {constant!r}")
-        each.set("resistance", repr(ohm))
-        each.set("controller", f"{stiff!r} 0 {k_t * k_e / ohm!r} 0 0 {most_v!r}")
+        motor_element = ET.SubElement(parent, "dcmotor", name=name, joint=name, input="pos")
+        motor_element.set("motorconst", f"{constant!r} {constant!r}")
+        motor_element.set("resistance", repr(ohm))
+        motor_element.set("controller", f"{stiff!r} 0 {k_t * k_e / ohm!r} 0 0 {most_v!r}")
         if math.isfinite(limit_a):
-            each.set("saturation", f"{k_t * limit_a!r} 0 0")
+            motor_element.set("saturation", f"{k_t * limit_a!r} 0 0")
         hinges[name].set("damping", repr(float(gear.viscous_n_m_s)))
         if gear.dry_n_m:
             hinges[name].set("frictionloss", repr(float(gear.dry_n_m)))

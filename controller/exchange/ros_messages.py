@@ -198,11 +198,11 @@ class RosMessages:
                     child_frame_id=name,
                     transform=self._new(
                         "geometry_msgs/msg/Transform",
-                        translation=self._xyz("Vector3", at),
+                        translation=self._xyz("Vector3", place),
                         rotation=self._quaternion(turn),
                     ),
                 )
-                for parent, name, at, turn in rows
+                for parent, name, place, turn in rows
                 if links or parent == WORLD
             ]
             yield self._row(time_s, FRAMES, TYPES[FRAMES], transforms=transforms)
@@ -214,9 +214,9 @@ class RosMessages:
         frames = body_frames(record)
         world = pose_frame(record.header)
         for k, time_s in enumerate(frames.time_s.tolist()):
-            at = frames.translation_m[k, 0]
+            place = frames.translation_m[k, 0]
             turn = frames.quaternion[k, 0]
-            pose = self._pose(time_s, world, at.tolist(), turn.tolist())
+            pose = self._pose(time_s, world, place.tolist(), turn.tolist())
             yield Row(time_s, HEAD_POSE, TYPES[HEAD_POSE], pose)
 
     def odometry(
@@ -238,11 +238,11 @@ class RosMessages:
         variance = [_variance(position_sd_m)] * 3 + [_variance(heading_sd_rad)] * 3
         nothing = self._xyz("Vector3", [0.0, 0.0, 0.0])
         for k, time_s in enumerate(frames.time_s.tolist()):
-            at = frames.translation_m[k, 0]
+            place = frames.translation_m[k, 0]
             turn = frames.quaternion[k, 0]
             pose = self._new(
                 "geometry_msgs/msg/PoseWithCovariance",
-                pose=self._bare_pose(at.tolist(), turn.tolist()),
+                pose=self._bare_pose(place.tolist(), turn.tolist()),
                 covariance=self._floats(np.diag(variance).ravel()),
             )
             twist = self._new(
@@ -381,17 +381,17 @@ class RosMessages:
         header = self._header(time_s, "")
         return self._row(time_s, DIAGNOSTICS, TYPES[DIAGNOSTICS], header=header, status=status)
 
-    def _pose(self, time_s: float, frame: str, at: list[float], turn: list[float]) -> Any:
+    def _pose(self, time_s: float, frame: str, place: list[float], turn: list[float]) -> Any:
         return self._new(
             TYPES[HEAD_POSE],
             header=self._header(time_s, frame),
-            pose=self._bare_pose(at, turn),
+            pose=self._bare_pose(place, turn),
         )
 
-    def _bare_pose(self, at: list[float], turn: list[float]) -> Any:
+    def _bare_pose(self, place: list[float], turn: list[float]) -> Any:
         return self._new(
             "geometry_msgs/msg/Pose",
-            position=self._xyz("Point", at),
+            position=self._xyz("Point", place),
             orientation=self._quaternion(turn),
         )
 

@@ -56,8 +56,8 @@ def body_map(
     axes.set_xlabel("time (s" + (", rate assumed)" if track.rate_assumed else ")"))
     axes.set_yticks([0.0, 1.0], ["head", "tail"])
     axes.tick_params(axis="y", length=0, colors=GREY)
-    known = values[np.isfinite(values)]
-    beyond = float(np.mean((known < low) | (known > high)))
+    finite_values = values[np.isfinite(values)]
+    beyond = float(np.mean((finite_values < low) | (finite_values > high)))
     colour_bar(figure, image, axes, label if beyond < 0.02 else f"{label} ({beyond:.0%} beyond)")
 
 
@@ -68,7 +68,7 @@ def _thin(rows: Floats) -> Floats:
         return rows
     short = np.full((-len(rows) % size, rows.shape[1]), np.nan)
     blocks = np.concatenate([rows, short]).reshape(-1, size, rows.shape[1])
-    known = np.isfinite(blocks)
-    count = known.sum(axis=1)
-    total = np.where(known, blocks, 0.0).sum(axis=1)
+    is_known = np.isfinite(blocks)
+    count = is_known.sum(axis=1)
+    total = np.where(is_known, blocks, 0.0).sum(axis=1)
     return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))

@@ -109,7 +109,7 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
 def _body(axes: Axes, line: Floats, up: Floats) -> None:
     """Draw a body (L, 2), blue where its back is up, amber where its belly is."""
     pieces = np.stack([line[:-1], line[1:]], axis=1)
-    colours = [BACK_TO_BELLY(0.5 - 0.5 * float(one)) for one in up[:-1]]
+    colours = [BACK_TO_BELLY(0.5 - 0.5 * float(upward_share)) for upward_share in up[:-1]]
     widths = np.linspace(4.5, 2.0, len(pieces)).tolist()
     axes.add_collection(
         LineCollection(list(pieces), colors=colours, linewidths=widths, capstyle="round")

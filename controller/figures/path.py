@@ -36,12 +36,12 @@ def path_figure(record: RunRecord) -> Figure | None:
     _plan(axes, record)
     _bodies(axes, record)
     is_measured = record.header.pose_evidence.is_measured
-    known = "" if is_measured else ", dead-reckoned"
+    evidence = "" if is_measured else ", dead-reckoned"
     axes.plot(
         *pose.centre_m[:, :2].T,
         color=CENTRE,
         linewidth=2.0,
-        label=f"centre of mass{known}",
+        label=f"centre of mass{evidence}",
         linestyle="-" if is_measured else (0, (3, 2)),
     )
     axes.plot(*pose.head_m[:, :2].T, color=HEAD, linewidth=0.9, label="head")
@@ -150,14 +150,14 @@ def _plan(axes: Axes, record: RunRecord) -> None:
 def _bodies(axes: Axes, record: RunRecord) -> None:
     pose = record.pose
     robot = record.header.robot
-    known = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
-    if len(known) == 0:
+    indices = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
+    if len(indices) == 0:
         return
-    along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[known, :2], axis=0, prepend=[[0, 0]]).T))
+    along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[indices, :2], axis=0, prepend=[[0, 0]]).T))
     along_m -= along_m[0]
     count = 1 + max(1, int(along_m[-1] / (_BODY_SPACING * robot.length_m)))
     half_m = 0.5 * robot.link_lengths_m[0], 0.5 * robot.link_lengths_m[-1]
-    chosen = known[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
+    chosen = indices[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
     for k, row in enumerate(chosen):
         strength = 0.25 + 0.6 * k / max(len(chosen) - 1, 1)
         outline = body_outline_m(pose.links_m[row, :, :2], half_m, robot.body_radius_m)

@@ -93,9 +93,9 @@ def thin(
     time_s: Floats, values: Floats, points: int = _POINTS
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, least, mean and largest of every few samples; short series (n,) as they are."""
-    known = np.isfinite(values)
-    time_s = time_s[known]
-    values = values[known]
+    is_known = np.isfinite(values)
+    time_s = time_s[is_known]
+    values = values[is_known]
     size = -(-len(time_s) // points)
     if size < 3:
         return time_s, values, values, values

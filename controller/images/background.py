@@ -68,8 +68,8 @@ def smooth_background(image: DeepImage) -> DeepImage:
     surface = (terms @ fit).reshape(small.shape).astype(np.float32)
     if image.dtype == np.uint8:
         surface = np.clip(surface, 0.0, 255.0)
-    whole = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
-    return as_deep_as(image, whole)
+    smooth_image = cv2.resize(surface, (columns, rows), interpolation=cv2.INTER_LINEAR)
+    return as_deep_as(image, smooth_image)
 
 
 def surrounding_ground(image: DeepImage, polarity: Polarity, side_px: int) -> DeepImage:
@@ -90,18 +90,19 @@ def contrast_polarity(image: DeepImage, background: DeepImage) -> Polarity | Non
     None: nothing stands out by more than noise.
     """
     kind: type[np.int16 | np.float32] = np.int16 if image.dtype == np.uint8 else np.float32
-    apart: NDArray[Any] = image.astype(kind) - background.astype(kind)
-    if apart.ndim == 3:
+    contrast_image: NDArray[Any] = image.astype(kind) - background.astype(kind)
+    if contrast_image.ndim == 3:
         strongest_channel, *others = (
-            np.asarray(cv2.extractChannel(apart, k)) for k in range(apart.shape[2])
+            np.asarray(cv2.extractChannel(contrast_image, k))
+            for k in range(contrast_image.shape[2])
         )
         for other in others:
             stronger = np.abs(other) > np.abs(strongest_channel)
             np.copyto(strongest_channel, other, where=stronger)
-        apart = strongest_channel
-    every = max(1, min(apart.shape) // _SHRUNK_PX)
-    smooth = cv2.GaussianBlur(apart.astype(np.float32), (5, 5), 0.0)
-    smooth = smooth - np.float32(np.median(apart[::every, ::every]))
+        contrast_image = strongest_channel
+    every = max(1, min(contrast_image.shape) // _SHRUNK_PX)
+    smooth = cv2.GaussianBlur(contrast_image.astype(np.float32), (5, 5), 0.0)
+    smooth = smooth - np.float32(np.median(contrast_image[::every, ::every]))
     size = np.abs(smooth)
     few = min(smooth.size // 2, round(_STRONGEST_PX))
     strongest = float(np.partition(size.ravel(), -few)[-few])

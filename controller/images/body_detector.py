@@ -101,17 +101,17 @@ class BodyDetector:
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
         body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
-        found = self._judged(image, background, body)
+        detection = self._judged(image, background, body)
         if self.threshold is not None:
-            return found
+            return detection
         faint = may_have_faint_parts(body)
         if not self.search_faint_parts:
-            return replace(found, may_have_faint_parts=faint)
+            return replace(detection, may_have_faint_parts=faint)
         hidden = body.noise_level > _HIDING * body.threshold
-        part = found.skeleton.status is FrameStatus.PART
-        may_go_on = faint or hidden or part or _is_pointed(found.skeleton)
+        part = detection.skeleton.status is FrameStatus.PART
+        may_go_on = faint or hidden or part or _is_pointed(detection.skeleton)
         tailed = self._with_tails(image, background, body) if may_go_on else None
-        best = found if tailed is None else tailed
+        best = detection if tailed is None else tailed
         if faint:
             fuller = with_faint_parts(image, background, self.polarity, body)
             if fuller is not None:
@@ -120,7 +120,7 @@ class BodyDetector:
                 least = _LONGER if tailed is None else _THAN_TAILED
                 if other.skeleton.length_px > least * length:
                     return replace(other, faint_parts=True, core_threshold=body.threshold)
-        return best if tailed is not None else replace(found, may_have_faint_parts=faint)
+        return best if tailed is not None else replace(detection, may_have_faint_parts=faint)
 
     def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
         if self.inside is not None and body.status is FrameStatus.GOOD:
@@ -159,10 +159,10 @@ class BodyDetector:
         tailed = with_tails(image, background, self.polarity, body, core)
         if tailed is None or tailed.skeleton.length_px < _TAILED * core.length_px:
             return None
-        found = self._checked(image, background, tailed.silhouette, tailed.skeleton)
-        if found.skeleton.status is not FrameStatus.GOOD:
+        checked = self._checked(image, background, tailed.silhouette, tailed.skeleton)
+        if checked.skeleton.status is not FrameStatus.GOOD:
             return None
-        return replace(found, tip_error_px=tailed.tip_error_px)
+        return replace(checked, tip_error_px=tailed.tip_error_px)
 
     def ground_of(self, image: DeepImage) -> DeepImage:
         """Return the background (H, W[, 3]) for a frame."""
@@ -275,16 +275,20 @@ class _Candidate:
 
     @classmethod
     def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
-        found = [detector.detect(frame) for frame in frames]
-        bodies = [one.skeleton for one in found]
-        length = np.array([one.length_px for one in bodies])
+        detections = [detector.detect(frame) for frame in frames]
+        bodies = [detection.skeleton for detection in detections]
+        length = np.array([body.length_px for body in bodies])
         if not np.isfinite(length).any():
             return cls(detector, 0.0, 0.0, 0.0, 0.0, 0.0)
         usual = float(np.nanmedian(length))
         share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
-        width = 2.0 * float(np.nanmedian([np.median(one.radius_px) for one in bodies]))
-        edges = [one.contrast_threshold for one in found if np.isfinite(one.skeleton.length_px)]
-        faint = float(np.mean([one.may_have_faint_parts for one in found]))
+        width = 2.0 * float(np.nanmedian([np.median(body.radius_px) for body in bodies]))
+        edges = [
+            detection.contrast_threshold
+            for detection in detections
+            if np.isfinite(detection.skeleton.length_px)
+        ]
+        faint = float(np.mean([detection.may_have_faint_parts for detection in detections]))
         return cls(detector, share, usual, width, float(np.median(edges)), faint)
 
 
@@ -297,37 +301,42 @@ def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
 
     A part of a body has the same contrast as the whole; a longer, much fainter object is a stain.
     """
-    sure = [one for one in candidates if one.share >= _SURE]
-    strongest = max((one.contrast for one in sure), default=0.0)
-    whole = [one.length_px for one in sure if one.contrast >= _FAINT * strongest]
-    longest = max(whole, default=0.0)
+    sure = [candidate for candidate in candidates if candidate.share >= _SURE]
+    strongest = max((candidate.contrast for candidate in sure), default=0.0)
+    lengths_px = [
+        candidate.length_px for candidate in sure if candidate.contrast >= _FAINT * strongest
+    ]
+    longest = max(lengths_px, default=0.0)
     scores = [
-        one.share * (min(1.0, one.length_px / longest) if longest else 1.0) for one in candidates
+        candidate.share * (min(1.0, candidate.length_px / longest) if longest else 1.0)
+        for candidate in candidates
     ]
     best = max(scores)
     return next(
-        one for one, score in zip(candidates, scores, strict=True) if score >= best - _BETTER
+        candidate
+        for candidate, score in zip(candidates, scores, strict=True)
+        if score >= best - _BETTER
     )
 
 
 def _with_surroundings(
-    surface: BodyDetector, seen: _Candidate, frames: Sequence[DeepImage]
+    surface: BodyDetector, candidate: _Candidate, frames: Sequence[DeepImage]
 ) -> BodyDetector | None:
     """Detector that compares each pixel with its surroundings; None without a polarity."""
     if surface.polarity is Polarity.BOTH:
         return None
     side = min(frames[0].shape[:2])
     tried = [2 * max(2, round(part * side)) + 1 for part in _PARTS]
-    if seen.width_px > 0.0:
-        tried.insert(0, 2 * max(2, round(_WIDTHS * seen.width_px)) + 1)
+    if candidate.width_px > 0.0:
+        tried.insert(0, 2 * max(2, round(_WIDTHS * candidate.width_px)) + 1)
     source = "the surroundings of each place in each frame"
-    found: list[_Candidate] = []
+    candidates: list[_Candidate] = []
     for size in tried:
         detector = replace(surface, background_source=source, surroundings_px=size)
-        found.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
-        if found[-1].share >= _CLEAR:
+        candidates.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
+        if candidates[-1].share >= _CLEAR:
             break
-    return _best(found)
+    return _best(candidates)
 
 
 def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
@@ -362,9 +371,9 @@ def _filled(frame: DeepImage, ground: DeepImage, cover: Image) -> DeepImage:
     The surroundings of a place are lighter than a patterned ground (darker for a light animal), so
     the difference next to the cover is added.
     """
-    beside = cv2.dilate(cover, np.ones((_BESIDE_PX, _BESIDE_PX), np.uint8)) > cover
-    difference = frame[beside].astype(float) - ground[beside]
-    filled = ground[cover > 0] + (np.median(difference, axis=0) if beside.any() else 0.0)
+    is_adjacent = cv2.dilate(cover, np.ones((_BESIDE_PX, _BESIDE_PX), np.uint8)) > cover
+    difference = frame[is_adjacent].astype(float) - ground[is_adjacent]
+    filled = ground[cover > 0] + (np.median(difference, axis=0) if is_adjacent.any() else 0.0)
     out = frame.copy()
     if frame.dtype == np.uint8:
         filled = np.clip(np.rint(filled), 0.0, 255.0)
@@ -396,13 +405,13 @@ def stands_out_both_ways(frames: Sequence[DeepImage]) -> bool:
 def _most_frequent(frames: Sequence[DeepImage], background: DeepImage | None) -> Polarity:
     few = frames[:: max(1, len(frames) // _VOTES)]
     for some in (few, frames):  # the animal may be absent in all of the few
-        found = [
+        polarities = [
             contrast_polarity(frame, smooth_background(frame) if background is None else background)
             for frame in some
         ]
-        if any(found):
+        if any(polarities):
             break
-    return max(Polarity, key=found.count) if any(found) else Polarity.BOTH
+    return max(Polarity, key=polarities.count) if any(polarities) else Polarity.BOTH
 
 
 def _size(image: DeepImage) -> str:

@@ -55,13 +55,13 @@ def sampled_solutions(
         order = np.argsort([_bit_reversed(k) for k in range(number)], kind="stable")
         for chord in least + (most - least) * (order + 0.5) / number:
             limits = np.array([reach * chord, length])
-            found = follow_places(line, arc, chord, limits, steps, excess)
-            for k in np.argsort(np.abs(excess[:found])):
+            place_count = follow_places(line, arc, chord, limits, steps, excess)
+            for k in np.argsort(np.abs(excess[:place_count])):
                 crossing = steps[k].astype(np.int64)
                 bracket = _bracket(chord, float(excess[k]), crossing, segments, residual)
-                at = None if bracket is None else root(bracket)
-                if at is not None:
-                    yield at, crossing
+                place = None if bracket is None else root(bracket)
+                if place is not None:
+                    yield place, crossing
 
 
 def _bit_reversed(number: int) -> int:
@@ -107,7 +107,7 @@ def follow_places(
 
     """
     count = steps.shape[1]
-    at = np.zeros(_KEPT)
+    along = np.zeros(_KEPT)
     piece = np.zeros(_KEPT, dtype=np.int64)
     parent = np.zeros((count, _KEPT), dtype=np.int64)
     taken = np.zeros((count, _KEPT), dtype=np.int8)
@@ -121,7 +121,9 @@ def follow_places(
         number = 0
         for k in range(kept):
             pieces[0] = piece[k]
-            crossings = crossings_ahead(line, arc, chord, at[k] + limits[0], ahead, pieces, at[k])
+            crossings = crossings_ahead(
+                line, arc, chord, along[k] + limits[0], ahead, pieces, along[k]
+            )
             for c in range(crossings):
                 if ahead[c] + (count - 1 - step) * chord > limits[1] + 2.0 * chord:
                     continue  # it ends too far beyond B
@@ -133,14 +135,14 @@ def follow_places(
         order = np.argsort(new_at[:number])
         kept = min(number, _KEPT)
         for k in range(kept):
-            one = order[k * number // kept]
-            at[k], piece[k] = new_at[one], new_piece[one]
-            parent[step, k], taken[step, k] = new_parent[one], new_taken[one]
-    off = np.abs(at[:kept] - limits[1])
+            selected = order[k * number // kept]
+            along[k], piece[k] = new_at[selected], new_piece[selected]
+            parent[step, k], taken[step, k] = new_parent[selected], new_taken[selected]
+    off = np.abs(along[:kept] - limits[1])
     nearest = np.argsort(off)[: len(excess)]
     for row in range(len(nearest)):
         place = nearest[row]
-        excess[row] = at[place] - limits[1]
+        excess[row] = along[place] - limits[1]
         for back in range(count):
             step = count - 1 - back
             steps[row, step] = taken[step, place]

@@ -107,14 +107,14 @@ class BranchSearch:
         for _ in range(_BISECTIONS):
             brackets = _passing(low, high)
             chords = [root(bracket) for bracket in brackets]
-            found = [
+            roots = [
                 (chord, bracket.crossing)
                 for chord, bracket in zip(chords, brackets, strict=True)
                 if chord is not None
             ]
             is_complete = low.is_complete and high.is_complete
-            if found or low.sign_sum == high.sign_sum or not is_complete:
-                return found
+            if roots or low.sign_sum == high.sign_sum or not is_complete:
+                return roots
             middle = self.branches(0.5 * (low.chord + high.chord), reach)
             low, high = (low, middle) if middle.sign_sum != low.sign_sum else (middle, high)
         return []
@@ -133,31 +133,37 @@ _LINE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C'
 
 @compiled(f"int64({_LINE}, float64, float64, float64[::1], int64[::1], float64)")
 def crossings_ahead(
-    line: Floats, arc: Floats, chord: float, end: float, at: Floats, piece: Ints, here: float
+    line: Floats,
+    arc: Floats,
+    chord: float,
+    end: float,
+    along: Floats,
+    piece: Ints,
+    from_along: float,
 ) -> int:
-    """Write the crossings of the circle around the place ``here`` up to ``end``.
+    """Write the crossings of the circle around the place ``from_along`` up to ``end``.
 
     Args:
         line: (M, 2).
         arc: (M,).
         chord: radius of the circle.
         end: arc length after which no piece begins.
-        at: (K,) out: arc length of the crossings, increasing.
-        piece: (K,) in: the piece of ``here`` in the first entry; out: pieces of the crossings.
-        here: arc length of the circle's centre.
+        along: (K,) out: arc length of the crossings, increasing.
+        piece: (K,) in: the piece of ``from_along``, as the first; out: pieces of the crossings.
+        from_along: arc length of the circle's centre.
 
     Returns:
         their number, which is odd: the last one leads out of the circle.
 
     """
     first = piece[0]
-    share = (here - arc[first]) / (arc[first + 1] - arc[first])
+    share = (from_along - arc[first]) / (arc[first + 1] - arc[first])
     px = line[first, 0] + share * (line[first + 1, 0] - line[first, 0])
     py = line[first, 1] + share * (line[first + 1, 1] - line[first, 1])
     count = 0
     j = first
-    while j + 1 < len(line) and count + 1 < len(at) and arc[j] <= end:
-        ax, ay, start = (px, py, here) if j == first else (line[j, 0], line[j, 1], arc[j])
+    while j + 1 < len(line) and count + 1 < len(along) and arc[j] <= end:
+        ax, ay, start = (px, py, from_along) if j == first else (line[j, 0], line[j, 1], arc[j])
         dx, dy = line[j + 1, 0] - ax, line[j + 1, 1] - ay
         a = dx * dx + dy * dy
         if a > 0.0:
@@ -167,7 +173,7 @@ def crossings_ahead(
                 for root in (-np.sqrt(inside), np.sqrt(inside)):
                     t = (root - b) / a
                     if 0.0 < t <= 1.0:
-                        at[count], piece[count] = start + t * np.sqrt(a), j
+                        along[count], piece[count] = start + t * np.sqrt(a), j
                         count += 1
         j += 1
     return count - 1 if count > 0 and count % 2 == 0 else count
@@ -194,7 +200,7 @@ def count_branches(
 
     """
     count = steps.shape[1]
-    at = np.empty((count, _MOST_CROSSINGS))
+    along = np.empty((count, _MOST_CROSSINGS))
     piece = np.zeros((count, _MOST_CROSSINGS), dtype=np.int64)
     number = np.zeros(count, dtype=np.int64)
     turn = np.zeros(count, dtype=np.int64)
@@ -202,7 +208,7 @@ def count_branches(
     branches = 0
     places = 1
     level = 0
-    number[0] = crossings_ahead(line, arc, chord, limits[0], at[0], piece[0], 0.0)
+    number[0] = crossings_ahead(line, arc, chord, limits[0], along[0], piece[0], 0.0)
     while level >= 0 and places <= _MOST_PLACES:
         k = turn[level]
         if k >= number[level]:
@@ -210,16 +216,16 @@ def count_branches(
             if level >= 0:
                 turn[level] += 1
             continue
-        here = at[level, k]
-        if level < count - 1 and here <= limits[1]:
+        along_here = along[level, k]
+        if level < count - 1 and along_here <= limits[1]:
             level += 1
             places += 1
             turn[level], piece[level, 0] = 0, piece[level - 1, k]
             number[level] = crossings_ahead(
-                line, arc, chord, here + limits[0], at[level], piece[level], here
+                line, arc, chord, along_here + limits[0], along[level], piece[level], along_here
             )
             continue
-        rest = here + (count - 1 - level) * chord - limits[1]
+        rest = along_here + (count - 1 - level) * chord - limits[1]
         if rest > 0.0:
             sign_sum += 1 if np.sum(turn[: level + 1]) % 2 == 0 else -1
         if branches < len(excess):

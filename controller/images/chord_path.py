@@ -34,25 +34,25 @@ def follow_chords(curve: Floats, arc: Floats, segments: int, most_steps: int) ->
         most_steps: limit of steps along the path.
 
     """
-    at = np.append(np.arange(1.0, segments + 1.0), 1.0) * (0.5 * arc[1] / segments)
+    along = np.append(np.arange(1.0, segments + 1.0), 1.0) * (0.5 * arc[1] / segments)
     curve = np.ascontiguousarray(curve)
     arc = np.ascontiguousarray(arc)
     piece: Ints = np.zeros(segments, dtype=np.int64)
-    if not follow(curve, arc, at, piece, most_steps):
+    if not follow(curve, arc, along, piece, most_steps):
         return None
-    return np.concatenate([[0.0], at[:-1]])
+    return np.concatenate([[0.0], along[:-1]])
 
 
 @compiled(f"void({_CURVE}, float64[::1], int64[::1], float64[::1], float64[:, ::1])")
 def equations(
-    curve: Floats, arc: Floats, at: Floats, piece: Ints, gap: Floats, slopes: Floats
+    curve: Floats, arc: Floats, along: Floats, piece: Ints, gap: Floats, slopes: Floats
 ) -> None:
     """Write the residuals of the equations, and their slopes.
 
     Args:
         curve: (M, 2).
         arc: (M,).
-        at: (N + 1,) the places and the chord.
+        along: (N + 1,) the places and the chord.
         piece: (N,) index of the piece of each place.
         gap: (N,) out: excess of each chord's length.
         slopes: (N, 2) out: slopes by the previous place and by its own.
@@ -64,11 +64,11 @@ def equations(
         k = piece[i]
         long = arc[k + 1] - arc[k]
         ux, uy = (curve[k + 1, 0] - curve[k, 0]) / long, (curve[k + 1, 1] - curve[k, 1]) / long
-        x = curve[k, 0] + (at[i] - arc[k]) * ux
-        y = curve[k, 1] + (at[i] - arc[k]) * uy
+        x = curve[k, 0] + (along[i] - arc[k]) * ux
+        y = curve[k, 1] + (along[i] - arc[k]) * uy
         size = max(np.hypot(x - px, y - py), 1e-300)
         ex, ey = (x - px) / size, (y - py) / size
-        gap[i] = size - at[count]
+        gap[i] = size - along[count]
         slopes[i, 0], slopes[i, 1] = -(ex * tx + ey * ty), ex * ux + ey * uy
         px, py, tx, ty = x, y, ux, uy
 
@@ -112,15 +112,15 @@ def solve(gap: Floats, slopes: Floats, step: Floats, along: Floats) -> None:
 
 
 @compiled(f"boolean({_CURVE}, float64[::1], int64[::1], int64)")
-def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int) -> bool:  # noqa: C901  a compiled loop
-    """Move ``at`` (N + 1,) along the path until the last place is the end of the curve."""
+def follow(curve: Floats, arc: Floats, places: Floats, piece: Ints, most_steps: int) -> bool:  # noqa: C901  a compiled loop
+    """Move ``places`` (N + 1,) along the path until the last place is the end of the curve."""
     count = len(piece)
     length = arc[-1]
     gap = np.empty(count)
     slopes = np.empty((count, 2))
     step = np.empty(count + 1)
     along = np.empty(count + 1)
-    tangent = at / np.sqrt((at * at).sum())
+    tangent = places / np.sqrt((places * places).sum())
     there = np.empty(count + 1)
     least = np.diff(arc).min()
     reach = 0.05 * length
@@ -131,7 +131,7 @@ def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int)
         place = 0
         for i in range(count):  # distance along the tangent at which a place first reaches a vertex
             if abs(tangent[i]) > 1e-14:
-                far = (arc[piece[i] + (1 if tangent[i] > 0.0 else 0)] - at[i]) / tangent[i]
+                far = (arc[piece[i] + (1 if tangent[i] > 0.0 else 0)] - places[i]) / tangent[i]
                 if far < share:
                     share = far
                     place = i
@@ -140,8 +140,8 @@ def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int)
         size = min(share, reach)
         ahead = tangent[place] > 0.0
         vertex = arc[piece[place] + (1 if ahead else 0)]
-        value = vertex if meets else (tangent * at).sum() + size
-        there[:] = at + size * tangent
+        value = vertex if meets else (tangent * places).sum() + size
+        there[:] = places + size * tangent
         close = False
         for _newton in range(_NEWTON):
             equations(curve, arc, there, piece, gap, slopes)
@@ -162,7 +162,7 @@ def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int)
             reach = 0.5 * size
             continue
         if meets and place == count - 1 and ahead and vertex == length:
-            at[:] = there
+            places[:] = there
             return True
         if meets:
             piece[place] += 1 if ahead else -1
@@ -176,6 +176,6 @@ def follow(curve: Floats, arc: Floats, at: Floats, piece: Ints, most_steps: int)
         if not meets and abs(lead) < _STRAIGHT:
             reach *= 0.5
             continue
-        at[:], tangent[:] = there, along
+        places[:], tangent[:] = there, along
         reach = max(2.0 * reach, least) if meets else 2.0 * reach
     return False

@@ -104,8 +104,8 @@ def _has_blocks(image: Image) -> bool:
     if float(np.median(mean)) > 0.0:
         return bool(mean[-1] > _BLOCKS * np.median(mean[:-1]))
     moved = (steps > 0).astype(np.float32)
-    beside = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
-    alone = ((moved > 0) & (beside < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
+    block_edges = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
+    alone = ((moved > 0) & (block_edges < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
     return bool(alone[-1] > _ALONE * max(float(np.median(alone[:-1])), 1.0))
 
 
@@ -115,7 +115,7 @@ def _quality(image: Image) -> int | None:
     value = value[np.abs(value).max(axis=1) > _NOT_ZERO]
     value = value[:: max(1, len(value) // _MOST_BLOCKS)]
     best = _REGULAR
-    found = None
+    best_quality = None
     for quality in _QUALITIES:
         scale = 5000 // quality if quality < 50 else 200 - 2 * quality
         step = np.clip((_LUMA * scale + 50) // 100, 1, 255).ravel()[1:].astype(np.float32)
@@ -126,8 +126,8 @@ def _quality(image: Image) -> int | None:
         regular = float(np.cos(2.0 * np.pi * some).mean())
         if regular > best:
             best = regular
-            found = quality
-    return found
+            best_quality = quality
+    return best_quality
 
 
 def _grey(image: Image) -> Image:

@@ -17,8 +17,8 @@ def even_line(line: Floats, arc: Floats, step: float) -> Floats:
 
     ``arc`` is from ``arc_lengths``.
     """
-    at = np.arange(0.0, arc[-1], step)
-    return np.column_stack([np.interp(at, arc, column) for column in line.T])
+    stations = np.arange(0.0, arc[-1], step)
+    return np.column_stack([np.interp(stations, arc, column) for column in line.T])
 
 
 def end_direction(line: Floats, back: int) -> Floats:
@@ -36,5 +36,5 @@ def seen_across(path: Floats, level: NDArray[np.float32], across: Floats) -> NDA
     side = np.column_stack([-along[:, 1], along[:, 0]])
     side = side / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
     x, y = np.moveaxis(path[:, None] + across[:, None] * side[:, None], -1, 0).astype(np.float32)
-    seen = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
-    return np.asarray(seen, dtype=np.float32)
+    level_across = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+    return np.asarray(level_across, dtype=np.float32)

@@ -86,17 +86,17 @@ class _Curve:
     def solution(self, chord: float, method: str, crossing: Ints | None = None) -> Equipartition:
         self.residual(chord, crossing)
         points = self.points.copy()
-        at = self.at.copy()
-        points[-1], at[-1] = self.curve[-1], self.length
-        return Equipartition(points, at, chord, method, 1, self.distance(points, at))
+        along = self.at.copy()
+        points[-1], along[-1] = self.curve[-1], self.length
+        return Equipartition(points, along, chord, method, 1, self.distance(points, along))
 
-    def distance(self, points: Floats, at: Floats) -> float:
-        of = np.clip(np.searchsorted(at, self.arc, side="right") - 1, 0, self.segments - 1)
+    def distance(self, points: Floats, along: Floats) -> float:
+        of = np.clip(np.searchsorted(along, self.arc, side="right") - 1, 0, self.segments - 1)
         chord = points[of + 1] - points[of]
         away = self.curve - points[of]
         share = (away * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)
-        apart = np.hypot(*(away - np.clip(share, 0.0, 1.0)[:, None] * chord).T)
-        return float(np.trapezoid(apart, self.arc)) / self.length
+        gap = np.hypot(*(away - np.clip(share, 0.0, 1.0)[:, None] * chord).T)
+        return float(np.trapezoid(gap, self.arc)) / self.length
 
 
 def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
@@ -121,18 +121,20 @@ def equipartition(curve: Floats, segments: int = 100) -> Equipartition:
         if given.least <= TOLERANCE * given.length:
             raise NoEquipartitionError("one chord cannot span a closed curve")
         ends = given.curve[[0, -1]]
-        whole = np.array([0.0, given.length])
-        return Equipartition(ends, whole, given.least, "descent", 1, given.distance(ends, whole))
+        ends_along = np.array([0.0, given.length])
+        return Equipartition(
+            ends, ends_along, given.least, "descent", 1, given.distance(ends, ends_along)
+        )
     if segments == 2:
         return _halves(given)
-    found = _descend(given)
-    if found is not None and _fits(found):
-        return found
-    return _closest(given, found)
+    descent = _descend(given)
+    if descent is not None and _fits(descent):
+        return descent
+    return _closest(given, descent)
 
 
-def _fits(found: Equipartition) -> bool:
-    return float(np.diff(found.at).max()) <= _BENT * found.chord
+def _fits(solution: Equipartition) -> bool:
+    return float(np.diff(solution.at).max()) <= _BENT * solution.chord
 
 
 def _halves(given: _Curve) -> Equipartition:
@@ -142,15 +144,17 @@ def _halves(given: _Curve) -> Equipartition:
     side = ((curve - curve[0]) ** 2 - (curve - curve[-1]) ** 2).sum(axis=1)
     if given.least <= TOLERANCE * given.length:
         side = arc - 0.5 * given.length  # A is B: every point is valid, use the middle
-    found = []
+    solutions = []
     for k in np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0)):
         part = side[k] / (side[k] - side[k + 1])
         points = np.stack([curve[0], curve[k] + part * (curve[k + 1] - curve[k]), curve[-1]])
-        at = np.array([0.0, arc[k] + part * (arc[k + 1] - arc[k]), given.length])
+        along = np.array([0.0, arc[k] + part * (arc[k + 1] - arc[k]), given.length])
         chord = float(np.hypot(*(points[1] - points[0])))
-        found.append(Equipartition(points, at, chord, "bisector", 1, given.distance(points, at)))
-    best = min(found, key=lambda one: one.distance)
-    return replace(best, solutions=len(found))
+        solutions.append(
+            Equipartition(points, along, chord, "bisector", 1, given.distance(points, along))
+        )
+    best = min(solutions, key=lambda solution: solution.distance)
+    return replace(best, solutions=len(solutions))
 
 
 def _descend(given: _Curve) -> Equipartition | None:
@@ -190,32 +194,34 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
     return None
 
 
-def _closest(given: _Curve, known: Equipartition | None) -> Equipartition:  # noqa: C901  a compiled loop
-    found = [] if known is None else [known]
-    for method, crossing in _crossings(given.segments, search=known is None):
+def _closest(given: _Curve, earlier: Equipartition | None) -> Equipartition:  # noqa: C901  a compiled loop
+    solutions = [] if earlier is None else [earlier]
+    for method, crossing in _crossings(given.segments, search=earlier is None):
         for chord in _roots(given, crossing):
-            if all(abs(chord - other.chord) > 1e-7 * given.most for other in found):
-                found.append(given.solution(chord, method, crossing))
-        if method == "later crossing" and found and given.segments > 8:
+            if all(abs(chord - other.chord) > 1e-7 * given.most for other in solutions):
+                solutions.append(given.solution(chord, method, crossing))
+        if method == "later crossing" and solutions and given.segments > 8:
             break
     if given.segments == 3:
         for third in _thirds(given):
-            if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in found):
-                found.append(third)
-    if not found:
-        found = _by_branches(given)
-    if not found:
-        found = _by_sample(given)
-    if not found:
+            if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in solutions):
+                solutions.append(third)
+    if not solutions:
+        solutions = _by_branches(given)
+    if not solutions:
+        solutions = _by_sample(given)
+    if not solutions:
         places = follow_chords(given.curve, given.arc, given.segments, _path_steps(given))
         if places is not None:
-            found.append(_at_places(given, places))
-    if not found:
+            solutions.append(_at_places(given, places))
+    if not solutions:
         raise NoEquipartitionError(
             f"no {given.segments} equal chords on this curve of {len(given.curve)} points"
         )
-    best = min(found, key=lambda one: one.distance)
-    return Equipartition(best.points, best.at, best.chord, best.method, len(found), best.distance)
+    best = min(solutions, key=lambda solution: solution.distance)
+    return Equipartition(
+        best.points, best.at, best.chord, best.method, len(solutions), best.distance
+    )
 
 
 def _by_branches(given: _Curve) -> list[Equipartition]:
@@ -274,28 +280,28 @@ def _thirds(given: _Curve) -> list[Equipartition]:
         corners = np.stack([gap[:-1, :-1], gap[1:, :-1], gap[:-1, 1:], gap[1:, 1:]])
         both &= (corners.min(axis=0) <= 0.0) & (corners.max(axis=0) >= 0.0)
     starts = np.argwhere(both)[:, None] + np.array([[0.5, 0.5], [0.1, 0.9], [0.9, 0.9], [0.1, 0.1]])
-    at = _newton(given, starts.reshape(-1, 2) * (length / _GRID))
-    found: list[Equipartition] = []
-    for s, t in at[np.argsort(at[:, 0])]:
+    along = _newton(given, starts.reshape(-1, 2) * (length / _GRID))
+    solutions: list[Equipartition] = []
+    for s, t in along[np.argsort(along[:, 0])]:
         places = np.array([0.0, s, t, length])
-        if found and np.abs(found[-1].at - places).max() < 1e-6 * length:
+        if solutions and np.abs(solutions[-1].at - places).max() < 1e-6 * length:
             continue
         points = np.stack([np.interp(places, given.arc, column) for column in given.curve.T], -1)
         chord = float(np.hypot(*(points[1] - points[0])))
-        found.append(
+        solutions.append(
             Equipartition(points, places, chord, "two places", 1, given.distance(points, places))
         )
-    return found
+    return solutions
 
 
-def _newton(given: _Curve, at: Floats) -> Floats:
+def _newton(given: _Curve, along: Floats) -> Floats:
     """Newton's method from starts (K, 2); return the solutions."""
     length = given.length
     ends = given.curve[[0, -1]]
     slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
     for _ in range(_NEWTON_STEPS):
-        piece = np.clip(np.searchsorted(given.arc, at, side="right") - 1, 0, len(slope) - 1)
-        place = given.curve[piece] + (at - given.arc[piece])[..., None] * slope[piece]
+        piece = np.clip(np.searchsorted(given.arc, along, side="right") - 1, 0, len(slope) - 1)
+        place = given.curve[piece] + (along - given.arc[piece])[..., None] * slope[piece]
         a, b, c = place[:, 0] - ends[0], place[:, 1] - place[:, 0], ends[1] - place[:, 1]
         u, v = slope[piece[:, 0]], slope[piece[:, 1]]
         f = (a * a).sum(1) - (c * c).sum(1)
@@ -307,10 +313,10 @@ def _newton(given: _Curve, at: Floats) -> Floats:
         step = np.stack([ft * g - gt * f, gs * f - fs * g], axis=1) / size[:, None]
         if np.abs(step).max(initial=0.0) < 1e-14 * length:
             break
-        at = np.clip(at + np.clip(step, -0.02 * length, 0.02 * length), 0.0, length)
+        along = np.clip(along + np.clip(step, -0.02 * length, 0.02 * length), 0.0, length)
     chord = np.stack([np.hypot(*side.T) for side in (a, b, c)])
     equal = np.ptp(chord, axis=0) <= TOLERANCE * length
-    return np.asarray(at[equal & (at[:, 0] < at[:, 1]) & (chord[0] > TOLERANCE * length)])
+    return np.asarray(along[equal & (along[:, 0] < along[:, 1]) & (chord[0] > TOLERANCE * length)])
 
 
 def _crossings(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:
@@ -344,7 +350,7 @@ def _roots(given: _Curve, crossing: Ints) -> Iterator[float]:
     f" {readonly_array('int64', layout='C')}, float64[:, ::1], float64[::1])"
 )
 def march(  # noqa: C901  a compiled loop
-    line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, at: Floats
+    line: Floats, arc: Floats, chord: float, crossing: Ints, points: Floats, along: Floats
 ) -> int:
     """Write the points at distance ``chord`` from one another along ``line``.
 
@@ -354,7 +360,7 @@ def march(  # noqa: C901  a compiled loop
         chord: length of every step.
         crossing: (N,) index of the circle's crossing that each step uses, 0 the first.
         points: (N + 1, 2) out.
-        at: (N + 1,) out: their arc length.
+        along: (N + 1,) out: their arc length.
 
     Returns:
         N, or fewer steps if a crossing does not exist.
@@ -362,15 +368,15 @@ def march(  # noqa: C901  a compiled loop
     """
     px = line[0, 0]
     py = line[0, 1]
-    here = 0.0
-    points[0, 0], points[0, 1], at[0] = px, py, 0.0
+    along_here = 0.0
+    points[0, 0], points[0, 1], along[0] = px, py, 0.0
     piece = 0
     square = chord * chord
     for step in range(crossing.shape[0]):
         left = crossing[step]
-        found = False
+        is_crossing = False
         j = piece
-        while j + 1 < line.shape[0] and not found:
+        while j + 1 < line.shape[0] and not is_crossing:
             ex, ey = line[j + 1, 0] - px, line[j + 1, 1] - py
             if left == 0 and ex * ex + ey * ey < square:
                 # before the first crossing the piece lies inside the circle; a piece of a later
@@ -393,17 +399,17 @@ def march(  # noqa: C901  a compiled loop
                     root = np.sqrt(inside)
                     for side in range(2):
                         t = (-b - root) / a if side == 0 else (-b + root) / a
-                        if low < t <= 1.0 and not found:
+                        if low < t <= 1.0 and not is_crossing:
                             if left > 0:
                                 left -= 1
                                 continue
-                            begin = here if j == piece else arc[j]
-                            here = begin + t * np.sqrt(a)
+                            begin = along_here if j == piece else arc[j]
+                            along_here = begin + t * np.sqrt(a)
                             px, py = ax + t * dx, ay + t * dy
                             piece = j
-                            found = True
+                            is_crossing = True
             j += 1
-        if not found:
+        if not is_crossing:
             return step
-        points[step + 1, 0], points[step + 1, 1], at[step + 1] = px, py, here
+        points[step + 1, 0], points[step + 1, 1], along[step + 1] = px, py, along_here
     return int(crossing.shape[0])

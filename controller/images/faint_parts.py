@@ -31,9 +31,12 @@ def may_have_faint_parts(body: Silhouette) -> bool:
         return True
     if body.status is not FrameStatus.GOOD:
         return False
-    seen = np.array(cv2.boundingRect((body.level > body.noise_level).astype(np.uint8)))
+    level_box = np.array(cv2.boundingRect((body.level > body.noise_level).astype(np.uint8)))
     core = np.array(cv2.boundingRect(body.mask.astype(np.uint8)))
-    before, after = core[:2] - seen[:2], (seen[:2] + seen[2:]) - (core[:2] + core[2:])
+    before, after = (
+        core[:2] - level_box[:2],
+        (level_box[:2] + level_box[2:]) - (core[:2] + core[2:]),
+    )
     return bool(max(before.max(), after.max()) > _BLUR_PX)
 
 
@@ -52,21 +55,21 @@ def with_faint_parts(
         body: the part of most contrast.
 
     """
-    apart = soft_contrast(image, background, polarity)
-    found = connected_parts((apart > body.noise_level).astype(np.uint8))
-    if found is None:
+    contrast_image = soft_contrast(image, background, polarity)
+    parts = connected_parts((contrast_image > body.noise_level).astype(np.uint8))
+    if parts is None:
         return None
-    label, stats = found
+    label, stats = parts
     left, top = (int(v) for v in body.origin_px)
     rows, columns = body.level.shape
     inner = label[top : top + rows, left : left + columns]
-    own = int(np.bincount(inner[body.mask & (inner > 0)], minlength=2).argmax())
-    x, y, wide, high, _ = (int(v) for v in stats[own])
+    core_part = int(np.bincount(inner[body.mask & (inner > 0)], minlength=2).argmax())
+    x, y, wide, high, _ = (int(v) for v in stats[core_part])
     core_box = cv2.boundingRect(body.mask.astype(np.uint8))
-    if own == 0 or max(wide, high) <= max(core_box[2:]) + _BLUR_PX:
+    if core_part == 0 or max(wide, high) <= max(core_box[2:]) + _BLUR_PX:
         return None
     window = (slice(y, y + high), slice(x, x + wide))
-    joined = label[window] == own
+    joined = label[window] == core_part
     core = np.zeros(label.shape, dtype=np.uint8)
     core[top : top + rows, left : left + columns] = body.mask
     thick = 2.0 * float(cv2.distanceTransform(core, cv2.DIST_L2, 5).max())
@@ -74,14 +77,14 @@ def with_faint_parts(
     beyond = joined & (away > _AWAY * thick)
     if np.count_nonzero(beyond) < _MUCH * body.area_px:
         return None
-    middle, _ = noise_of(apart)
+    middle, _ = noise_of(contrast_image)
     depth = np.asarray(cv2.distanceTransform(np.pad(joined, 1).astype(np.uint8), cv2.DIST_L2, 5))
     ridge = (depth >= cv2.dilate(depth, np.ones((3, 3), np.uint8)))[1:-1, 1:-1] & beyond
     if not ridge.any():
         return None
-    faint = float(np.percentile(apart[window][ridge], _TYPICAL)) - middle
+    faint = float(np.percentile(contrast_image[window][ridge], _TYPICAL)) - middle
     threshold = max(middle + 0.5 * faint, body.noise_level)
     if faint < FAINTEST * 2.0 * (body.threshold - middle) or threshold > 0.9 * body.threshold:
         return None
-    flat = np.minimum(apart, 2.0 * threshold).astype(np.float32)
+    flat = np.minimum(contrast_image, 2.0 * threshold).astype(np.float32)
     return cut_out(flat, threshold, body.noise_level, middle, _MARGIN_PX)

@@ -85,29 +85,29 @@ def follow_tail(
     back = max(1, round(_AHEAD_PX * (len(line) - 1) / max(length, 1e-6)))
     ahead = line[-1] - line[max(0, len(line) - 1 - back)]
     angle = float(np.arctan2(ahead[1], ahead[0]))
-    here = line[-1]
+    tip = line[-1]
     points: list[Floats] = []
     clear = [0.0]
     rows, columns = level.shape
     for _ in range(round(_MOST * length)):
         ways = angle + _FAN_RAD * _FAN
-        seen = _ridge(level, np.broadcast_to(here, (len(ways), 2)), ways, half) / noise
-        best = int(np.argmax(seen - np.abs(_FAN)))
+        ridge_levels = _ridge(level, np.broadcast_to(tip, (len(ways), 2)), ways, half) / noise
+        best = int(np.argmax(ridge_levels - np.abs(_FAN)))
         ahead_px = 1.0
-        if seen[best] < _CLEAR:
+        if ridge_levels[best] < _CLEAR:
             # a ray that only begins on the tail is as clear as its part on the tail is long
             usual = float(np.mean(clear[-_AVERAGED:]))
-            ahead_px = _AHEAD_PX * min(1.0, float(seen[best]) / max(usual, _CLEAR))
+            ahead_px = _AHEAD_PX * min(1.0, float(ridge_levels[best]) / max(usual, _CLEAR))
         angle += float(np.clip(_FAN_RAD * _FAN[best], -1.0 / _RADIUS_PX, 1.0 / _RADIUS_PX))
         unit = np.array([np.cos(angle), np.sin(angle)])
-        if seen[best] < _CLEAR:
-            points.extend(here + k * unit for k in np.arange(1.0, ahead_px + 0.5))
+        if ridge_levels[best] < _CLEAR:
+            points.extend(tip + k * unit for k in np.arange(1.0, ahead_px + 0.5))
             break
-        here = here + unit
-        if not (0.0 <= here[0] < columns and 0.0 <= here[1] < rows):
+        tip = tip + unit
+        if not (0.0 <= tip[0] < columns and 0.0 <= tip[1] < rows):
             break
-        points.append(here)
-        clear.append(float(seen[best]))
+        points.append(tip)
+        clear.append(float(ridge_levels[best]))
     if len(clear) - 1 < _LEAST_PX or _returns(np.array(points), away_px):
         return None
     clearness = float(np.median(clear[1:]))
@@ -122,13 +122,13 @@ def _ridge(level: NDArray[np.float32], start: Floats, ways: Floats, half: float)
     unit = np.column_stack([np.cos(ways), np.sin(ways)])
     side = np.column_stack([-unit[:, 1], unit[:, 0]])
     middle = start[:, None] + along[None, :, None] * unit[:, None]
-    beside = half + _BESIDE_PX
-    across = np.array([-0.5 * half, 0.0, 0.5 * half, -beside, beside])
+    ring = half + _BESIDE_PX
+    across = np.array([-0.5 * half, 0.0, 0.5 * half, -ring, ring])
     places = middle[:, :, None] + across[:, None] * side[:, None, None]
     x, y = np.moveaxis(places.reshape(len(ways), -1, 2), -1, 0).astype(np.float32)
     shown = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    seen = np.asarray(shown, dtype=float).reshape(places.shape[:-1]).mean(axis=1)
-    return np.asarray(seen[:, :3].mean(axis=1) - seen[:, 3:].max(axis=1))
+    shown_level = np.asarray(shown, dtype=float).reshape(places.shape[:-1]).mean(axis=1)
+    return np.asarray(shown_level[:, :3].mean(axis=1) - shown_level[:, 3:].max(axis=1))
 
 
 def _returns(points: Floats, away_px: Floats) -> bool:
@@ -146,12 +146,16 @@ def _noise(level: NDArray[np.float32], half: float, free: Bools) -> float | None
         return None
     some = np.linspace(0, len(x) - 1, _SAMPLES).round().astype(int)
     ways = np.linspace(0.0, 12.0 * np.pi, _SAMPLES)
-    seen = _ridge(level, np.column_stack([x[some], y[some]]).astype(float), ways, half)
-    return float(1.4826 * np.median(np.abs(seen - np.median(seen))))
+    ridge = _ridge(level, np.column_stack([x[some], y[some]]).astype(float), ways, half)
+    return float(1.4826 * np.median(np.abs(ridge - np.median(ridge))))
 
 
 def with_tails(
-    image: DeepImage, background: DeepImage, polarity: Polarity, body: Silhouette, found: Skeleton
+    image: DeepImage,
+    background: DeepImage,
+    polarity: Polarity,
+    body: Silhouette,
+    body_skeleton: Skeleton,
 ) -> TailedBody | None:
     """Return the body with the faint tail beyond either end; None if nothing goes on there.
 
@@ -160,10 +164,10 @@ def with_tails(
         background: the same without the animal.
         polarity: whether the animal is darker or lighter than its ground.
         body: the part above half of the contrast.
-        found: its skeleton.
+        body_skeleton: its skeleton.
 
     """
-    around = round(_AROUND * found.length_px) + _MARGIN_PX
+    around = round(_AROUND * body_skeleton.length_px) + _MARGIN_PX
     rows, columns = body.level.shape
     left, top = (int(v) for v in body.origin_px)
     x, y = max(0, left - around), max(0, top - around)
@@ -174,7 +178,7 @@ def with_tails(
     mask[inner] = body.mask
     away_px = np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5), dtype=float)
     faintest = 2.0 * FAINTEST * body.threshold
-    line, radius = found.points_px - [x, y], found.radius_px
+    line, radius = body_skeleton.points_px - [x, y], body_skeleton.radius_px
     clearness, added = [], []
     for _ in range(2):
         end = float(np.median(radius[-_END_STATIONS:]))
@@ -198,14 +202,14 @@ def with_tails(
     skeleton = Skeleton(
         even.points + np.array([x, y]), np.interp(shares, arc, radius), length, FrameStatus.GOOD
     )
-    own = np.zeros(level.shape, dtype=np.float32)
-    own[inner] = body.level
+    body_level = np.zeros(level.shape, dtype=np.float32)
+    body_level[inner] = body.level
     for points in added:
         cv2.polylines(
             mask, [np.rint(points).astype(np.int32)], isClosed=False, color=2, thickness=3
         )
-    own[mask == 2] = np.maximum(own[mask == 2], _DRAWN * body.threshold)
-    area = float(np.count_nonzero(own > body.threshold))
-    silhouette = replace(body, level=own, origin_px=(float(x), float(y)), area_px=area)
+    body_level[mask == 2] = np.maximum(body_level[mask == 2], _DRAWN * body.threshold)
+    area = float(np.count_nonzero(body_level > body.threshold))
+    silhouette = replace(body, level=body_level, origin_px=(float(x), float(y)), area_px=area)
     error = _TIP * _AHEAD_PX / min(clearness)
     return TailedBody(silhouette, skeleton, error)

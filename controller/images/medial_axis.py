@@ -168,10 +168,10 @@ def _fitted_line(
     uniform = float(depth.max()) < _UNIFORM * WORKING_WIDTH
     if not uniform and width >= _UNSURE_PX:
         return line
-    found = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
-    if found is None:
+    fitted_line = fitted((line - _MARGIN + 0.5) / step - 0.5, level, width)
+    if fitted_line is None:
         return None if width < _UNSURE_PX else line
-    return (found[0] + 0.5) * step - 0.5 + _MARGIN
+    return (fitted_line[0] + 0.5) * step - 0.5 + _MARGIN
 
 
 def _in_segments(
@@ -187,9 +187,9 @@ def _in_segments(
     except (NoEquipartitionError, ValueError):
         return no_skeleton(FrameStatus.BLOB)
     radius = _sample(depth, even.points) / step
-    for one in heads:
-        within = np.hypot(*(even.points - one.place).T) < one.length
-        radius[within] = np.maximum(radius[within], one.deep / step)
+    for head in heads:
+        within = np.hypot(*(even.points - head.place).T) < head.length
+        radius[within] = np.maximum(radius[within], head.deep / step)
     points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
     return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
 
@@ -313,10 +313,10 @@ def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
         part = np.clip((high - threshold) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         reach.append(np.where(last > 0, out[last] - 0.5 + 0.5 * part, np.nan))
     off = 0.5 * (reach[0] - reach[1])
-    known = np.flatnonzero(np.abs(off) < 0.25 * WORKING_WIDTH)
-    if not known.size:
+    central = np.flatnonzero(np.abs(off) < 0.25 * WORKING_WIDTH)
+    if not central.size:
         return line
-    off = np.interp(np.arange(len(line)), known, off[known])
+    off = np.interp(np.arange(len(line)), central, off[central])
     return np.asarray(line + gaussian_filter1d(off, _SMOOTH, mode="nearest")[:, None] * side)
 
 
@@ -325,25 +325,25 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
     ahead = end[-1] - end[0]
     first = ahead = ahead / np.hypot(*ahead)
     across = np.linspace(-0.5, 0.5, 15) * WORKING_WIDTH
-    here = end[-1]
-    found = []
+    tip = end[-1]
+    tips = []
     last = threshold
     for _ in range(round(4.0 * WORKING_WIDTH)):
-        there = here + ahead
+        there = tip + ahead
         side = np.array([-ahead[1], ahead[0]])
         level = _sample(fine, np.vstack([there, there + across[:, None] * side]))
         if level[0] <= threshold:
             part = (last - threshold) / max(last - level[0], 1e-6)
-            found.append(here + float(np.clip(part, 0.0, 1.0)) * ahead)
+            tips.append(tip + float(np.clip(part, 0.0, 1.0)) * ahead)
             break
         last = float(level[0])
         weight = np.maximum(level[1:] - threshold, 0.0)
         off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
         turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
         ahead = _bounded(turned, first)
-        here = there + 0.5 * _TURN_GAIN * off * side
-        found.append(here)
-    return np.asarray(found)
+        tip = there + 0.5 * _TURN_GAIN * off * side
+        tips.append(tip)
+    return np.asarray(tips)
 
 
 def _bounded(turned: Floats, first: Floats) -> Floats:
@@ -358,7 +358,7 @@ def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
     """Interpolate at points (..., 2), one or two leading axes; 0 outside."""
     rows = points if points.ndim == 3 else points[:, None]
     x, y = np.ascontiguousarray(np.moveaxis(rows, -1, 0), dtype=np.float32)
-    found = cv2.remap(
+    samples = cv2.remap(
         np.asarray(image, dtype=np.float32),
         x,
         y,
@@ -366,7 +366,7 @@ def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
         borderMode=cv2.BORDER_CONSTANT,
         borderValue=0,
     )
-    return np.asarray(found, dtype=float).reshape(points.shape[:-1])
+    return np.asarray(samples, dtype=float).reshape(points.shape[:-1])
 
 
 def _largest(mask: Bools) -> Image | None:
@@ -403,8 +403,8 @@ def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
         walk_line(place, flat, wide, np.asarray(start), length, before)
         return length, before
 
-    one, _ = paths_from([0])
-    far, before = paths_from([int(np.argmax(one))])
+    lengths, _ = paths_from([0])
+    far, before = paths_from([int(np.argmax(lengths))])
     chain = [int(np.argmax(far))]
     while before[chain[-1]] >= 0:
         chain.append(int(before[chain[-1]]))
@@ -437,14 +437,14 @@ def walk_line(
         length[start[k]] = 0.0
     slanted = 2.0**0.5
     sides = (1, -1, wide, -wide, wide + 1, wide - 1, -wide + 1, -wide - 1)
-    at = 0
-    while at < count:
-        here = front[at]
-        at += 1
+    index = 0
+    while index < count:
+        node = front[index]
+        index += 1
         for side in range(8):
-            other = place[flat[here] + sides[side]]
+            other = place[flat[node] + sides[side]]
             if other >= 0 and length[other] < 0.0:
-                length[other] = length[here] + (1.0 if side < 4 else slanted)
-                before[other] = here
+                length[other] = length[node] + (1.0 if side < 4 else slanted)
+                before[other] = node
                 front[count] = other
                 count += 1

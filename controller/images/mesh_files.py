@@ -124,8 +124,10 @@ def _unpacked_glb(file: Path) -> int:
 
 
 def _check_pictures(file: Path, scene: Any) -> None:
-    found = {id(p): p for g in scene.geometry.values() if (p := _picture_of(g.visual)) is not None}
-    pixels = sum(picture.width * picture.height for picture in found.values())
+    pictures = {
+        id(p): p for g in scene.geometry.values() if (p := _picture_of(g.visual)) is not None
+    }
+    pixels = sum(picture.width * picture.height for picture in pictures.values())
     if pixels > MOST_PIXELS:
         raise InputError(
             f"{file}: its pictures have {pixels / 1e6:.0f} million pixels; at most "

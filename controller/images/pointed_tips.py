@@ -91,6 +91,6 @@ def _sums(path: Floats, level: NDArray[np.float32], wide: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
     reach = round(_ACROSS * wide)
     across = np.arange(-reach, reach + 1.0)
-    seen = seen_across(path, level, across)
-    ground = np.median(seen[:, np.abs(across) > _RIM * wide])
-    return np.asarray((seen - ground).sum(axis=1), dtype=float)
+    levels = seen_across(path, level, across)
+    ground = np.median(levels[:, np.abs(across) > _RIM * wide])
+    return np.asarray((levels - ground).sum(axis=1), dtype=float)

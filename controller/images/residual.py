@@ -45,11 +45,11 @@ def check_residual(
     left, top = (int(v) for v in silhouette.origin_px)
     low_x, low_y = max(0, left - around), max(0, top - around)
     window = (slice(low_y, top + rows + around), slice(low_x, left + columns + around))
-    seen = image[window]
+    window_image = image[window]
     ground = background[window]
-    body = np.zeros(seen.shape[:2], dtype=bool)
+    body = np.zeros(window_image.shape[:2], dtype=bool)
     body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
-    same = _soft(contrast(seen, ground, polarity))
+    same = _soft(contrast(window_image, ground, polarity))
     level = 2.0 * silhouette.threshold
     mass = float(same[body].sum())
     least = max(silhouette.noise_level, _WEAK * level)
@@ -58,7 +58,7 @@ def check_residual(
         return FrameStatus.PART
     if ghosts and polarity is not Polarity.BOTH:
         least = max(silhouette.noise_level, _GHOST_WEAK * level)
-        if _ghost(seen, ground, polarity, body, wide, least) > _GHOST * mass:
+        if _ghost(window_image, ground, polarity, body, wide, least) > _GHOST * mass:
             return FrameStatus.GHOST
     return FrameStatus.GOOD
 
@@ -75,22 +75,27 @@ def is_ghost(image: DeepImage, background: DeepImage, silhouette: Silhouette) ->
     body = silhouette.mask.astype(np.uint8)
     box = np.ones((3, 3), dtype=np.uint8)
     outline = cv2.dilate(body, box) != cv2.erode(body, box)
-    own, other = _gradient(image[window], outline), _gradient(background[window], outline)
-    apart = own - other
-    return float((own * apart).sum()) < _EDGES * float((apart * apart).sum())
+    outline_gradient, other = (
+        _gradient(image[window], outline),
+        _gradient(background[window], outline),
+    )
+    difference = outline_gradient - other
+    return float((outline_gradient * difference).sum()) < _EDGES * float(
+        (difference * difference).sum()
+    )
 
 
 def _gradient(image: DeepImage, places: Bools) -> Floats:
     """(2, P[, C]) slopes along x and y at some places (H, W), with single-pixel noise averaged."""
     grey = cv2.GaussianBlur(np.asarray(image, dtype=np.float32), (3, 3), 0.0)
-    slopes = [cv2.Sobel(grey, cv2.CV_32F, *way)[places] for way in ((1, 0), (0, 1))]
+    slopes = [cv2.Sobel(grey, cv2.CV_32F, *order)[places] for order in ((1, 0), (0, 1))]
     return np.asarray(slopes, dtype=float)
 
 
 def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
     """Summed contrast of residuals that start at a tip and lead away from the body."""
-    apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
-    rest = (same > least) & (apart > 1.5)
+    distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
+    rest = (same > least) & (distance_px > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
     if count < 2:
         return 0.0
@@ -99,25 +104,30 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
     near = np.zeros(count, dtype=bool)
     for tip in tips:
         near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR * wide + 2.0]] = True
-    away = rest & (apart > _AWAY * wide)
+    away = rest & (distance_px > _AWAY * wide)
     return float(same[away & near[label]].sum())
 
 
 def _ghost(
-    seen: DeepImage, ground: DeepImage, polarity: Polarity, body: Bools, wide: float, least: float
+    window_image: DeepImage,
+    ground: DeepImage,
+    polarity: Polarity,
+    body: Bools,
+    wide: float,
+    least: float,
 ) -> float:
     """Summed contrast of the wrong sign next to the body, if the ground shows a similar shape."""
     opposite = Polarity.LIGHT if polarity is Polarity.DARK else Polarity.DARK
-    wrong = _soft(contrast(seen, ground, opposite))
+    wrong = _soft(contrast(window_image, ground, opposite))
     side = 2 * round(1.5 * wide) + 3
-    own = contrast(ground, surrounding_ground(ground, polarity, side), polarity)
-    apart = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
-    shown = (wrong > least) & (_soft(own) > least) & (apart > 1.5)
+    ground_contrast = contrast(ground, surrounding_ground(ground, polarity, side), polarity)
+    distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
+    shown = (wrong > least) & (_soft(ground_contrast) > least) & (distance_px > 1.5)
     count, label = cv2.connectedComponents(shown.astype(np.uint8), connectivity=8)
     near = np.zeros(count, dtype=bool)
-    near[label[shown & (apart < wide)]] = True
+    near[label[shown & (distance_px < wide)]] = True
     return float(wrong[shown & near[label]].sum())
 
 
-def _soft(apart: DeepImage) -> DeepImage:
-    return as_deep_as(apart, cv2.GaussianBlur(apart, (3, 3), 0.0))
+def _soft(contrast_image: DeepImage) -> DeepImage:
+    return as_deep_as(contrast_image, cv2.GaussianBlur(contrast_image, (3, 3), 0.0))

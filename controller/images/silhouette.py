@@ -62,15 +62,17 @@ def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:
 def contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
     """(H, W) contrast of each pixel; the strongest channel of a colour image."""
     if polarity is Polarity.BOTH:
-        apart = cv2.absdiff(image, background)
+        contrast_image = cv2.absdiff(image, background)
     elif polarity is Polarity.DARK:
-        apart = cv2.subtract(background, image)
+        contrast_image = cv2.subtract(background, image)
     else:
-        apart = cv2.subtract(image, background)
-    if apart.ndim == 3:
-        one, two, three = (cv2.extractChannel(apart, k) for k in range(3))
-        apart = cv2.max(cv2.max(one, two, dst=one), three, dst=one)
-    return np.asarray(np.maximum(apart, 0) if apart.dtype == np.float32 else apart)
+        contrast_image = cv2.subtract(image, background)
+    if contrast_image.ndim == 3:
+        blue, two, three = (cv2.extractChannel(contrast_image, k) for k in range(3))
+        contrast_image = cv2.max(cv2.max(blue, two, dst=blue), three, dst=blue)
+    return np.asarray(
+        np.maximum(contrast_image, 0) if contrast_image.dtype == np.float32 else contrast_image
+    )
 
 
 def soft_contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -> DeepImage:
@@ -78,10 +80,10 @@ def soft_contrast(image: DeepImage, background: DeepImage, polarity: Polarity) -
     return as_deep_as(image, cv2.GaussianBlur(contrast(image, background, polarity), (3, 3), 0.0))
 
 
-def noise_of(apart: DeepImage) -> tuple[float, float]:
+def noise_of(contrast_image: DeepImage) -> tuple[float, float]:
     """Median and spread of the background's contrast, from every n-th pixel."""
-    every = max(1, min(apart.shape) // _SHRUNK_PX + 1)
-    some = apart[::every, ::every].ravel()
+    every = max(1, min(contrast_image.shape) // _SHRUNK_PX + 1)
+    some = contrast_image[::every, ::every].ravel()
     middle = float(np.median(some))
     above = some[some >= middle].astype(float) - middle
     return middle, float(1.4826 * np.median(above)) + 0.5
@@ -106,29 +108,29 @@ def silhouette_of(
 
     """
     margin = _WIDE_MARGIN if wide_margin else _MARGIN
-    apart = soft_contrast(image, background, polarity)
-    middle, spread = noise_of(apart)
+    contrast_image = soft_contrast(image, background, polarity)
+    middle, spread = noise_of(contrast_image)
     clear = middle + _CLEAR * spread
     if threshold is not None:
-        return cut_out(apart, threshold, min(clear, threshold), middle, margin)
-    found = connected_parts((apart > clear).astype(np.uint8))
-    if found is None:
+        return cut_out(contrast_image, threshold, min(clear, threshold), middle, margin)
+    parts = connected_parts((contrast_image > clear).astype(np.uint8))
+    if parts is None:
         return _no_silhouette()
-    threshold = _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
-    return cut_out(apart, threshold, clear, middle, margin)
+    threshold = _threshold_of_body(contrast_image, *parts, middle, middle + 3.0 * spread)
+    return cut_out(contrast_image, threshold, clear, middle, margin)
 
 
-def body_threshold(apart: DeepImage) -> float | None:
+def body_threshold(contrast_image: DeepImage) -> float | None:
     """Half of the strongest body's contrast, from a contrast (H, W); None: no body."""
-    middle, spread = noise_of(apart)
-    found = connected_parts((apart > middle + _CLEAR * spread).astype(np.uint8))
-    if found is None:
+    middle, spread = noise_of(contrast_image)
+    parts = connected_parts((contrast_image > middle + _CLEAR * spread).astype(np.uint8))
+    if parts is None:
         return None
-    return _threshold_of_body(apart, *found, middle, middle + 3.0 * spread)
+    return _threshold_of_body(contrast_image, *parts, middle, middle + 3.0 * spread)
 
 
 def _threshold_of_body(
-    apart: DeepImage,
+    contrast_image: DeepImage,
     label: NDArray[np.int32],
     stats: NDArray[np.int32],
     middle: float,
@@ -140,7 +142,7 @@ def _threshold_of_body(
     is fainter than half of its strong pixels, its contrast is a percentile weighted by squared
     contrast. The sum counts pixels above half of the part's contrast.
     """
-    strength = np.maximum(apart.astype(np.float32) - middle, 0.0)
+    strength = np.maximum(contrast_image.astype(np.float32) - middle, 0.0)
     inside = label > 0
     squares = np.bincount(label[inside], weights=strength[inside] ** 2, minlength=len(stats))
     best = least
@@ -150,14 +152,14 @@ def _threshold_of_body(
             break
         left, top, wide, high, _ = (int(v) for v in stats[part])
         window = (slice(top, top + high), slice(left, left + wide))
-        own = np.sort(strength[window][label[window] == part])
-        weight = np.cumsum(own**2)
-        level = float(own[np.searchsorted(weight, _SHARE * weight[-1])])
-        usual = float(np.percentile(own, 70))
+        body_strength = np.sort(strength[window][label[window] == part])
+        weight = np.cumsum(body_strength**2)
+        level = float(body_strength[np.searchsorted(weight, _SHARE * weight[-1])])
+        usual = float(np.percentile(body_strength, 70))
         if usual > 0.5 * level:
             level = usual
         threshold = max(middle + 0.5 * level, least)
-        mass = float(own[own > threshold - middle].sum())
+        mass = float(body_strength[body_strength > threshold - middle].sum())
         if mass > most:
             best = threshold
             most = mass
@@ -186,22 +188,22 @@ def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int3
 
 
 def cut_out(
-    apart: DeepImage, threshold: float, noise_level: float, middle: float, most_px: int
+    contrast_image: DeepImage, threshold: float, noise_level: float, middle: float, most_px: int
 ) -> Silhouette:
     """Cut out the body of most contrast above the threshold; its status is whether alone and whole.
 
     The margin is ``most_px`` if more than noise reaches the edge, else a few pixels.
     """
-    above = apart > threshold
-    found = connected_parts(above.astype(np.uint8))
-    if found is None:
+    above = contrast_image > threshold
+    parts = connected_parts(above.astype(np.uint8))
+    if parts is None:
         return _no_silhouette()
-    label, stats = found
+    label, stats = parts
     areas = stats[1:, cv2.CC_STAT_AREA]
-    sums = np.bincount(label[above], weights=apart[above] - np.float32(middle))
+    sums = np.bincount(label[above], weights=contrast_image[above] - np.float32(middle))
     best = 1 + int(np.argmax(sums[1:]))
     left, top, wide, high, area = (int(v) for v in stats[best])
-    rows, columns = apart.shape
+    rows, columns = contrast_image.shape
     status = FrameStatus.GOOD
     distractors = float(np.delete(areas, best - 1).max(initial=0)) / area
     if distractors > _RIVAL:
@@ -213,7 +215,7 @@ def cut_out(
             slice(max(0, top - margin), min(rows, top + high + margin)),
             slice(max(0, left - margin), min(columns, left + wide + margin)),
         )
-        level = apart[window].astype(np.float32)
+        level = contrast_image[window].astype(np.float32)
         rim = (level[0], level[-1], level[:, 0], level[:, -1])
         if not any(bool((side > noise_level).any()) for side in rim):
             break

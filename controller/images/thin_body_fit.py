@@ -28,10 +28,10 @@ _MISFIT = 0.25  # of the picture's own strength: a larger residual rejects the f
 
 
 def _basis(count: int) -> Floats:
-    at = np.linspace(0.0, 1.0, count)
+    places = np.linspace(0.0, 1.0, count)
     inner = np.linspace(0.0, 1.0, _CONTROLS - 2)
     knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(at, knots, 3).toarray(), dtype=float)
+    return np.asarray(BSpline.design_matrix(places, knots, 3).toarray(), dtype=float)
 
 
 _ALONG = _basis(_SPOTS)
@@ -187,10 +187,10 @@ def draw_spots(
             for p in range(len(by) - 1):
                 if x_by[p, k] == 0.0 and y_by[p, k] == 0.0 and area_by[p, k] == 0.0:
                     continue  # each spot depends on few values of a spline
-                beside = heavy * x_by[p, k]
+                heavy_x = heavy * x_by[p, k]
                 along = heavy * off / spot * y_by[p, k] + down * area_by[p, k]
                 for u in range(left, right):
-                    by[p, v, u] += beside * moved[u] + along * across[u]
+                    by[p, v, u] += heavy_x * moved[u] + along * across[u]
             if len(by) > 0:
                 wider = heavy * (off * off - 1.0)
                 for u in range(left, right):

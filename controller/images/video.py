@@ -32,12 +32,12 @@ def in_order(file: Path) -> list[tuple[int, str]]:
 
 def pages_of(files: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[int, ...]]:
     """Return each image once per page, and the page of each, from 0."""
-    found = [
+    file_pages = [
         (file, page)
         for file in files
         for page in range(_page_count(file) if file.suffix.lower() in STACKS else 1)
     ]
-    return tuple(file for file, _ in found), tuple(page for _, page in found)
+    return tuple(file for file, _ in file_pages), tuple(page for _, page in file_pages)
 
 
 def _page_count(file: Path) -> int:
@@ -53,10 +53,10 @@ def frame_numbers_of(files: Sequence[Path]) -> Ints | None:
     None if no number is missing at a constant step, or if the names do not form one sequence.
     """
     parts = [re.fullmatch(r"(.*?)(\d+)(\D*)", file.name) for file in files]
-    known = [one for one in parts if one is not None]
-    if len(files) < 3 or len(known) < len(files) or len({(m[1], m[3]) for m in known}) > 1:
+    matches = [part for part in parts if part is not None]
+    if len(files) < 3 or len(matches) < len(files) or len({(m[1], m[3]) for m in matches}) > 1:
         return None
-    number = np.array([int(one[2]) for one in known], dtype=np.int64)
+    number = np.array([int(match[2]) for match in matches], dtype=np.int64)
     step = np.diff(number)
     if step.min() < 1 or (step % step.min()).any() or (step == step.min()).all():
         return None
@@ -134,7 +134,7 @@ class Footage:
         if self.files:
             at_s = [n / self.rate_hz for n in self.numbers] or [float("nan")] * len(self.files)
             shots = list(zip(self.files, self.pages, at_s, strict=True))[first:]
-            return ((self.image(file, page), at) for file, page, at in shots)
+            return ((self.image(file, page), moment_s) for file, page, moment_s in shots)
         return self._video(1, first)
 
     def spread(self, most: int) -> list[DeepImage]:
@@ -154,10 +154,10 @@ class Footage:
         """
         if self.deep is None:
             return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR, page)))
-        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page)
-        if whole.dtype != np.uint16:
-            return _one_channel(whole)
-        return _one_channel((whole.astype(np.float32) - self.deep.black) * self.deep.gain)
+        decoded = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page)
+        if decoded.dtype != np.uint16:
+            return _one_channel(decoded)
+        return _one_channel((decoded.astype(np.float32) - self.deep.black) * self.deep.gain)
 
     def _video(self, every: int, first: int = 0) -> Iterator[tuple[DeepImage, float]]:
         done = 0
@@ -186,8 +186,8 @@ class Footage:
                 if number % every or number < first:
                     yield None, at_s
                 else:
-                    whole, frame = film.retrieve()
-                    if not whole:
+                    is_decoded, frame = film.retrieve()
+                    if not is_decoded:
                         break
                     yield np.asarray(frame, dtype=np.uint8), at_s
                 number += 1
@@ -203,8 +203,8 @@ def _av_frames(path: Path, every: int, first: int = 0) -> Iterator[tuple[Image |
             for number, frame in enumerate(film.decode(video=0)):
                 at_s = float("nan") if frame.time is None else float(frame.time)
                 skipped = number % every or number < first
-                whole = None if skipped else frame.to_ndarray(format="bgr24")
-                yield None if whole is None else np.asarray(whole, dtype=np.uint8), at_s
+                pixels = None if skipped else frame.to_ndarray(format="bgr24")
+                yield None if pixels is None else np.asarray(pixels, dtype=np.uint8), at_s
     except (av.error.FFmpegError, IndexError):
         return  # the caller counts missing frames
 
@@ -268,20 +268,20 @@ def open_footage(path: Path, rate_hz: float | None = None) -> Footage:
 
 def _images(path: Path, rate_hz: float | None) -> Footage:
     if path.is_dir():
-        found = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=in_order)
+        images = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=in_order)
     else:
-        found = [path]
-    if not found:
+        images = [path]
+    if not images:
         raise InputError(f"{path}: holds no images ({', '.join(IMAGES)})")
-    files, pages = pages_of(found)
-    numbers = frame_numbers_of(files) if len(files) == len(found) else None
+    files, pages = pages_of(images)
+    numbers = frame_numbers_of(files) if len(files) == len(images) else None
     return Footage(
         path,
         files,
         len(files),
         rate_hz or ASSUMED_HZ,
         rate_hz is None,
-        deep=_scale_of_deep(found[:: max(1, len(found) // _DEEP_SAMPLE)]),
+        deep=_scale_of_deep(images[:: max(1, len(images) // _DEEP_SAMPLE)]),
         pages=pages,
         numbers=() if numbers is None else tuple(numbers.tolist()),
     )
@@ -325,10 +325,10 @@ def _scale_of_deep(files: Sequence[Path]) -> GreyScale | None:
     """
     low, high = float("inf"), -float("inf")
     for file in files:
-        whole = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
-        if whole.dtype != np.uint16:
+        decoded = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+        if decoded.dtype != np.uint16:
             return None
-        calm = cv2.medianBlur(whole, 3)  # removes broken pixels
+        calm = cv2.medianBlur(decoded, 3)  # removes broken pixels
         low, high = min(low, float(calm.min())), max(high, float(calm.max()))
     if high <= low:
         return GreyScale(low - _DEEP_RANGE[0], 1.0)
@@ -359,8 +359,8 @@ def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint1
     image = cv2.imdecode(data, how) if data.size else None
     if image is None:
         raise InputError(f"{file}: is not a readable image; choose another file")
-    whole: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)
-    return whole
+    pixels: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)
+    return pixels
 
 
 def _one_channel(image: NDArray[np.uint8 | np.uint16 | np.float32]) -> DeepImage:

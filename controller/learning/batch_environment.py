@@ -124,11 +124,12 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
         self._begin_s = self._batch.time_s
         self._cycles = 0
         self._steps[:], self._ended[:] = 0, False
-        found = [
-            row.reset(seed=own, options=options) for row, own in zip(self._rows, seeds, strict=True)
+        first_states = [
+            row.reset(seed=row_seed, options=options)
+            for row, row_seed in zip(self._rows, seeds, strict=True)
         ]
-        return np.stack([observation for observation, _ in found]), self._infos(
-            [info for _, info in found]
+        return np.stack([observation for observation, _ in first_states]), self._infos(
+            [info for _, info in first_states]
         )
 
     def step(

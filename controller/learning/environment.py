@@ -394,17 +394,17 @@ def _fill(
         values[joints + k] = velocity_rad_s[k]
         values[2 * joints + k] = current_a[k]
         values[3 * joints + k] = sent_rad[k]
-    at = 4 * joints
+    offset = 4 * joints
     for axis in range(3):
-        values[at + axis] = rotation[0, 2, axis]
+        values[offset + axis] = rotation[0, 2, axis]
     before = total = np.arctan2(rotation[0, 1, 0], rotation[0, 0, 0])
     for link in range(1, len(rotation)):
         heading = np.arctan2(rotation[link, 1, 0], rotation[link, 0, 0])
         before = heading - 2.0 * np.pi * np.rint((heading - before) / (2.0 * np.pi))
         total += before
     mean = total / len(rotation)
-    values[at + 3], values[at + 4] = np.cos(mean), np.sin(mean)
-    values[at + 5], values[at + 6] = velocity_m_s[0], velocity_m_s[1]
+    values[offset + 3], values[offset + 4] = np.cos(mean), np.sin(mean)
+    values[offset + 5], values[offset + 6] = velocity_m_s[0], velocity_m_s[1]
     for k in range(len(values)):
         values[k] = min(max(values[k], -end[k]), end[k])
 

@@ -66,8 +66,8 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Lay another robot on the ground, with a motion at its beginning."""
         super().reset(seed=seed)
-        own = int(self.np_random.integers(2**31)) if seed is None else seed
-        _, info = self._snake.reset(seed=own, options=options)
+        wave_seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        _, info = self._snake.reset(seed=wave_seed, options=options)
         self._motion = PolicyMotion(self._policy, self._snake.robot)
         return self._observe(self._motion), info
 

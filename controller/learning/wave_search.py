@@ -108,10 +108,10 @@ def search_wave(
                 strategy.tell(genes, [-reward_m for reward_m in rewards])
                 continue
             work = partial(_earned, world=world, start=seed + generation, steps=steps)
-            rewards = tuple(rate(work, [policy(each, 0) for each in genes]))
+            rewards = tuple(rate(work, [policy(gene, 0) for gene in genes]))
             strategy.tell(genes, [-reward_m for reward_m in rewards])
-            known = (*progress.rewards_m, rewards)
-            progress = progress.model_copy(update={"rewards_m": known})
+            rewards_m = (*progress.rewards_m, rewards)
+            progress = progress.model_copy(update={"rewards_m": rewards_m})
             on_progress(progress)
     return policy(strategy.result.xfavorite, generations * population)
 

@@ -23,11 +23,11 @@ def read_colours(file: Path) -> Image:
         with Pictures.open(file) as opened:
             columns, rows = opened.size
         check_expansion(file, len(data), 3 * columns * rows)
-        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError, cv2.error):
-        found = None
-    if found is None:
+        picture = None
+    if picture is None:
         raise InputError(f"{file}: cannot be read as a picture")
-    return np.asarray(found, dtype=np.uint8)
+    return np.asarray(picture, dtype=np.uint8)

@@ -65,10 +65,10 @@ def match(left: Image, right: Image, count: int, least: int = 0, fill_px: int = 
     there = _one_way(left, right, count, least)
     back = _one_way(_mirrored(right), _mirrored(left), count, least)[:, ::-1]
     column = np.arange(left.shape[1])[None]
-    at = np.rint(column - np.nan_to_num(there)).astype(np.intp)
-    other = np.take_along_axis(back, np.clip(at, 0, None), axis=1)
+    other_column = np.rint(column - np.nan_to_num(there)).astype(np.intp)
+    other = np.take_along_axis(back, np.clip(other_column, 0, None), axis=1)
     with np.errstate(invalid="ignore"):
-        agree = (np.abs(there - other) <= _AGREE_PX) & (at >= 0)
+        agree = (np.abs(there - other) <= _AGREE_PX) & (other_column >= 0)
     checked = np.where(agree, there, np.nan)
     for _ in range(_STEPS):
         checked = _aligned(left, right, checked)
@@ -86,17 +86,19 @@ def _filled(disparity: Floats, most_px: int) -> Floats:
     if not most_px:
         return disparity
     column = np.arange(disparity.shape[1])
-    known = np.isfinite(disparity)
-    before = np.maximum.accumulate(np.where(known, column, -1), axis=1)
-    after = np.minimum.accumulate(np.where(known, column, len(column))[:, ::-1], axis=1)[:, ::-1]
-    between = (before >= 0) & (after < len(column)) & ~known & (after - before <= most_px + 1)
-    row, at = np.nonzero(between)
+    is_known = np.isfinite(disparity)
+    before = np.maximum.accumulate(np.where(is_known, column, -1), axis=1)
+    after = np.minimum.accumulate(np.where(is_known, column, len(column))[:, ::-1], axis=1)[:, ::-1]
+    between = (before >= 0) & (after < len(column)) & ~is_known & (after - before <= most_px + 1)
+    row, column_index = np.nonzero(between)
     first, last = before[between], after[between]
-    one, other = disparity[row, first], disparity[row, last]
-    share = (at - first) / (last - first)
+    left_end, other = disparity[row, first], disparity[row, last]
+    share = (column_index - first) / (last - first)
     out = disparity.copy()
-    near = np.abs(one - other) <= _AGREE_PX
-    out[between] = np.where(near, one + share * (other - one), np.minimum(one, other))
+    near = np.abs(left_end - other) <= _AGREE_PX
+    out[between] = np.where(
+        near, left_end + share * (other - left_end), np.minimum(left_end, other)
+    )
     return out
 
 
@@ -118,9 +120,9 @@ def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
         cv2.copyMakeBorder(picture, 0, 0, count + least, 0, cv2.BORDER_REPLICATE)
         for picture in (left, right)
     ]
-    found = matcher.compute(*wide)[:, count + least :].astype(float) / 16.0
-    found[found < max(least, 0.5)] = np.nan
-    return np.asarray(found)
+    disparity = matcher.compute(*wide)[:, count + least :].astype(float) / 16.0
+    disparity[disparity < max(least, 0.5)] = np.nan
+    return np.asarray(disparity)
 
 
 def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
@@ -130,20 +132,24 @@ def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
     step of B. D. Lucas and T. Kanade (1981) along the row removes the bias.
     """
     grey = [picture if picture.ndim == 2 else picture.mean(axis=2) for picture in (left, right)]
-    one, two = (np.asarray(picture, dtype=np.float32) for picture in grey)
+    left_picture, two = (np.asarray(picture, dtype=np.float32) for picture in grey)
     rows, columns = disparity.shape
     u, v = np.meshgrid(np.arange(columns, dtype=np.float32), np.arange(rows, dtype=np.float32))
-    at = u - np.nan_to_num(disparity).astype(np.float32)
+    source_column = u - np.nan_to_num(disparity).astype(np.float32)
     slope = cv2.Sobel(two, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
-    seen, slope = (
-        np.asarray(cv2.remap(picture, at, v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE))
+    matched, slope = (
+        np.asarray(
+            cv2.remap(picture, source_column, v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        )
         for picture in (two, slope)
     )
-    told = np.isfinite(disparity).astype(np.float32)
-    count = np.maximum(_box(told), 1e-6)
-    off = (one - seen) - _box(told * (one - seen)) / count  # one camera may be brighter
-    steep = _box(told * slope * slope) / count
-    shift = -_box(told * slope * off) / count / np.maximum(steep, _LEAST_STEEP)
+    is_matched = np.isfinite(disparity).astype(np.float32)
+    count = np.maximum(_box(is_matched), 1e-6)
+    off = (left_picture - matched) - _box(
+        is_matched * (left_picture - matched)
+    ) / count  # one camera may be brighter
+    steep = _box(is_matched * slope * slope) / count
+    shift = -_box(is_matched * slope * off) / count / np.maximum(steep, _LEAST_STEEP)
     return np.asarray(disparity + np.clip(shift, -_MOST_SHIFT_PX, _MOST_SHIFT_PX), dtype=float)
 
 
@@ -173,7 +179,7 @@ def _on_planes(  # noqa: C901  a compiled loop
     middle's value, then those near the first plane. NaN if too few pixels of the window are on it.
     """
     rows, columns = disparity.shape
-    whole = (2 * radius + 1) ** 2
+    window_px = (2 * radius + 1) ** 2
     for i in range(rows):
         for j in range(columns):
             smooth[i, j] = np.nan
@@ -200,7 +206,7 @@ def _on_planes(  # noqa: C901  a compiled loop
                             sxz += x * z
                             syz += y * z
                 count = n
-                if n < least_share * whole:
+                if n < least_share * window_px:
                     break
                 mx, my, mz = sx / n, sy / n, sz / n
                 vxx = sxx / n - mx * mx
@@ -214,5 +220,5 @@ def _on_planes(  # noqa: C901  a compiled loop
                 a = (vxz * vyy - vyz * vxy) / det
                 b = (vyz * vxx - vxz * vxy) / det
                 c = mz - a * mx - b * my
-            if count >= least_share * whole and abs(c - middle) <= touch:
+            if count >= least_share * window_px and abs(c - middle) <= touch:
                 smooth[i, j] = c

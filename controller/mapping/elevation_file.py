@@ -176,14 +176,14 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
         OSError: the file cannot be opened.
 
     """
-    found = _read(file, options)
-    size_m = (max(found.elevation.z_m.shape) - 1) * found.elevation.spacing_m
+    elevation_file = _read(file, options)
+    size_m = (max(elevation_file.elevation.z_m.shape) - 1) * elevation_file.elevation.spacing_m
     if size_m > _MOST_SIZE_M:
         raise InputError(
             f"{file}: a map of {size_m:.3g} m at a scale of {options.scale:g}; the most is "
             f"{_MOST_SIZE_M:g} m: a smaller --scale, or --crop a part"
         )
-    return found
+    return elevation_file
 
 
 def _read(file: Path, options: MapOptions) -> FileMap:
@@ -264,10 +264,10 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
 
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
     units = options.units
-    held = read_las(file, options.classes, options.crop, units.unit)
-    points_m, notes = in_metres(file, held, units.unit, units.height_unit)
-    left = replace(options, crop=None) if held.cropped else options
-    return _of_points(file, points_m, None, left, [*held.notes, *notes])
+    laser_points = read_las(file, options.classes, options.crop, units.unit)
+    points_m, notes = in_metres(file, laser_points, units.unit, units.height_unit)
+    left = replace(options, crop=None) if laser_points.cropped else options
+    return _of_points(file, points_m, None, left, [*laser_points.notes, *notes])
 
 
 def _upright(points_m: Floats, options: MapOptions) -> Floats:
@@ -327,13 +327,13 @@ def _cropped(
     low = np.zeros(2)
     high = placed[:, :2].max(axis=0)
     if crop is not None:
-        whole = high
+        size_m = high
         low, high = np.maximum(crop[:2], low), np.minimum(crop[2:], high)
         if not is_mesh:
             placed = placed[((placed[:, :2] >= low) & (placed[:, :2] <= high)).all(axis=1)]
         if len(placed) == 0 or (low > high).any():
             raise InputError(
-                f"{file}: nothing is within the crop: it is {whole[0]:.6g} m by {whole[1]:.6g} m"
+                f"{file}: nothing is within the crop: it is {size_m[0]:.6g} m by {size_m[1]:.6g} m"
             )
     if not is_mesh:
         low, high = placed[:, :2].min(axis=0), placed[:, :2].max(axis=0)

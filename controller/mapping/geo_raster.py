@@ -117,22 +117,22 @@ def _read(
     unit = units.unit or _horizontal_unit(file, opened)
     dx, dy = (abs(turn.a), abs(turn.e)) if units.cell is None else (units.cell,) * 2
     everything = slice(0, opened.height), slice(0, opened.width)
-    whole = _cells(file, opened, unit, (dx, dy), everything)
+    all_cells = _cells(file, opened, unit, (dx, dy), everything)
     rows, columns = raster_window(
-        file, opened.shape, whole.dx_m, whole.dy_m, crop, turn.e < 0.0, MOST_STRIPPED_CELLS
+        file, opened.shape, all_cells.dx_m, all_cells.dy_m, crop, turn.e < 0.0, MOST_STRIPPED_CELLS
     )
-    here = _cells(file, opened, unit, (dx, dy), (rows, columns)) if crop else whole
+    cropped_cells = _cells(file, opened, unit, (dx, dy), (rows, columns)) if crop else all_cells
     height_unit, notes = _height_unit(file, opened, units, unit)
-    notes = [*here.notes, *notes]
+    notes = [*cropped_cells.notes, *notes]
     if opened.count > 1:
         notes.append(f"band 1 of {opened.count} is read")
     scale, offset, words = _band_scale(opened, units)
     notes += words
     per_unit = scale * unit_m(height_unit)
-    spacing_m = 0.0 if spacing_of is None else spacing_of(here.dx_m, here.dy_m)
+    spacing_m = 0.0 if spacing_of is None else spacing_of(cropped_cells.dx_m, cropped_cells.dy_m)
     strips = _Strips(opened, rows, columns, units.no_data)
-    if spacing_m >= _COARSER * max(here.dx_m, here.dy_m):
-        z, absent = strips.reduced(here.dx_m, here.dy_m, spacing_m)
+    if spacing_m >= _COARSER * max(cropped_cells.dx_m, cropped_cells.dy_m):
+        z, absent = strips.reduced(cropped_cells.dx_m, cropped_cells.dy_m, spacing_m)
         notes.append(
             f"{strips.cells} cells are reduced to {z.size} medians, {spacing_m:.4g} m apart"
         )
@@ -142,11 +142,11 @@ def _read(
             raise InputError(
                 f"{file}: {columns.stop - columns.start} by {rows.stop - rows.start} cells are "
                 f"over {_MOST_PLAIN}: give a --spacing of {_COARSER:g} cells or more, or --crop a "
-                f"part of its {opened.width * whole.dx_m:.6g} m by "
-                f"{opened.height * whole.dy_m:.6g} m"
+                f"part of its {opened.width * all_cells.dx_m:.6g} m by "
+                f"{opened.height * all_cells.dy_m:.6g} m"
             )
         z, absent = strips.plain()
-        dx_m, dy_m = here.dx_m, here.dy_m
+        dx_m, dy_m = cropped_cells.dx_m, cropped_cells.dy_m
     z = (z * per_unit) + offset * unit_m(height_unit)
     if absent:
         notes.append(f"{absent} cells hold no height")
@@ -225,9 +225,11 @@ def _column_medians(z: Floats, column_of: Ints, samples: int) -> Floats:
     padded.sort(axis=1)  # NaN is last
     count = np.isfinite(padded).sum(axis=1)
     low, high = np.maximum((count - 1) // 2, 0), np.maximum(count // 2, 0)
-    at = np.arange(samples)
+    sample_index = np.arange(samples)
     high = np.minimum(high, padded.shape[1] - 1)
-    return np.where(count > 0, 0.5 * (padded[at, low] + padded[at, high]), np.nan)
+    return np.where(
+        count > 0, 0.5 * (padded[sample_index, low] + padded[sample_index, high]), np.nan
+    )
 
 
 def _horizontal_unit(file: Path, opened: Any) -> str:

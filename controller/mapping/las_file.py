@@ -165,7 +165,7 @@ def child(words: str) -> str:
             plane = unit or stated
             window = None
             if crop is not None and plane not in (None, DEGREE):
-                window = [each / unit_m(plane) for each in crop]
+                window = [crop_value / unit_m(plane) for crop_value in crop]
             points, notes = _read(reader, classes, window)
     except InputError as error:
         return json.dumps({"fault": str(error)})
@@ -196,25 +196,25 @@ def _read(
         if window is None
         else (corner + np.array(window[:2]), corner + np.array(window[2:]))
     )
-    seen: dict[int, int] = {}
+    counts_by_class: dict[int, int] = {}
     withheld = 0
     kept = []
     total = 0
-    held = 0
+    kept_count = 0
     ground: list[Floats] = []
     for chunk in reader.chunk_iterator(_CHUNK):
         points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
         kinds = np.asarray(chunk.classification)
-        held += len(points)
+        kept_count += len(points)
         held_back = np.asarray(chunk.withheld, dtype=bool)
         withheld += int(held_back.sum())
         inside = ~held_back & ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
         for kind, number in zip(*np.unique(kinds[inside], return_counts=True), strict=True):
-            seen[int(kind)] = seen.get(int(kind), 0) + int(number)
-        wanted = ~np.isin(kinds, _NOISE) if classes is None else np.isin(kinds, list(classes))
-        is_ground = np.isin(kinds, _GROUND) if classes is None else wanted
+            counts_by_class[int(kind)] = counts_by_class.get(int(kind), 0) + int(number)
+        is_kept = ~np.isin(kinds, _NOISE) if classes is None else np.isin(kinds, list(classes))
+        is_ground = np.isin(kinds, _GROUND) if classes is None else is_kept
         if not ground:
-            kept.append(points[inside & wanted])
+            kept.append(points[inside & is_kept])
         ground_part = points[inside & is_ground]
         if len(ground_part) and classes is None:
             ground.append(ground_part)
@@ -224,24 +224,24 @@ def _read(
             raise InputError(f"over {MOST_POINTS} points are left of {count}: --crop a part")
     chosen = ground or kept
     points = np.concatenate(chosen) if chosen else np.empty((0, 3))
-    if held < count:
-        raise InputError(f"states {count} points, and holds {held}")
-    notes = _class_notes(seen, classes, bool(ground), len(points))
+    if kept_count < count:
+        raise InputError(f"states {count} points, and holds {kept_count}")
+    notes = _class_notes(counts_by_class, classes, bool(ground), len(points))
     if withheld:
         notes.append(f"{withheld} withheld points are left out")
     return points, notes
 
 
 def _class_notes(
-    seen: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
+    counts_by_class: dict[int, int], classes: Collection[int] | None, by_ground: bool, kept: int
 ) -> list[str]:
     used = (
         set(classes)
         if classes is not None
-        else set(_GROUND if by_ground else (kind for kind in seen if kind not in _NOISE))
+        else set(_GROUND if by_ground else (kind for kind in counts_by_class if kind not in _NOISE))
     )
-    dropped = {kind: number for kind, number in seen.items() if kind not in used}
-    notes = [f"{kept} points of {sum(seen.values())} are used"]
+    dropped = {kind: number for kind, number in counts_by_class.items() if kind not in used}
+    notes = [f"{kept} points of {sum(counts_by_class.values())} are used"]
     if classes is None:
         notes[0] += ": those of the ground" if by_ground else ": no class is ground"
     if dropped:
@@ -295,7 +295,7 @@ def _system(text_or_number: str | int) -> Any:
 
 
 def in_metres(
-    file: Path, held: LasPoints, unit: str | None, height_unit: str | None
+    file: Path, las_points: LasPoints, unit: str | None, height_unit: str | None
 ) -> tuple[Floats, list[str]]:
     """Points in metres.
 
@@ -303,12 +303,12 @@ def in_metres(
         InputError: the unit is unknown (the question).
 
     """
-    plane = unit or held.unit
+    plane = unit or las_points.unit
     if plane is None:
         raise InputError(
             f"{file}: states no coordinate system, and so no unit; add --unit m (or ft, us-ft, deg)"
         )
-    up = height_unit or held.height_unit
+    up = height_unit or las_points.height_unit
     notes = []
     if up is None:
         if plane not in ("m", DEGREE) and unit is None:
@@ -321,19 +321,19 @@ def in_metres(
             notes.append("the file states no unit of heights: metres")
     elif height_unit is None and up != "m":
         notes.append(f"heights are in {up}, as the file states")
-    points = held.points
+    points = las_points.points
     if plane == DEGREE:
         middle = float(np.median(points[:, 1])) if len(points) else 0.0
         east_m, north_m = degree_cell_m(1.0, 1.0, middle)
         return points * [east_m, north_m, unit_m(up)], notes
     x_m = y_m = unit_m(plane)
-    if held.crs is not None and unit is None and len(points):
+    if las_points.crs is not None and unit is None and len(points):
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         middle = 0.5 * (low + high)
         half = np.maximum(0.5 * (high - low), 1.0)
         corners = [tuple(middle + half * side) for side in ((0, 0), (0, -1), (0, 1), (1, 0))]
         try:
-            x_m, y_m, words = ground_lengths(held.crs, x_m, corners, (1.0, 1.0))
+            x_m, y_m, words = ground_lengths(las_points.crs, x_m, corners, (1.0, 1.0))
         except InputError as error:
             raise InputError(f"{file}: {error}") from None
         notes += words

@@ -51,7 +51,7 @@ _MOST_VARIATION: Final = 0.1
 def named_unit(words: str) -> str | None:
     """Name in ``UNITS_M`` of a unit as spelled in files, or None."""
     plain = re.sub(r"[^a-z0-9-]+", " ", words.lower()).strip()
-    return next((name for name, known in _SPELLINGS.items() if plain in known), None)
+    return next((name for name, spellings in _SPELLINGS.items() if plain in spellings), None)
 
 
 def unit_name(factor_m: float) -> str:
@@ -69,15 +69,15 @@ def unit_m(unit: str) -> float:
 
 def vertical_unit(wkt: str) -> str | None:
     """Unit of heights of a compound coordinate system in WKT, or None."""
-    found = _VERTICAL.search(wkt)
-    if found is None:
+    match = _VERTICAL.search(wkt)
+    if match is None:
         return None
     depth = 1
-    end = found.end()
+    end = match.end()
     while end < len(wkt) and depth:
         depth += {"[": 1, "]": -1}.get(wkt[end], 0)
         end += 1
-    unit = _UNIT.search(wkt[found.end() : end])
+    unit = _UNIT.search(wkt[match.end() : end])
     return None if unit is None else unit_name(float(unit[2]))
 
 
@@ -137,7 +137,7 @@ def ground_lengths(
 
     """
     middle = true_scale(crs, places[0], step)
-    if math.isnan(middle[0]) or max(abs(each / per_unit_m - 1.0) for each in middle) <= _TRUE:
+    if math.isnan(middle[0]) or max(abs(length / per_unit_m - 1.0) for length in middle) <= _TRUE:
         return per_unit_m, per_unit_m, []
     notes = [
         f"the projection has no true lengths: 1 m of it is {middle[0] / per_unit_m:.4g} m west to "

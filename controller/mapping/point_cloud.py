@@ -63,7 +63,7 @@ def read_pcd(file: Path) -> PcdCloud:
     if not finite.all():
         notes.append(f"{int((~finite).sum())} points without numbers are left out")
     if pose not in ([], [0, 0, 0, 1, 0, 0, 0]):
-        notes.append(f"VIEWPOINT {' '.join(f'{each:g}' for each in pose)} is not used")
+        notes.append(f"VIEWPOINT {' '.join(f'{number:g}' for number in pose)} is not used")
     return PcdCloud(points[finite], (width, height) if height > 1 else None, tuple(notes))
 
 
@@ -107,14 +107,14 @@ def _compressed(body: bytes, row: np.dtype[Any], total: int) -> Floats:
     if _expand(np.frombuffer(body[8 : 8 + packed], np.uint8), plain) != unpacked:
         raise ValueError("its compressed data are damaged")
     columns = {}
-    at = 0
+    offset = 0
     for name in row.names or ():
         field = row[name]
         width = field.itemsize * total
         if name in "xyz":
             count = field.shape[0]
-            columns[name] = plain[at : at + width].view(field.base)[::count].astype(float)
-        at += width
+            columns[name] = plain[offset : offset + width].view(field.base)[::count].astype(float)
+        offset += width
     return np.stack([columns[axis] for axis in "xyz"], axis=-1)
 
 
@@ -137,8 +137,8 @@ def _ascii(body: bytes, names: list[str], counts: list[int], total: int) -> Floa
     rows = [line.split() for line in body.splitlines()[:total]]
     if len(rows) < total:
         raise ValueError(f"says {total} points, and holds {len(rows)}")
-    held = [[float(row[first[axis]]) for axis in "xyz"] for row in rows]
-    return np.array(held, dtype=float).reshape(-1, 3)
+    rows_m = [[float(row[first[axis]]) for axis in "xyz"] for row in rows]
+    return np.array(rows_m, dtype=float).reshape(-1, 3)
 
 
 @compiled(f"int64({readonly_array('uint8', layout='C')}, uint8[::1])")
@@ -148,29 +148,29 @@ def _expand(packed: Bytes, plain: Bytes) -> int:
     A control byte below 32 precedes that many and one plain bytes. Any other is a back reference:
     three high bits are the length, five low ones the high bits of the distance.
     """
-    at = 0
+    position = 0
     out = 0
-    while at < len(packed):
-        control = int(packed[at])
-        at += 1
+    while position < len(packed):
+        control = int(packed[position])
+        position += 1
         if control < 32:
             length = control + 1
-            if at + length > len(packed) or out + length > len(plain):
+            if position + length > len(packed) or out + length > len(plain):
                 return -1
             for k in range(length):
-                plain[out + k] = packed[at + k]
-            at += length
+                plain[out + k] = packed[position + k]
+            position += length
         else:
             length = control >> 5
             if length == 7:
-                if at >= len(packed):
+                if position >= len(packed):
                     return -1
-                length += int(packed[at])
-                at += 1
-            if at >= len(packed):
+                length += int(packed[position])
+                position += 1
+            if position >= len(packed):
                 return -1
-            back = out - ((control & 31) << 8) - int(packed[at]) - 1
-            at += 1
+            back = out - ((control & 31) << 8) - int(packed[position]) - 1
+            position += 1
             length += 2
             if back < 0 or out + length > len(plain):
                 return -1
@@ -200,11 +200,11 @@ def read_ply(file: Path) -> tuple[Floats, Any]:
         if any(not 0 <= count <= size for count in counts):  # each needs a byte or more
             raise ValueError("says more elements than it can hold")
         check_expansion(file, size, min(MOST_BYTES, 100 * sum(counts)))
-        held: Any = trimesh.load(file, process=False)
-        points = np.asarray(held.vertices, dtype=float)
+        mesh: Any = trimesh.load(file, process=False)
+        points = np.asarray(mesh.vertices, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError("holds no vertices")
-        faces = getattr(held, "faces", None)
+        faces = getattr(mesh, "faces", None)
     except InputError:
         raise
     except Exception as error:  # trimesh raises the exceptions of its parsers

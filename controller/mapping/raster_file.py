@@ -162,8 +162,8 @@ def _picture(file: Path) -> Floats:
 def _array(file: Path) -> Floats:
     """``elevation`` (rows, columns) of an .npz."""
     try:
-        held, others = read_arrays(file, {"elevation"})
-        values = np.asarray(held["elevation"], dtype=float)
+        arrays, others = read_arrays(file, {"elevation"})
+        values = np.asarray(arrays["elevation"], dtype=float)
     except KeyError:
         raise InputError(
             f"{file}: holds no array named 'elevation', but {', '.join(sorted(others)) or 'none'}"

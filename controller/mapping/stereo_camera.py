@@ -93,22 +93,24 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
     if ending == ".txt":
         return _checked(file, _middlebury(file), 1.0)
     if ending in (".yml", ".yaml", ".xml", ".json"):
-        held = _storage(file)
+        storage = _storage(file)
     elif ending == ".npz":
         try:
-            held, _ = read_arrays(file)
+            storage, _ = read_arrays(file)
         except ValueError as error:
             raise InputError(f"{file}: is no .npz of numbers: {error}") from None
     else:
         raise InputError(f"{file}: a calibration ends in .yml, .yaml, .xml, .json, .npz or .txt")
-    found: dict[str, Any] = {}
+    matrices: dict[str, Any] = {}
     for key, names in _NAMES.items():
-        name = next((name for name in names if held.get(name) is not None), None)
+        name = next((name for name in names if storage.get(name) is not None), None)
         if name is None and key not in _OPTIONAL:
-            there = ", ".join(one for one, value in held.items() if value is not None)
+            there = ", ".join(
+                given_name for given_name, value in storage.items() if value is not None
+            )
             raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
-        found[key] = np.zeros(5) if name is None else held[name]
-    return _checked(file, found, unit_m)
+        matrices[key] = np.zeros(5) if name is None else storage[name]
+    return _checked(file, matrices, unit_m)
 
 
 def _storage(file: Path) -> dict[str, Any]:
@@ -119,14 +121,14 @@ def _storage(file: Path) -> dict[str, Any]:
     try:
         store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
         nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict
-        held = {name: node.mat() for name, node in nodes.items() if node.isMap()}
+        nodes_by_name = {name: node.mat() for name, node in nodes.items() if node.isMap()}
         store.release()
     except (cv2.error, SystemError) as error:
         raise InputError(
             f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
             "file"
         ) from None
-    return held
+    return nodes_by_name
 
 
 def _middlebury(file: Path) -> dict[str, Any]:
@@ -154,10 +156,10 @@ def _middlebury(file: Path) -> dict[str, Any]:
     }
 
 
-def _numbers(file: Path, found: Mapping[str, Any], unit_m: float) -> dict[str, Floats]:
+def _numbers(file: Path, matrices: Mapping[str, Any], unit_m: float) -> dict[str, Floats]:
     """Return the values as arrays of the right size, in metres."""
     values: dict[str, Floats] = {}
-    for key, value in found.items():
+    for key, value in matrices.items():
         try:
             values[key] = np.array(value, dtype=float)
         except (TypeError, ValueError):
@@ -181,8 +183,8 @@ def _numbers(file: Path, found: Mapping[str, Any], unit_m: float) -> dict[str, F
     return values
 
 
-def _checked(file: Path, found: Mapping[str, Any], unit_m: float) -> StereoCalibration:
-    values = _numbers(file, found, unit_m)
+def _checked(file: Path, matrices: Mapping[str, Any], unit_m: float) -> StereoCalibration:
+    values = _numbers(file, matrices, unit_m)
     rotation = values["rotation"]
     translation = values["translation"]
     for key in ("k_left", "k_right"):
@@ -229,10 +231,12 @@ def rectify(calibration: StereoCalibration, left: Image, right: Image) -> Rectif
     if ideal and same and np.allclose(c.rotation, np.eye(3)):
         offset_px = float(c.k_right[0, 2] - c.k_left[0, 2])
         centre = float(c.k_left[0, 2]), float(c.k_left[1, 2])
-        seen = np.ones((rows, columns), bool)
+        is_visible = np.ones((rows, columns), bool)
         baseline_m = -float(c.translation_m[0])
         focal_px = float(c.k_left[0, 0])
-        return RectifiedPair(left, right, seen, focal_px, centre, offset_px, baseline_m, np.eye(3))
+        return RectifiedPair(
+            left, right, is_visible, focal_px, centre, offset_px, baseline_m, np.eye(3)
+        )
     size = (columns, rows)
     turn_left, turn_right, p_left, p_right, *_ = cv2.stereoRectify(
         c.k_left,

@@ -113,14 +113,14 @@ def stereo_ground(
     world[:, 2] += stand.height_m
     world = world[world[:, 0] <= far_m]
     elevation = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
-    seen = max(int(pair.seen.sum()), 1)
+    visible_px = max(int(pair.seen.sum()), 1)
     return StereoGround(
         elevation,
         disparity,
         stand,
         fitted,
-        float(np.isfinite(disparity).sum()) / seen,
-        len(world) / seen,
+        float(np.isfinite(disparity).sum()) / visible_px,
+        len(world) / visible_px,
     )
 
 
@@ -181,10 +181,10 @@ def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
         normal = normal / size * (-1.0 if normal[1] > 0.0 else 1.0)  # up: y points down
         if -normal[1] < _LEVEL_ENOUGH or normal @ a >= 0.0:
             continue
-        held = int((np.abs(points @ normal - normal @ a) <= reach).sum())
-        if held > most:
+        points_near = int((np.abs(points @ normal - normal @ a) <= reach).sum())
+        if points_near > most:
             best = np.array([*normal, normal @ a])
-            most = held
+            most = points_near
     if most < _LEAST_GROUND * len(points):
         raise InputError(
             "stereo: no ground is seen: no plane below the camera holds a fifth of the points; "

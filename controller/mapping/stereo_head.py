@@ -96,8 +96,8 @@ class StereoHead:
     def fuse(self, now_s: float) -> None:
         """Add matched pictures to the map."""
         while self._coming and self._coming[0].arrives_s <= now_s + 1e-9:
-            seen = self._coming.popleft()
-            self._map.add(seen.points_m, seen.error_m, seen.taken_s)
+            look = self._coming.popleft()
+            self._map.add(look.points_m, look.error_m, look.taken_s)
 
     def close(self) -> None:
         """Free the frame buffer."""
@@ -172,10 +172,10 @@ class StereoHead:
         near = ((points_m[:, :2] > low) & (points_m[:, :2] < high)).all(axis=1)
         close_m = points_m[near, :2]
         hit = np.zeros(int(near.sum()), bool)
-        for one, other in pairwise(chain_m):
-            along = other - one
-            share = (close_m - one) @ along / max(float(along @ along), 1e-12)
-            foot_m = one + np.clip(share, 0.0, 1.0)[:, None] * along
+        for before, other in pairwise(chain_m):
+            along = other - before
+            share = (close_m - before) @ along / max(float(along @ along), 1e-12)
+            foot_m = before + np.clip(share, 0.0, 1.0)[:, None] * along
             hit |= np.hypot(*(close_m - foot_m).T) < reach_m
         near[near] = hit
         return np.asarray(near)

@@ -67,10 +67,10 @@ class StereoMap:
         provider.ground_map = ground_map
         provider.true_ground = ground
         ground_map.clear()
-        made = StereoHead(
+        stereo_head = StereoHead(
             prepared.run, prepared.robot, prepared.world, ground, backend.qpos, ground_map
         )
-        with closing(made) as head:
+        with closing(stereo_head) as head:
             head.observe(clock.now_s(), backend.pose(), backend.qpos()[7:])
             head.fuse(np.inf)  # the run begins when the first picture is matched
 

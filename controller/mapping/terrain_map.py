@@ -22,15 +22,15 @@ def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
         figure = Figure(figsize=(wide_in, tall_in), layout="constrained", dpi=110)
         axes = figure.subplots(1, 1)
         draw_ground(axes, ground)
-        at = np.meshgrid(*ground.axes_m)
-        known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
-        safe = relief.safe(*at)
+        mesh_m = np.meshgrid(*ground.axes_m)
+        is_known = np.ones(ground.z_m.shape, bool) if ground.known is None else ground.known
+        safe = relief.safe(*mesh_m)
         marks = [Patch(facecolor=BLUE, alpha=0.35, label="safe for a path")]
         if safe.any():
-            axes.contourf(*at, safe, levels=[0.5, 1.5], colors=[BLUE], alpha=0.35)
-        if not known.all():
-            axes.contourf(*at, ~known, levels=[0.5, 1.5], colors=["white"], alpha=0.75)
-            axes.contourf(*at, ~known, levels=[0.5, 1.5], colors=["none"], hatches=["////"])
+            axes.contourf(*mesh_m, safe, levels=[0.5, 1.5], colors=[BLUE], alpha=0.35)
+        if not is_known.all():
+            axes.contourf(*mesh_m, ~is_known, levels=[0.5, 1.5], colors=["white"], alpha=0.75)
+            axes.contourf(*mesh_m, ~is_known, levels=[0.5, 1.5], colors=["none"], hatches=["////"])
             marks.append(Patch(facecolor="white", edgecolor=INK, hatch="////", label="unknown"))
         axes.set_aspect("equal")
         axes.set_xlabel("x (m)")

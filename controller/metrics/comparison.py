@@ -133,8 +133,8 @@ def _difference(
     gap = np.abs(a[:rows] - b[:rows])
     gap[np.isnan(a[:rows]) & np.isnan(b[:rows])] = 0.0
     gap[np.isnan(gap)] = np.inf
-    known = gap[np.isfinite(gap)]
-    rms = float(np.sqrt(np.square(known).mean())) if known.size else 0.0
+    finite_values = gap[np.isfinite(gap)]
+    rms = float(np.sqrt(np.square(finite_values).mean())) if finite_values.size else 0.0
     sizes = float(gap.max(initial=0.0)), rms, tuple(gap.max(axis=0, initial=0.0).tolist())
     bad = np.argwhere(gap > tolerance)
     if len(bad) == 0:

@@ -66,12 +66,12 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     gait = make_gait(config.name, config.parameters)
     hz = GaitCycle(gait, robot).frequency_hz
     unknown = GaitDisplacement(0, hz, *(float("nan"),) * 4)
-    known = np.isfinite(pose.links_m).all(axis=(1, 2))
-    if not known.any() or hz <= 0.0:
+    is_known = np.isfinite(pose.links_m).all(axis=(1, 2))
+    if not is_known.any() or hz <= 0.0:
         return unknown
-    time_s = pose.time_s[known]
-    links = pose.links_m[known]
-    up = pose.rotation[known][:, :, 2]
+    time_s = pose.time_s[is_known]
+    links = pose.links_m[is_known]
+    up = pose.rotation[is_known][:, :, 2]
     first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config.duration_s)
     count = int((last_s - first_s) * hz + 1e-9)
     if count < 1:

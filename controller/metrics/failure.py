@@ -133,8 +133,8 @@ def _steepest_ahead_rad(record: RunRecord, along_m: float) -> float:
     x, y = (np.interp(due_m, at_m, path_m[:, axis]) for axis in range(2))
     steps_m = np.diff(due_m)
     rises_m = np.diff(ground.elevation_m(x, y))
-    known = steps_m > 1e-6
-    return float(np.arctan(rises_m[known] / steps_m[known]).max(initial=0.0))
+    is_known = steps_m > 1e-6
+    return float(np.arctan(rises_m[is_known] / steps_m[is_known]).max(initial=0.0))
 
 
 def _holds_rad(record: RunRecord) -> float:

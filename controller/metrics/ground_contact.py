@@ -57,17 +57,17 @@ def lifted_by_current(record: RunRecord) -> float:
     cycle = record.cycle
     robot = header.robot
     k_t = header.torque_constant_n_m_a
-    known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
-    rows = np.flatnonzero(known)[::EVERY]
+    is_known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
+    rows = np.flatnonzero(is_known)[::EVERY]
     if not robot.pitch_joints or not np.isfinite(k_t) or not len(rows):
         return float("nan")
-    at = np.searchsorted(cycle.time_s, pose.time_s[rows])
-    inside = at < len(cycle.time_s)
+    index = np.searchsorted(cycle.time_s, pose.time_s[rows])
+    inside = index < len(cycle.time_s)
     rows = rows[inside]
-    at = at[inside]
-    read = np.isfinite(cycle.current_a[at]).all(axis=1)
+    index = index[inside]
+    read = np.isfinite(cycle.current_a[index]).all(axis=1)
     shares = []
-    for row, k in zip(rows[read], at[read], strict=True):
+    for row, k in zip(rows[read], index[read], strict=True):
         head = BodyPose(float(pose.time_s[row]), pose.head_m[row], pose.rotation[row])
         body = body_in_world(robot, head, cycle.measured_rad[k])
         bears_n = support_n(robot, body, k_t * cycle.current_a[k])

@@ -72,8 +72,8 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     low[0] = -np.inf
     foot = a + np.clip(t, low, 1.0)[..., None] * step
     gap = np.hypot(*np.moveaxis(points_m[:, None] - foot, -1, 0))
-    at = np.clip(along_m, 0.0, end[-1])[:, None]
-    far = (end < at - _WINDOW_M) | (end - length > at + _WINDOW_M)  # False where NaN
+    clipped_m = np.clip(along_m, 0.0, end[-1])[:, None]
+    far = (end < clipped_m - _WINDOW_M) | (end - length > clipped_m + _WINDOW_M)  # False where NaN
     return np.asarray(np.where(far, np.inf, gap).min(axis=1))
 
 
@@ -99,18 +99,20 @@ def smooth_track_m(pose: PoseTable) -> Floats:
     """
     time_s = pose.time_s
     centre_m = pose.centre_m
-    known = np.isfinite(centre_m).all(axis=1)
-    if known.sum() < 3:
+    is_known = np.isfinite(centre_m).all(axis=1)
+    if is_known.sum() < 3:
         return centre_m
-    step_s = float(np.median(np.diff(time_s[known])))
-    even_s = np.arange(time_s[known][0], time_s[known][-1] + 0.5 * step_s, step_s)
+    step_s = float(np.median(np.diff(time_s[is_known])))
+    even_s = np.arange(time_s[is_known][0], time_s[is_known][-1] + 0.5 * step_s, step_s)
     window = min(2 * round(0.5 * _SMOOTH_S / step_s) + 1, (len(even_s) - 1) // 2 * 2 + 1)
     if window <= 3:
         return centre_m
     smooth = centre_m.copy()
     for axis in range(3):
-        even_m = np.interp(even_s, time_s[known], centre_m[known, axis])
-        smooth[known, axis] = np.interp(time_s[known], even_s, fitted_parabolas(even_m, window))
+        even_m = np.interp(even_s, time_s[is_known], centre_m[is_known, axis])
+        smooth[is_known, axis] = np.interp(
+            time_s[is_known], even_s, fitted_parabolas(even_m, window)
+        )
     return smooth
 
 

@@ -242,7 +242,7 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
     current = _peak(np.abs(cycle.current_a))
     use = wire_use(record)
     energy = energy_track(record)
-    whole = energy.between(-np.inf, np.inf)
+    energy_totals = energy.between(-np.inf, np.inf)
     along_links = _mean(pose.speed_m_s[chosen])
     costs = costs_of_transport(record, energy, moved)
     return RunSummary(
@@ -275,8 +275,8 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         eta_predicted=_digits(predicted / pulse),
         peak_current_a=_digits(current),
         peak_torque_n_m=_digits(current * header.torque_constant_n_m_a),
-        electrical_energy_j=_digits(whole[0]),
-        mechanical_energy_j=_digits(whole[1]),
+        electrical_energy_j=_digits(energy_totals[0]),
+        mechanical_energy_j=_digits(energy_totals[1]),
         energy_source=energy.source,
         electrical_cost_of_transport=_digits(costs[0]),
         mechanical_cost_of_transport=_digits(costs[1]),
@@ -357,10 +357,10 @@ def _assumptions(header: Header) -> dict[str, dict[str, object]]:
 
 
 def _battery(record: RunRecord) -> SummarizedBattery | None:
-    found = record.battery
-    if not len(found.time_s):
+    battery = record.battery
+    if not len(battery.time_s):
         return None
-    known_v = found.voltage_v[np.isfinite(found.voltage_v)]
+    known_v = battery.voltage_v[np.isfinite(battery.voltage_v)]
     first_v, last_v, least_v = (
         (known_v[0], known_v[-1], known_v.min()) if len(known_v) else (np.nan,) * 3
     )
@@ -368,16 +368,16 @@ def _battery(record: RunRecord) -> SummarizedBattery | None:
         _digits(float(first_v)),
         _digits(float(last_v)),
         _digits(float(least_v)),
-        _digits(_peak(found.current_a)),
-        _digits(float(found.charge_ah[-1])),
-        _digits(_peak(found.winding_c)),
+        _digits(_peak(battery.current_a)),
+        _digits(float(battery.charge_ah[-1])),
+        _digits(_peak(battery.winding_c)),
     )
 
 
 def _friction(record: RunRecord) -> SummarizedFriction | None:
-    found = record.friction
+    friction = record.friction
     file = record.header.world.friction
-    if not len(found.time_s):
+    if not len(friction.time_s):
         return None
 
     def last(values: Floats) -> float:
@@ -386,10 +386,10 @@ def _friction(record: RunRecord) -> SummarizedFriction | None:
     return SummarizedFriction(
         file.along,
         file.across,
-        last(found.along),
-        last(found.across),
-        (last(found.along_95[:, 0]), last(found.along_95[:, 1])),
-        (last(found.across_95[:, 0]), last(found.across_95[:, 1])),
+        last(friction.along),
+        last(friction.across),
+        (last(friction.along_95[:, 0]), last(friction.along_95[:, 1])),
+        (last(friction.across_95[:, 0]), last(friction.across_95[:, 1])),
     )
 
 
@@ -410,18 +410,18 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
 
 
 def _mean(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else float("nan")
+    finite_values = values[np.isfinite(values)]
+    return float(finite_values.mean()) if finite_values.size else float("nan")
 
 
 def _median(values: Floats) -> float | None:
-    known = values[np.isfinite(values)]
-    return _digits(float(np.median(known))) if known.size else None
+    finite_values = values[np.isfinite(values)]
+    return _digits(float(np.median(finite_values))) if finite_values.size else None
 
 
 def _peak(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.max()) if known.size else float("nan")
+    finite_values = values[np.isfinite(values)]
+    return float(finite_values.max()) if finite_values.size else float("nan")
 
 
 def _digits(value: float) -> float | None:

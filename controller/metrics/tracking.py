@@ -20,19 +20,24 @@ def lag_s(cycle: CycleTable, period_s: float) -> float:
 
     NaN when nothing moves, or when the run is too short.
     """
-    whole = np.isfinite(cycle.sent_rad).all(axis=1) & np.isfinite(cycle.measured_rad).all(axis=1)
-    if np.count_nonzero(whole) < 2:
+    is_complete = np.isfinite(cycle.sent_rad).all(axis=1) & np.isfinite(cycle.measured_rad).all(
+        axis=1
+    )
+    if np.count_nonzero(is_complete) < 2:
         return float("nan")
-    time = cycle.deadline_s[whole]
+    time = cycle.deadline_s[is_complete]
     grid = np.arange(time[0], time[-1] + 0.5 * period_s, period_s)
-    sent = _on_grid(grid, time, cycle.sent_rad[whole])
-    measured = _on_grid(grid, time, cycle.measured_rad[whole])
+    sent = _on_grid(grid, time, cycle.sent_rad[is_complete])
+    measured = _on_grid(grid, time, cycle.measured_rad[is_complete])
     most = round(_LONGEST_S / period_s)
     if len(grid) < 3 * most or np.ptp(sent, axis=0).max() < 1e-3:
         return float("nan")
-    seen = measured[most:]
+    measured_window = measured[most:]
     cost = np.array(
-        [np.square(seen - sent[most - k : len(sent) - k]).mean() for k in range(most + 1)]
+        [
+            np.square(measured_window - sent[most - k : len(sent) - k]).mean()
+            for k in range(most + 1)
+        ]
     )
     k = int(cost.argmin())
     if 0 < k < most:

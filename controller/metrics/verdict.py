@@ -79,9 +79,9 @@ def _judged(record: RunRecord, numbers: RunSummary) -> tuple[int, str | None, st
         more = "snakewalk doctor --port {port}" if on_port else "snakewalk log report {log}"
         return _MISSED, f"stopped by safety: {numbers.trip}", more
     if _reached(numbers) < numbers.waypoints:
-        found = failure(record)
-        cause = "a waypoint was missed" if found is None else found.text
-        return _MISSED, cause, "" if found is None else _ADVICE.get(found.cause, "")
+        fault = failure(record)
+        cause = "a waypoint was missed" if fault is None else fault.text
+        return _MISSED, cause, "" if fault is None else _ADVICE.get(fault.cause, "")
     if numbers.waypoints and not numbers.is_measured:
         return (
             NOT_MEASURED,

@@ -176,8 +176,8 @@ class ExternalPose:
         self._now_s = state.time_s
         arrived = [*self._early, *self._feed.arrived(state.time_s)]
         self._early.clear()
-        for each in arrived:
-            self._accept(each)
+        for arrival in arrived:
+            self._accept(arrival)
         return self._filter.pose(state.time_s)
 
     def fault(self) -> str | None:

@@ -54,14 +54,14 @@ class FeedStatistics:
 
     def faults(self) -> list[str]:
         """Return contradictions among the messages, one line each."""
-        found = []
+        problems = []
         if not self._poses:
-            found.append(self.last_fault or "nothing arrived; start the sender")
+            problems.append(self.last_fault or "nothing arrived; start the sender")
         if len(self.senders) > 1:
-            found.append(f"two senders: {', '.join(self.senders)}; stop one of them")
+            problems.append(f"two senders: {', '.join(self.senders)}; stop one of them")
         if len(self.frames) > 1:
-            found.append(f"wrong frame: poses name {', '.join(self.frames)}; send one frame")
-        return found
+            problems.append(f"wrong frame: poses name {', '.join(self.frames)}; send one frame")
+        return problems
 
     def facts(self) -> dict[str, Any]:
         """Return the numbers, for a command's answer."""
@@ -110,7 +110,7 @@ class FeedStatistics:
         rotations = [sample.rotation for _, _, sample in self._poses]
         if len(rotations) < 10:
             return None
-        steps = np.array([rotation_vector(two @ one.T) for one, two in pairwise(rotations)])
+        steps = np.array([rotation_vector(two @ before.T) for before, two in pairwise(rotations)])
         return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
 
 

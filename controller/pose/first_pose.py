@@ -39,12 +39,12 @@ def await_first_pose(
     arrived = list[ArrivedPose]()
     reason = ""
     while clock.now_s() < until_s:
-        for each in feed.arrived(clock.now_s()):
-            arrived.append(each)
-            if isinstance(each.sample, UnusablePoseError):
-                reason = str(each.sample)
+        for arrival in feed.arrived(clock.now_s()):
+            arrived.append(arrival)
+            if isinstance(arrival.sample, UnusablePoseError):
+                reason = str(arrival.sample)
                 continue
-            fault = judge(each.sample)
+            fault = judge(arrival.sample)
             if fault is not None:
                 raise InputError(f"pose {source}: {fault}")
             return arrived

@@ -94,34 +94,36 @@ class MeasuredFriction(FrictionEstimator):
         newest_s = heads[-1].time_s if heads else begin_s
         if newest_s > end_s or now_s > end_s + LATE_S:
             self._steps = self._judge(begin_s, end_s)
-            self._cycles = [each for each in self._cycles if each.time_s > end_s]
-            self._heads = [each for each in self._heads if each.time_s > end_s]
-        found = next(self._steps, None)
-        if found is not None:
-            self.accept(found)
-        return found
+            self._cycles = [cycle for cycle in self._cycles if cycle.time_s > end_s]
+            self._heads = [head for head in self._heads if head.time_s > end_s]
+        identified = next(self._steps, None)
+        if identified is not None:
+            self.accept(identified)
+        return identified
 
     def _judge(self, begin_s: float, end_s: float) -> Iterator[FoundFriction | None]:
         """Compare a window with two hypotheses, one a cycle; the result comes last."""
-        cycles = [each for each in self._cycles if each.time_s <= end_s]
-        heads = [each for each in self._heads if begin_s <= each.time_s <= end_s]
+        cycles = [cycle for cycle in self._cycles if cycle.time_s <= end_s]
+        heads = [head for head in self._heads if begin_s <= head.time_s <= end_s]
         return self._steps_of(cycles, heads)
 
     def _steps_of(
         self, cycles: list[_Cycle], heads: list[TimedHead]
     ) -> Iterator[FoundFriction | None]:
-        columns = (np.array(each) for each in zip(*cycles, strict=True))
+        columns = (np.array(column) for column in zip(*cycles, strict=True))
         times, places, headings, points, links = columns
         window = SlideWindow(times, headings, points, places[0])
         ground = self._ground
         if ground is not None:
-            if any(_roughness_m(ground, each) > ROUGH_M for each in links[window.knots]):
+            if any(
+                _roughness_m(ground, link_points) > ROUGH_M for link_points in links[window.knots]
+            ):
                 yield self._filter.absorb(None, WINDOW_S)
                 return
-            window = replace(window, load=np.array([_load(ground, each) for each in links]))
+            window = replace(window, load=np.array([_load(ground, link) for link in links]))
             yield None
-        here, by_both, by_ratio = self._filter.hypotheses()
-        track = window.track(here)
+        hypothesis, by_both, by_ratio = self._filter.hypotheses()
+        track = window.track(hypothesis)
         yield None
         farther = window.track(by_ratio)
         yield None
@@ -129,12 +131,12 @@ class MeasuredFriction(FrictionEstimator):
         evidence = window.evidence(_readings(heads), track, farther, other) if heads else None
         yield self._filter.absorb(evidence, WINDOW_S)
 
-    def accept(self, found: FoundFriction) -> None:
+    def accept(self, identified: FoundFriction) -> None:
         """As ``FrictionEstimator``; on a slope the use begins only with narrow intervals."""
         is_used = self._used != self._file
-        if self._ground is not None and not is_used and found.spread > SPREAD:
-            found = replace(found, differs=False)
-        super().accept(found)
+        if self._ground is not None and not is_used and identified.spread > SPREAD:
+            identified = replace(identified, differs=False)
+        super().accept(identified)
 
 
 def _cycle(time_s: float, view: BodyView) -> _Cycle:
@@ -170,5 +172,5 @@ def _readings(heads: list[TimedHead]) -> HeadReadings:
         place.append([*head.position_m[:2], heading])
         (xx, yy), turn = np.diag(head.position_covariance)[:2], head.rotation_covariance[2, 2]
         variance.append([xx, yy, turn])
-    times = np.array([each.time_s for each in heads])
+    times = np.array([head_place.time_s for head_place in heads])
     return HeadReadings(times, np.array(place), np.array(variance))

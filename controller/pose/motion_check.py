@@ -65,37 +65,41 @@ class MotionCheck:
         if self._last is None or then.time_s - self._last[0].time_s > 2.0 * STEP_S:
             self._last = (then, measured)
             return
-        before, seen = self._last
+        before, last_head = self._last
         if then.time_s - before.time_s < STEP_S:
             return
         self._last = (then, measured)
         turn = then.place[2] - before.place[2]
         if abs(turn) < STILL_RAD and np.hypot(*(then.place[:2] - before.place[:2])) < STILL_M:
             return
-        seen_turn = _heading(measured) - _heading(seen)
+        seen_turn = _heading(measured) - _heading(last_head)
         self._turns.append((float(turn), float(np.arctan2(np.sin(seen_turn), np.cos(seen_turn)))))
-        way = complex(*(then.place[:2] - before.place[:2]))
-        way *= np.exp(1j * (_heading(seen) - before.place[2]))
-        self._ways.append((way, complex(*(measured.position_m - seen.position_m)[:2])))
+        direction = complex(*(then.place[:2] - before.place[:2]))
+        direction *= np.exp(1j * (_heading(last_head) - before.place[2]))
+        self._ways.append((direction, complex(*(measured.position_m - last_head.position_m)[:2])))
         self.fault = self._judge()
 
     def _judge(self) -> str | None:
         if len(self._turns) < LEAST:
             return None
-        expected, found = (np.array(column) for column in zip(*self._turns, strict=True))
+        expected, measured = (np.array(column) for column in zip(*self._turns, strict=True))
         turned = float(expected @ expected)
-        if turned > LEAST_TURN_RAD2 and _correlation(expected, found) < -SHARE:
+        if turned > LEAST_TURN_RAD2 and _correlation(expected, measured) < -SHARE:
             return (
                 "mirrored axes: the head turns the other way than its joints say; send a "
                 "right-handed frame, z up"
             )
-        way, seen = (np.array(column) for column in zip(*self._ways, strict=True))
-        if float(np.vdot(way, way).real) < LEAST_WAY_M2:
+        expected_ways, measured_ways = (
+            np.array(column) for column in zip(*self._ways, strict=True)
+        )
+        expected_size = float(np.vdot(expected_ways, expected_ways).real)
+        if expected_size < LEAST_WAY_M2:
             return None
-        same = np.vdot(way, seen)
-        mirrored = np.vdot(way.conj(), seen)
-        size = float(np.sqrt(np.vdot(way, way).real * np.vdot(seen, seen).real))
-        scale = float(np.sqrt(np.vdot(seen, seen).real / np.vdot(way, way).real))
+        same = np.vdot(expected_ways, measured_ways)
+        mirrored = np.vdot(expected_ways.conj(), measured_ways)
+        measured_size = float(np.vdot(measured_ways, measured_ways).real)
+        size = float(np.sqrt(expected_size * measured_size))
+        scale = float(np.sqrt(measured_size / expected_size))
         if scale > SCALE and abs(same) > SHARE * size:
             return f"wrong unit: the head moves {scale:.0f} times as far as expected; send metres"
         if abs(mirrored) > SHARE * size > abs(same) + 0.2 * size:
@@ -109,7 +113,7 @@ class MotionCheck:
             and abs(angle) < TURNED_RAD
             and scale < SCALE
             and turned > LEAST_TURN_RAD2
-            and _correlation(expected, found) > AGREED
+            and _correlation(expected, measured) > AGREED
         )
         if abs(same) > SHARE * size and abs(angle) > TURNED_RAD:
             return (

@@ -65,8 +65,8 @@ class MotionHistory:
             row = self._rows[self._first]
             return Moment(time_s, row[1:4].copy(), row[4:].copy())
         k = int(np.clip(np.searchsorted(times, time_s), 1, len(times) - 1)) + self._first
-        one = self._rows[k - 1]
+        before_row = self._rows[k - 1]
         two = self._rows[k]
-        part = float(np.clip((time_s - one[0]) / (two[0] - one[0]), 0.0, 1.0))
-        row = one + part * (two - one)
+        part = float(np.clip((time_s - before_row[0]) / (two[0] - before_row[0]), 0.0, 1.0))
+        row = before_row + part * (two - before_row)
         return Moment(time_s, row[1:4], row[4:])

@@ -109,12 +109,12 @@ class PoseFilter:
             self._align()
             return
         step_s = moment.time_s - before.time_s
-        turn, way = self._motion(before, moment)
-        self._head_m[:2] += way
+        turn, displacement_m = self._motion(before, moment)
+        self._head_m[:2] += displacement_m
         self._body = rotation_by(np.array([0.0, 0.0, turn])) @ self._body
         if step_s > 0.0:
             slip = 2.0 * SLIP_TIME_S * SLIP_SHARE**2 / step_s
-            moved = slip * float(way @ way)
+            moved = slip * float(displacement_m @ displacement_m)
             turned = slip * turn * turn
             across = DRIFT_M2_S * step_s + moved
             rise = RISE_M2_S * step_s + 0.5 * moved
@@ -125,15 +125,15 @@ class PoseFilter:
     def innovation(self, measured: HeadMeasurement, then: Moment) -> Innovation:
         """Compare a measurement with the prediction for its moment."""
         assert self._last is not None
-        turn, way = self._motion(then, self._last)
-        head_m = self._head_m - np.append(way, 0.0)
+        turn, displacement_m = self._motion(then, self._last)
+        head_m = self._head_m - np.append(displacement_m, 0.0)
         body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
-        seen = measured.rotation @ self._mean_frame(then)
-        off_m, off_rad = measured.position_m - head_m, rotation_vector(seen @ body.T)
+        measured_frame = measured.rotation @ self._mean_frame(then)
+        off_m, off_rad = measured.position_m - head_m, rotation_vector(measured_frame @ body.T)
         gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
         far = _deviations(off_m, self.position_covariance + measured.position_covariance)
         variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
-        turn_rad = abs(_turn_between(body[:, 0], seen[:, 0]))
+        turn_rad = abs(_turn_between(body[:, 0], measured_frame[:, 0]))
         is_jump = bool(
             (far > JUMP_SD and np.linalg.norm(off_m) > JUMP_M + SLIDE_M_S * gap_s)
             or (
@@ -145,8 +145,10 @@ class PoseFilter:
 
     def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
         """Return the turn from the frame of dead reckoning to the world by a measurement alone."""
-        seen = measured.rotation @ self._mean_frame(then)
-        return _wrapped(float(np.arctan2(seen[1, 0], seen[0, 0])) - self._body_heading(then))
+        measured_frame = measured.rotation @ self._mean_frame(then)
+        return _wrapped(
+            float(np.arctan2(measured_frame[1, 0], measured_frame[0, 0])) - self._body_heading(then)
+        )
 
     def place_again(self, measured: HeadMeasurement, then: Moment) -> None:
         """Place the body by a measurement, whatever its pose was before."""
@@ -191,8 +193,8 @@ class PoseFilter:
 
     def _mean_frame(self, moment: Moment) -> Floats:
         """Return the mean axes (3, 3) of the links, in those of the head link."""
-        for known, frame in self._frames:
-            if known is moment:
+        for moment_of_frame, frame in self._frames:
+            if moment_of_frame is moment:
                 return frame
         frame = self._mean_axes(moment.joint_rad)
         self._frames.append((moment, frame))
@@ -229,11 +231,13 @@ def _wrapped(angle_rad: float) -> float:
     return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
 
 
-def _turn_between(one: Floats, two: Floats) -> float:
+def _turn_between(first: Floats, two: Floats) -> float:
     """Return the angle between two directions in the horizontal plane; 0 of a steep one."""
-    if min(np.hypot(*one[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
+    if min(np.hypot(*first[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
         return 0.0
-    return float(np.arctan2(one[0] * two[1] - one[1] * two[0], one[0] * two[0] + one[1] * two[1]))
+    return float(
+        np.arctan2(first[0] * two[1] - first[1] * two[0], first[0] * two[0] + first[1] * two[1])
+    )
 
 
 def _deviations(error: Floats, covariance: Floats) -> float:

@@ -48,10 +48,10 @@ class SenderClock:
 
     def _fit(self) -> None:
         """Fit the drift to the smallest differences of whole bins."""
-        whole = list(self._bins)[:-1]
-        if len(whole) < DRIFT_AFTER:
+        complete_bins = list(self._bins)[:-1]
+        if len(complete_bins) < DRIFT_AFTER:
             return
-        time_s, value = (np.array(column) for column in zip(*whole, strict=True))
+        time_s, value = (np.array(column) for column in zip(*complete_bins, strict=True))
         time_s = time_s - time_s.mean()
         slope = float((time_s * (value - value.mean())).sum() / (time_s * time_s).sum())
         self.drift = min(max(slope, -MOST_DRIFT), MOST_DRIFT)

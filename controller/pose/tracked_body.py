@@ -45,18 +45,18 @@ class TrackedBody:
         body_m = self._world_m + self._world @ sample.position_m
         link = self._world @ sample.rotation @ self._offset.T
         link_m = body_m - link @ self._offset_m
-        at, link_in_head = self._in_head(joint_rad)
+        joint_in_head, link_in_head = self._in_head(joint_rad)
         rotation = link @ link_in_head.T
-        head_m = link_m - rotation @ at
+        head_m = link_m - rotation @ joint_in_head
         position, turn = self._covariances(sample)
         arm = _cross(head_m - body_m)  # an angle error moves the head by the lever arm
         return HeadMeasurement(head_m, rotation, position + arm @ turn @ arm.T, turn)
 
     def body(self, head: BodyPose, joint_rad: Floats) -> tuple[Floats, Floats]:
         """Return position (3,) and axes (3, 3) of the tracked body in the source's frame."""
-        at, link_in_head = self._in_head(joint_rad)
+        joint_in_head, link_in_head = self._in_head(joint_rad)
         link = head.rotation @ link_in_head
-        link_m = head.head_in_world_m + head.rotation @ at
+        link_m = head.head_in_world_m + head.rotation @ joint_in_head
         body_m = link_m + link @ self._offset_m
         axes = link @ self._offset
         return self._world.T @ (body_m - self._world_m), self._world.T @ axes

@@ -74,9 +74,13 @@ class SimulatedTracker:
 
     def due(self, now_s: float) -> Sequence[Sent]:
         """Return the datagrams that are to arrive by now, in the order of their arrival."""
-        due = sorted((each for each in self._outgoing if each.due_s <= now_s), key=_due_s)
+        due = sorted(
+            (outgoing for outgoing in self._outgoing if outgoing.due_s <= now_s), key=_due_s
+        )
         if due:
-            self._outgoing = deque(each for each in self._outgoing if each.due_s > now_s)
+            self._outgoing = deque(
+                outgoing for outgoing in self._outgoing if outgoing.due_s > now_s
+            )
         return due
 
     def _next_noise(self) -> Floats:

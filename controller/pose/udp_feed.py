@@ -52,10 +52,10 @@ class PoseQueue:
 
     def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
         """Return the poses that have arrived since the last call."""
-        found = []
+        arrivals = []
         while self._waiting:
-            found.append(self._waiting.popleft())
-        return found
+            arrivals.append(self._waiting.popleft())
+        return arrivals
 
 
 class UdpFeed(PoseQueue):

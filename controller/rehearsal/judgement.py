@@ -133,8 +133,8 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
     true_m = np.stack([np.interp(at_s, truth.time_s, truth.head_m[:, k]) for k in range(2)], 1)
     heading = np.unwrap(np.arctan2(truth.rotation[:, 1, 0], truth.rotation[:, 0, 0]))
     true_rad = np.interp(at_s, truth.time_s, heading)
-    found = pose.rotation[within]
-    turn = np.arctan2(found[:, 1, 0], found[:, 0, 0]) - true_rad
+    rotations = pose.rotation[within]
+    turn = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]) - true_rad
     return (
         np.hypot(*(pose.head_m[within, :2] - true_m).T),
         np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
@@ -148,11 +148,11 @@ def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
         return None
     row = {int(sequence): k for k, sequence in enumerate(truth.sequence)}
     rows = np.array([row.get(int(sequence), -1) for sequence in source.sequence])
-    known = (rows >= 0) & np.isfinite(source.arrival_s)
-    known[known] = np.isfinite(truth.sent_s[rows[known]])
-    if not known.any():
+    is_known = (rows >= 0) & np.isfinite(source.arrival_s)
+    is_known[is_known] = np.isfinite(truth.sent_s[rows[is_known]])
+    if not is_known.any():
         return None
-    return float((source.arrival_s[known] - truth.sent_s[rows[known]]).min())
+    return float((source.arrival_s[is_known] - truth.sent_s[rows[is_known]]).min())
 
 
 def _off_path_m(truth: Truth, record: RunRecord) -> Floats:

@@ -46,10 +46,10 @@ def metric_errors(truth: Truth, record: RunRecord, numbers: RunSummary) -> Metri
         numbers: its summary.
 
     """
-    known = true_record(truth, record)
-    if known is None:
+    records = true_record(truth, record)
+    if records is None:
         return None
-    true_run, displacement_m = known
+    true_run, displacement_m = records
     true = summary(true_run)
     return MetricErrors(
         numbers.travelled_m,

@@ -165,10 +165,10 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
     except InputError as error:
         return {"error": error.faults[0]}
     numbers = result.summary
-    found = judge(read_truth(truth), result.record, result.outcome.tripped, numbers.outcome)
+    judgement = judge(read_truth(truth), result.record, result.outcome.tripped, numbers.outcome)
     metrics = metric_errors(read_truth(truth), result.record, numbers)
     return {
-        **found.facts(),
+        **judgement.facts(),
         "metrics": None if metrics is None else asdict(metrics),
         "friction": _friction_facts(result, deviation),
         "duration_s": round(result.outcome.duration_s, 2),
@@ -179,15 +179,21 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
 
 def _friction_facts(result: RunResult, deviation: Deviation) -> dict[str, Any] | None:
     """Return the estimated friction next to the true one; None if it was not estimated."""
-    found = result.summary.friction_found
-    if found is None:
+    friction_found = result.summary.friction_found
+    if friction_found is None:
         return None
     true = {
-        "true_along": round(found.along_file * deviation.along, 4),
-        "true_across": round(found.across_file * deviation.across, 4),
+        "true_along": round(friction_found.along_file * deviation.along, 4),
+        "true_across": round(friction_found.across_file * deviation.across, 4),
     }
     law = deviation.law or result.record.header.world.friction.law_name
-    (low, high), (least, most) = found.along_95, found.across_95
+    (low, high), (least, most) = friction_found.along_95, friction_found.across_95
     is_inside = low <= true["true_along"] <= high and least <= true["true_across"] <= most
     used = any(event.kind == "friction" for event in result.record.events)
-    return {**asdict(found), **true, "true_law": law, "is_inside": is_inside, "was_used": used}
+    return {
+        **asdict(friction_found),
+        **true,
+        "true_law": law,
+        "is_inside": is_inside,
+        "was_used": used,
+    }

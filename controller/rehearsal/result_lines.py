@@ -24,16 +24,16 @@ def read_lines(path: Path, parse: Callable[[Any], A], what: str) -> list[A]:
         InputError: a line is damaged, or is not such a row.
 
     """
-    found: list[A] = []
+    lines_parsed: list[A] = []
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     for number, line in enumerate(lines, 1):
         try:
-            found.append(parse(parse_json(line)))
+            lines_parsed.append(parse(parse_json(line)))
         except (ValueError, KeyError, TypeError):
             raise InputError(
                 f"{path}: line {number} is not {what}; remove it, or choose another file"
             ) from None
-    return found
+    return lines_parsed
 
 
 def append_lines(

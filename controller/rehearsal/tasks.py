@@ -118,8 +118,8 @@ def task_named(name: str) -> ControllerTask:
     for task in TASKS:
         if task.name == name:
             return task
-    known = ", ".join(task.name for task in TASKS)
-    raise InputError(f"{name}: no such task; use one of {known}")
+    names = ", ".join(task.name for task in TASKS)
+    raise InputError(f"{name}: no such task; use one of {names}")
 
 
 def run_task(item: TaskRun) -> TaskResult:
@@ -191,10 +191,12 @@ def _prepare(task: ControllerTask, controller: str, seed: int) -> PreparedRun:
     if _is_policy(controller):
         return prepare_policy(controller, **place, seconds=task.seconds, seed=seed, keys=keys)
     if task.run is None:
-        own = find("motion", controller)
-        if own is None:
+        source_plugin = find("motion", controller)
+        if source_plugin is None:
             raise InputError(f"{controller} goes to waypoints, and the task {task.name} has none")
-        return prepare_source(own.load(), **place, seconds=task.seconds, seed=seed, keys=keys)
+        return prepare_source(
+            source_plugin.load(), **place, seconds=task.seconds, seed=seed, keys=keys
+        )
     keys["run.time_limit_s"] = task.seconds
     return prepare_job(task.run, motion=controller, seed=seed, keys=keys)
 
@@ -208,17 +210,17 @@ def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
         raise InputError(f"{item.controller} does not use a pose, and the rehearsal is about it")
     case = RehearsalCase(str(task.run), item.seed, has_errors=True, tracker=TRACKER)
     changes = {"motion": item.controller, "time_limit_s": task.seconds}
-    found = rehearse(case, changes)
-    if "error" in found:
-        raise InputError(str(found["error"]))
+    facts = rehearse(case, changes)
+    if "error" in facts:
+        raise InputError(str(facts["error"]))
     count = len(load_run(str(task.run)).waypoints_m)
     return TaskResult(
         item.task,
         item.controller,
         item.seed,
-        share=_digits(found["truly_reached"] / count),
-        duration_s=_digits(found["duration_s"]),
-        ended=found["tripped"] or "ran to its end",
+        share=_digits(facts["truly_reached"] / count),
+        duration_s=_digits(facts["duration_s"]),
+        ended=facts["tripped"] or "ran to its end",
     )
 
 

@@ -78,7 +78,7 @@ class Wandering:
             action = self._controllers[body].choose(float(self._speed_m_s[body]))
             self.crowd.place(body, start, segment=action, scale=float(sizes[body]))
         self.crowd.stagger(seed)
-        kinds = np.array([one.kind for one in repertoire.segments])
+        kinds = np.array([segment.kind for segment in repertoire.segments])
         turns = np.isin(kinds, ["left", "right"])
         back = np.isin(kinds, REVERSE)
         self._parts = np.linspace(0, repertoire.segments[0].link_m.shape[1] - 1, 5).astype(int)
@@ -117,9 +117,9 @@ class Wandering:
             f"crowd of {len(separated.held)} bodies: the ground is too small for them; use fewer"
         )
 
-    def _evade(self, held: Ints) -> None:
+    def _evade(self, waiting_frames: Ints) -> None:
         """Let each body that has waited long begin another action, and go to another place."""
-        late = np.flatnonzero((held > 0) & (held % WAITING_FRAMES == 0))
+        late = np.flatnonzero((waiting_frames > 0) & (waiting_frames % WAITING_FRAMES == 0))
         if len(late):
             self._goal_m[late] = self._places(len(late))
         for body in late.tolist():
@@ -131,15 +131,15 @@ class Wandering:
         """Choose the next action of bodies whose cycle has ended."""
         crowd = self.crowd
         random = self._random
-        at = crowd.origin_m[bodies, :2]
-        near = np.hypot(*(self._goal_m[bodies] - at).T) < self.length_m[bodies]
+        origin_m = crowd.origin_m[bodies, :2]
+        near = np.hypot(*(self._goal_m[bodies] - origin_m).T) < self.length_m[bodies]
         there = bodies[near]
         self._goal_m[there] = self._places(len(there))
         self._pause[there] = (random.random(len(there)) < PAUSE_SHARE) * random.integers(
             3, 8, len(there)
         )
         heading = np.arctan2(crowd.rotation[bodies, 3], crowd.rotation[bodies, 0])
-        turn = self._turn_rad(bodies, at, heading)
+        turn = self._turn_rad(bodies, origin_m, heading)
         for k, body in enumerate(bodies):
             rests = self._pause[body] > 0
             self._pause[body] -= int(rests)
@@ -147,19 +147,21 @@ class Wandering:
             rate = 0.0 if rests else float(turn[k]) / TURNING_S
             crowd.segment[body] = self._controllers[body].choose(speed, rate)
 
-    def _turn_rad(self, bodies: Indices, at: Floats, heading: Floats) -> Floats:
+    def _turn_rad(self, bodies: Indices, origin_m: Floats, heading: Floats) -> Floats:
         """(n,) turn of each body: towards its goal, or the nearest free direction."""
-        to = self._goal_m[bodies] - at
+        to = self._goal_m[bodies] - origin_m
         goal = np.arctan2(to[:, 1], to[:, 0])
         tried = goal[:, None] + _OFFSETS_RAD
         reach = AHEAD_LENGTHS * self.length_m[bodies]
         ahead = np.stack([np.cos(tried), np.sin(tried)], axis=2) * reach[:, None, None]
-        free = self._safe(ahead + at[:, None])
-        gap = self._gap_m(bodies, ahead + at[:, None])
+        free = self._safe(ahead + origin_m[:, None])
+        gap = self._gap_m(bodies, ahead + origin_m[:, None])
         if self.separated is None:
             free &= gap > CLEAR_LENGTHS * reach[:, None]
         else:
-            gap = np.minimum(gap, self._gap_m(bodies, at[:, None] + 0.5 * ahead)).astype(float)
+            gap = np.minimum(gap, self._gap_m(bodies, origin_m[:, None] + 0.5 * ahead)).astype(
+                float
+            )
             free &= gap > CLEAR_SIDE_LENGTHS * reach[:, None]
         widest = 0 if self.separated is None else gap.argmax(axis=1)
         first = np.where(free.any(axis=1), free.argmax(axis=1), widest)
@@ -190,11 +192,11 @@ class Wandering:
 
         """
         ground = self._ground
-        found = np.zeros((0, 2))
+        places_m = np.zeros((0, 2))
         corner = np.array([ground.x0_m, ground.y0_m]) + 0.1 * np.array(ground.size_m)
         for _ in range(1000):
-            if len(found) >= count:
-                return found[:count]
+            if len(places_m) >= count:
+                return places_m[:count]
             tried = corner + self._random.random((count + 8, 2)) * 0.8 * np.array(ground.size_m)
-            found = np.concatenate([found, tried[self._safe(tried)]])
+            places_m = np.concatenate([places_m, tried[self._safe(tried)]])
         raise InputError(f"a ground that is nowhere under {STEEP_RAD:g} rad: no place to go to")

@@ -258,10 +258,10 @@ def _step(  # noqa: C901  a compiled loop
                 playing[b] = new
                 cycles[b] = 0
                 following[b] = first[new]
-        at = following[b]
+        last_move = following[b]
         s = scale[b]
         shown = visible[b]
-        a = at
+        a = last_move
         share = 0.0
         r00, r01, r02 = rotation[b, 0], rotation[b, 1], rotation[b, 2]
         r10, r11, r12 = rotation[b, 3], rotation[b, 4], rotation[b, 5]
@@ -273,13 +273,13 @@ def _step(  # noqa: C901  a compiled loop
             bridge_remaining[b] -= 1
         else:
             bridge_remaining[b] = 0
-            u, v, w = s * move[at, 0], s * move[at, 1], s * move[at, 2]
+            u, v, w = s * move[last_move, 0], s * move[last_move, 1], s * move[last_move, 2]
             x += r00 * u + r01 * v + r02 * w
             y += r10 * u + r11 * v + r12 * w
             z += r20 * u + r21 * v + r22 * w
-            t00, t01, t02 = turn[at, 0], turn[at, 1], turn[at, 2]
-            t10, t11, t12 = turn[at, 3], turn[at, 4], turn[at, 5]
-            t20, t21, t22 = turn[at, 6], turn[at, 7], turn[at, 8]
+            t00, t01, t02 = turn[last_move, 0], turn[last_move, 1], turn[last_move, 2]
+            t10, t11, t12 = turn[last_move, 3], turn[last_move, 4], turn[last_move, 5]
+            t20, t21, t22 = turn[last_move, 6], turn[last_move, 7], turn[last_move, 8]
             r00, r01, r02 = (
                 r00 * t00 + r01 * t10 + r02 * t20,
                 r00 * t01 + r01 * t11 + r02 * t21,
@@ -299,11 +299,11 @@ def _step(  # noqa: C901  a compiled loop
             rotation[b, 3], rotation[b, 4], rotation[b, 5] = r10, r11, r12
             rotation[b, 6], rotation[b, 7], rotation[b, 8] = r20, r21, r22
             origin[b, 0], origin[b, 1], origin[b, 2] = x, y, z
-            if at == last[playing[b]]:
+            if last_move == last[playing[b]]:
                 ended[b] = True
                 following[b] = first[playing[b]]
             else:
-                following[b] = at + 1
+                following[b] = last_move + 1
         if not shown:
             continue
         x0, y0, z0 = np.float32(x), np.float32(y), np.float32(z)
@@ -319,9 +319,9 @@ def _step(  # noqa: C901  a compiled loop
         else:
             p, q = np.float32(1.0 - share), np.float32(share)
             for k in range(lanes):
-                dx = p * shape[a, 0, k] + q * shape[at, 0, k]
-                dy = p * shape[a, 1, k] + q * shape[at, 1, k]
-                dz = p * shape[a, 2, k] + q * shape[at, 2, k]
+                dx = p * shape[a, 0, k] + q * shape[last_move, 0, k]
+                dy = p * shape[a, 1, k] + q * shape[last_move, 1, k]
+                dz = p * shape[a, 2, k] + q * shape[last_move, 2, k]
                 points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
                 points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
                 points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz

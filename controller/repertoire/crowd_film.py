@@ -70,7 +70,7 @@ class DetailedCrowd:
         Near ones stand on the ground by the half circle of [PT] 2.6.5, which keeps their lengths;
         of others each point is lifted onto the ground.
         """
-        found = []
+        detailed_chains = []
         for body in np.flatnonzero(levels > HIDDEN).tolist():
             level = int(levels[body])
             scale = float(crowd.scale[body])
@@ -86,8 +86,8 @@ class DetailedCrowd:
                 points = links[kept]
                 radius = scale * self._radius_m[kept]
                 points[:, 2] = self._ground.elevation_m(points[:, 0], points[:, 1]) + radius
-            found.append(DetailedChain(body, level, points, radius))
-        return found
+            detailed_chains.append(DetailedChain(body, level, points, radius))
+        return detailed_chains
 
 
 FPS: Final = 20
@@ -203,8 +203,8 @@ class CrowdScene:
         middle = np.array([self._ground.x0_m, self._ground.y0_m]) + 0.5 * np.array(
             self._ground.size_m
         )
-        at = middle + 0.3 * wide * np.array([np.cos(turn), np.sin(turn)])
-        lookat = np.array([*at, float(self._ground.elevation_m(*at))])
+        place_m = middle + 0.3 * wide * np.array([np.cos(turn), np.sin(turn)])
+        lookat = np.array([*place_m, float(self._ground.elevation_m(*place_m))])
         distance = wide * (0.42 + 0.14 * np.cos(1.7 * turn))
         return lookat, distance, float(np.degrees(turn)) + 55.0, -26.0
 

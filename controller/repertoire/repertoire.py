@@ -108,14 +108,14 @@ def load_repertoire(path: Path) -> Repertoire:
             f"{path}: no such file; make one by: snakewalk gait repertoire record -o {path}"
         )
     try:
-        held, _ = read_arrays(path)
-        about = parse_json(str(held["about"]))
+        arrays, _ = read_arrays(path)
+        about = parse_json(str(arrays["about"]))
         if about.get("format") != FORMAT:
             raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
         about.setdefault("law", NO_LAW)
         about = {key: about[key] for key in (*_HEAD, "segments")}
         segments = tuple(
-            Segment(**plain, **{name: held[f"{k}/{name}"] for name in _ARRAYS})
+            Segment(**plain, **{name: arrays[f"{k}/{name}"] for name in _ARRAYS})
             for k, plain in enumerate(about["segments"])
         )
     except (KeyError, TypeError, AttributeError, ValueError):

@@ -59,16 +59,16 @@ def plan_route(
         InputError: no repertoire, of another robot or ground, or no sequence reaches all waypoints.
 
     """
-    known = load_run(name)
-    beside = Path(name).parent if name.endswith(".toml") else None
+    stored_run = load_run(name)
+    folder = Path(name).parent if name.endswith(".toml") else None
     changes = {"robot": robot, "world": world, "motion": "repertoire"}
-    fields = known.model_dump() | {k: v for k, v in changes.items() if v is not None}
+    fields = stored_run.model_dump() | {k: v for k, v in changes.items() if v is not None}
     run = checked(RunConfig, fields, "command line")
-    body = load_robot(run.robot, beside)
-    ground = load_world(run.world, beside)
+    body = load_robot(run.robot, folder)
+    ground = load_world(run.world, folder)
     if not run.waypoints_m:
         raise InputError(f"run {run.name}: has no waypoints to plan for")
-    file = repertoire_file or default_file(robot or known.robot, world or known.world)
+    file = repertoire_file or default_file(robot or stored_run.robot, world or stored_run.world)
     flat(ground)
     if not file.is_file():
         raise InputError(
@@ -230,10 +230,10 @@ def search_cost(
     start = job.route.pose[0]
     aimed_m = AIM_SHARE * run.waypoint_radius_m
     best = float("inf")
-    found = job.route
+    route = job.route
     for _ in range(TRIES):
         begun = time.process_time()
-        found = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
+        route = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
         best = min(best, time.process_time() - begun)
     random = np.random.default_rng(seed)
     spent = 0.0
@@ -244,7 +244,7 @@ def search_cost(
         spent += physics_route(job, actions)[0]
         ran += count
         on_progress(ran)
-    return SearchCost(best / found.candidates, spent / ran, ran, found.candidates)
+    return SearchCost(best / route.candidates, spent / ran, ran, route.candidates)
 
 
 def physics_route(job: RepertoireRun, actions: tuple[int, ...]) -> tuple[float, RouteFollower]:

@@ -87,8 +87,8 @@ def draw_route(job: RepertoireRun, record: RunRecord, path: Path) -> None:
     """Draw the route as planned, and where the centre of the body went."""
     pose = job.route.pose
     planned = []
-    for at, action in zip(pose, job.route.actions, strict=False):
-        planned.append(replay(job.repertoire.segments[action], Frame.flat(*at)).origin_m)
+    for placement, action in zip(pose, job.route.actions, strict=False):
+        planned.append(replay(job.repertoire.segments[action], Frame.flat(*placement)).origin_m)
     track = np.concatenate(planned)
     with style():
         figure = Figure(figsize=(WIDTH_IN, 3.6), layout="constrained")
@@ -117,7 +117,7 @@ def draw_schedule(job: ScheduleRun, played: Sequence[PlayedAction], path: Path) 
     requested = np.array([job.requested(t) for t in fine_s])
     edges_s = [*(action.begin_s for action in played), end_s]
     parts = (("recorded", "of the action, recorded", GOAL), ("measured", "of the body", MEASURED))
-    used = [name for k, name in enumerate(names) if any(one.action == k for one in played)]
+    used = [name for k, name in enumerate(names) if any(step.action == k for step in played)]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 4.6 + 0.22 * len(used)), layout="constrained")
         speed, turn, chosen = figure.subplots(
@@ -130,9 +130,9 @@ def draw_schedule(job: ScheduleRun, played: Sequence[PlayedAction], path: Path) 
                 values = [getattr(action, key)[which] for action in played]
                 axis.stairs(values, edges_s, color=colour, lw=1.4, label=label, baseline=None)
             axis.set_ylabel(name)
-        for one, last_s in zip(played, edges_s[1:], strict=True):
-            row = used.index(names[one.action])
-            chosen.plot([one.begin_s, last_s], [row, row], color=INK, lw=5, solid_capstyle="butt")
+        for step, last_s in zip(played, edges_s[1:], strict=True):
+            row = used.index(names[step.action])
+            chosen.plot([step.begin_s, last_s], [row, row], color=INK, lw=5, solid_capstyle="butt")
         chosen.set_yticks(range(len(used)), used)
         chosen.set_ylim(len(used) - 0.4, -0.6)
         chosen.set_ylabel("action")

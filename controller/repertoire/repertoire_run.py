@@ -111,9 +111,11 @@ class RouteMotion(MotionWrapper):
 
     def path_m(self, count: int) -> Floats:
         """(count, 2) points along the route as planned."""
-        at = np.linspace(0.0, len(self._path_m) - 1.0, count)
-        known = np.arange(len(self._path_m))
-        return np.column_stack([np.interp(at, known, self._path_m[:, k]) for k in (0, 1)])
+        sample_places = np.linspace(0.0, len(self._path_m) - 1.0, count)
+        stations = np.arange(len(self._path_m))
+        return np.column_stack(
+            [np.interp(sample_places, stations, self._path_m[:, k]) for k in (0, 1)]
+        )
 
     def begin(self, view: BodyView) -> Floats:
         """(J,) where the first action begins: the ground is flat."""

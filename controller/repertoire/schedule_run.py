@@ -91,14 +91,14 @@ class ScheduleRun(PathlessRun):
             InputError: no such file, actions of other joints, or a ground that is not flat.
 
         """
-        found = load_repertoire(Path(self.config.file))
-        found.check(self.robot)
+        loaded = load_repertoire(Path(self.config.file))
+        loaded.check(self.robot)
         if self.world.ground.kind != "flat":
             raise InputError(
                 f"world {self.world.name}: its ground is {self.world.ground.kind}; an action "
                 "repeats itself only on a flat one"
             )
-        return found
+        return loaded
 
     @property
     def scale(self) -> float:
@@ -133,9 +133,9 @@ class ScheduleRun(PathlessRun):
 
         """
         control = self.controller()
-        found = self._first_lasting(lambda *asked: bool(control.missing(*asked)))
-        if found is not None:
-            since_s, asked = found
+        missing_time = self._first_lasting(lambda *asked: bool(control.missing(*asked)))
+        if missing_time is not None:
+            since_s, asked = missing_time
             raise InputError(
                 f"{self.config.file}: no action {control.missing(*asked)} ({asked[0]:g} m/s, "
                 f"{asked[1]:g} rad/s from {since_s:.1f} s); request one of these: "
@@ -153,10 +153,10 @@ class ScheduleRun(PathlessRun):
                 f"even directions may differ: record there, or leave --world out"
             )
         control = self.controller()
-        found = self._first_lasting(control.is_far)
-        if found is None:
+        far_time = self._first_lasting(control.is_far)
+        if far_time is None:
             return None
-        since_s, asked = found
+        since_s, asked = far_time
         return (
             f"{self.config.file}: the nearest action to {asked[0]:g} m/s and {asked[1]:g} rad/s "
             f"(from {since_s:.1f} s) is {control.text(control.nearest(*asked))}; "
@@ -169,7 +169,7 @@ class ScheduleRun(PathlessRun):
         """Return since when, and the request for which, ``of`` holds for a while; None if never."""
         config = self.config
         times_s = np.arange(0.0, config.duration_s, _SAMPLE_S)
-        asked = (curve_at(each, times_s) for each in (config.speed_m_s, config.turn_rad_s))
+        asked = (curve_at(curve, times_s) for curve in (config.speed_m_s, config.turn_rad_s))
         lasting = min(round(_LASTING_S / _SAMPLE_S), len(times_s))
         count = 0
         for k, (speed_m_s, turn_rad_s) in enumerate(zip(*asked, strict=True)):

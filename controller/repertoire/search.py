@@ -169,17 +169,17 @@ def _expanded(
     return ends.reshape(-1, 3), count.ravel(), spent.ravel()
 
 
-def _backtracked(level: _Level, at: int, candidates: int) -> Route:
-    reached = int(level.passed[at])
-    time_s = float(level.time_s[at])
-    poses = [level.pose[at]]
+def _backtracked(level: _Level, level_index: int, candidates: int) -> Route:
+    reached = int(level.passed[level_index])
+    time_s = float(level.time_s[level_index])
+    poses = [level.pose[level_index]]
     actions = []
     before: _Level | None = level
     while before is not None and before.before is not None:
-        actions.append(int(before.action[at]))
-        at = int(before.parent[at])
+        actions.append(int(before.action[level_index]))
+        level_index = int(before.parent[level_index])
         before = before.before
-        poses.append(before.pose[at])
+        poses.append(before.pose[level_index])
     return Route(tuple(actions[::-1]), np.array(poses[::-1]), reached, time_s, candidates)
 
 

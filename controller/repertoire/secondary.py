@@ -124,8 +124,8 @@ class SecondaryController:
     def text(self, segment: int) -> str:
         """Return name, speed and turn of a segment for a message."""
         speed_m_s, turn_rad_s = (
-            round(float(each[segment]), 2) + 0.0  # not -0
-            for each in (self._speed_m_s, self._turn_rad_s)
+            round(float(rates[segment]), 2) + 0.0  # not -0
+            for rates in (self._speed_m_s, self._turn_rad_s)
         )
         return f"{self._names[segment]} ({speed_m_s:.2f} m/s, {turn_rad_s:.2f} rad/s)"
 
@@ -152,8 +152,8 @@ class SecondaryController:
 
     def _going(self, direction: int) -> Indices:
         """Return the segments of a direction; else those that rest, else the slowest."""
-        for wanted in (direction, 0):
-            options = self._steady[self._direction[self._steady] == wanted]
+        for sign in (direction, 0):
+            options = self._steady[self._direction[self._steady] == sign]
             if len(options):
                 return np.asarray(options)
         slowest = np.abs(self._speed_m_s[self._steady]).argmin()

@@ -81,10 +81,12 @@ class SeparatedCrowd:
 
     def _stopped(self, old_m: Singles) -> Ints:
         """Mark further bodies that have to return to links ``old_m``, and return them."""
-        known = self.blocker.copy()
+        blocker_before = self.blocker.copy()
         points = self._crowd.points_m
-        _stop(points, old_m, self._crowd.scale, self._radius_m, known, self.blocker, self.met)
-        return np.flatnonzero(self.blocker != known)
+        _stop(
+            points, old_m, self._crowd.scale, self._radius_m, blocker_before, self.blocker, self.met
+        )
+        return np.flatnonzero(self.blocker != blocker_before)
 
 
 @callable_in_loops
@@ -93,11 +95,11 @@ def _segment_gap(
 ) -> float:
     """Distance of the segments ab and cd in the plane, 0 if they cross."""
     ux, uy, vx, vy = bx - ax, by - ay, dx - cx, dy - cy
-    one = ux * (cy - ay) - uy * (cx - ax)
+    side_c = ux * (cy - ay) - uy * (cx - ax)
     two = ux * (dy - ay) - uy * (dx - ax)
     three = vx * (ay - cy) - vy * (ax - cx)
     four = vx * (by - cy) - vy * (bx - cx)
-    if one * two < 0.0 and three * four < 0.0:
+    if side_c * two < 0.0 and three * four < 0.0:
         return 0.0
     least = np.inf
     for k in range(4):
@@ -167,22 +169,22 @@ def _stop(
     old: Singles,
     scale: Floats,
     radius: Floats,
-    known: Ints,
+    blocker_before: Ints,
     blocker: Ints,
     met: Floats,
 ) -> None:
-    """Write into ``blocker`` the bodies that have to return; those of ``known`` have returned."""
+    """Write into ``blocker`` the bodies that must return; those of ``blocker_before`` did."""
     box = _boxes(points, scale, radius)
     last = len(radius) - 1.0
     for i in range(len(points)):
         for j in range(i):
-            if (known[i] != NONE and known[j] != NONE) or _apart(box, i, j):
+            if (blocker_before[i] != NONE and blocker_before[j] != NONE) or _apart(box, i, j):
                 continue
             at_i, at_j = _meeting(points[i], scale[i], points[j], scale[j], radius)
             if at_i == NONE:
                 continue
-            if known[i] != NONE or known[j] != NONE:
-                stops_i = known[j] != NONE
+            if blocker_before[i] != NONE or blocker_before[j] != NONE:
+                stops_i = blocker_before[j] != NONE
             else:
                 by_i = _meeting(points[i], scale[i], old[j], scale[j], radius)[0] != NONE
                 by_j = _meeting(old[i], scale[i], points[j], scale[j], radius)[0] != NONE

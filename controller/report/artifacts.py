@@ -80,12 +80,12 @@ def build_report(
     return _write_page(record, out_dir, film, numbers, _draw(record))
 
 
-def _draw(record: RunRecord, made: str = "") -> Drawings:
+def _draw(record: RunRecord, creation_text: str = "") -> Drawings:
     require_extra("the report needs", "matplotlib", "plotly")
     require_extra("the report needs", "jinja2")
     from snakewalk.controller.report.figures.sections import drawn  # noqa: PLC0415  an extra
 
-    return Drawings(*drawn(record), made)
+    return Drawings(*drawn(record), creation_text)
 
 
 def _write_page(

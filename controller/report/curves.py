@@ -82,11 +82,11 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
     constant = []
     for panel in Panel:
         curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
-        constant += [each.constant_text for each in curves if each.is_constant]
+        constant += [curve.constant_text for curve in curves if curve.is_constant]
         drawn = [
-            (each.curve.name, COLOURS[each.curve.colour], each.time_s, each.values)
-            for each in curves
-            if not each.is_constant
+            (curve.curve.name, COLOURS[curve.curve.colour], curve.time_s, curve.values)
+            for curve in curves
+            if not curve.is_constant
         ]
         if drawn:
             panels.append((panel, drawn))
@@ -98,7 +98,7 @@ def _figure(
     record: RunRecord, panels: Sequence[tuple[str, list[Curve]]], shown: int
 ) -> dict[str, Any]:
     """Traces, layout, and values of every joint's two panels for Plotly; joint ``shown`` first."""
-    joint = [(each, panel_curves(record, each)) for each in Panel if each.is_of_one_joint]
+    joint = [(panel, panel_curves(record, panel)) for panel in Panel if panel.is_of_one_joint]
     traces = [
         trace
         for row, (_, curves) in enumerate(panels, start=1)
@@ -107,12 +107,14 @@ def _figure(
     ]
     first = len(traces)
     traces += [
-        _trace(each.curve.name, COLOURS[each.curve.colour], row, each.time_s, each.values[:, shown])
+        _trace(
+            curve.curve.name, COLOURS[curve.curve.colour], row, curve.time_s, curve.values[:, shown]
+        )
         for row, (_, curves) in enumerate(joint, start=len(panels) + 1)
-        for each in curves
+        for curve in curves
     ]
     every = [
-        [_packed(each.values[:, k]) for _, curves in joint for each in curves]
+        [_packed(curve.values[:, k]) for _, curves in joint for curve in curves]
         for k in range(record.cycle.asked_rad.shape[1])
     ]
     titles = [_title(record, title) for title, _ in (*panels, *joint)]
@@ -209,8 +211,8 @@ def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
 def _traces(
     name: str, colour: str, row: int, time_s: Floats, values: Floats
 ) -> list[dict[str, Any]]:
-    known = values[np.isfinite(values)]
-    if len(known) < _BLOCK or _crossings(known) < _BLOCK:
+    finite_values = values[np.isfinite(values)]
+    if len(finite_values) < _BLOCK or _crossings(finite_values) < _BLOCK:
         return [_trace(name, colour, row, time_s, values)]
     at_s, low, mean, high = thin(time_s, values, _BAND_POINTS)
     edge = {"line": {"color": _pale(colour), "width": 1}, "showlegend": False}

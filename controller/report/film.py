@@ -106,11 +106,11 @@ def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
     head = pose.head_m[:rows]
     turn = pose.rotation[:rows].reshape(-1, 9)
     joints = record.cycle.measured_rad[:rows]
-    known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
-    if not known.any():
+    is_known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
+    if not is_known.any():
         return np.zeros(0), np.zeros((0, 7 + joints.shape[1]))
-    quaternion = Rotation.from_matrix(turn[known].reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    return pose.time_s[:rows][known], np.hstack([head[known], quaternion, joints[known]])
+    quaternion = Rotation.from_matrix(turn[is_known].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    return pose.time_s[:rows][is_known], np.hstack([head[is_known], quaternion, joints[is_known]])
 
 
 def film_times(record: RunRecord) -> tuple[float, float]:

@@ -82,36 +82,40 @@ def page(
 
     """
     header = record.header
-    found = verdict(record, numbers, LOG)
+    run_verdict = verdict(record, numbers, LOG)
     events: Sequence[Event] = record.events
     trip = trip_of(record)
-    made = drawings.made
+    creation_text = drawings.made
     config: Mapping[str, Any] = {
         "run": header.run.model_dump(mode="json"),
         "robot": header.robot.model_dump(mode="json"),
         "world": header.world.model_dump(mode="json"),
     }
     if not folders:
-        known = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
+        numbers_by_name = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
         texts: dict[str, Any] = {
-            key: without_folders(one) for key, one in known.items() if isinstance(one, str)
+            key: without_folders(text)
+            for key, text in numbers_by_name.items()
+            if isinstance(text, str)
         }
         numbers = replace(numbers, **texts)
         config = shared(config)
-        made = without_folders(made)
+        creation_text = without_folders(creation_text)
         events = [replace(event, text=without_folders(event.text)) for event in events]
         trip = None if trip is None else replace(trip, reason=without_folders(trip.reason))
-        cause = None if found.cause is None else without_folders(found.cause)
-        command = None if found.next_command is None else without_folders(found.next_command)
-        found = replace(found, cause=cause, next_command=command)
+        cause = None if run_verdict.cause is None else without_folders(run_verdict.cause)
+        command = (
+            None if run_verdict.next_command is None else without_folders(run_verdict.next_command)
+        )
+        run_verdict = replace(run_verdict, cause=cause, next_command=command)
     every = numbers.to_dict() if folders else shared(numbers.to_dict())
     return str(
         _template().render(
             n=numbers,
             mood=_mood(numbers),
-            headline=_headline(numbers, found),
-            verdict=found,
-            facts=_facts(numbers, found),
+            headline=_headline(numbers, run_verdict),
+            verdict=run_verdict,
+            facts=_facts(numbers, run_verdict),
             tiles=_tiles(numbers),
             film=film,
             trip=trip,
@@ -124,7 +128,7 @@ def page(
                 for title, values in (("All numbers", every), ("Configuration", config))
             ],
             links=[(quote(name), name) for name in links],
-            made=made,
+            made=creation_text,
         )
     )
 
@@ -145,15 +149,15 @@ def _mood(n: RunSummary) -> str:
     return "good" if n.is_measured and n.waypoints_reached == n.waypoints else "fair"
 
 
-def _headline(n: RunSummary, found: RunVerdict) -> str:
+def _headline(n: RunSummary, run_verdict: RunVerdict) -> str:
     """Return the sentence of the verdict, with robot, motion, bus and missed deadlines."""
     where = "on the simulator" if n.backend == "sim" else f"on {n.backend}"
     late = n.missed_deadlines
     missed = f"{_count(late, 'deadline') if late else 'no deadline'} missed"
-    return f"{n.robot} by {n.motion} {where}: {found.sentence}, {missed}."
+    return f"{n.robot} by {n.motion} {where}: {run_verdict.sentence}, {missed}."
 
 
-def _facts(n: RunSummary, found: RunVerdict) -> tuple[tuple[str, object], ...]:
+def _facts(n: RunSummary, run_verdict: RunVerdict) -> tuple[tuple[str, object], ...]:
     backend = "simulation" if n.backend == "sim" else n.backend
     return (
         ("robot", n.robot),
@@ -162,7 +166,7 @@ def _facts(n: RunSummary, found: RunVerdict) -> tuple[tuple[str, object], ...]:
         ("bus", backend),
         ("seed", n.seed),
         ("configuration", n.config_hash),
-        ("pose", found.evidence),
+        ("pose", run_verdict.evidence),
         ("snakewalk", n.software),
     )
 
@@ -212,15 +216,15 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
         tiles.insert(5, ("On wide waves", _pct(n.carrier_share), "of the walk's decisions"))
     law = n.assumptions["friction_law"]
     tiles.append(("Law of friction", str(law["value"]), f"{law['kind']}; {law['source']}"))
-    found = n.friction_found
-    if found is not None:
-        (along, along_to), (across, across_to) = found.along_95, found.across_95
+    friction_found = n.friction_found
+    if friction_found is not None:
+        (along, along_to), (across, across_to) = friction_found.along_95, friction_found.across_95
         tiles.append(
             (
                 "Friction found",
-                f"{found.along:.2f} along, {found.across:.2f} across",
+                f"{friction_found.along:.2f} along, {friction_found.across:.2f} across",
                 f"95 %: {along:.2f} to {along_to:.2f}, {across:.2f} to {across_to:.2f}; "
-                f"world's file: {found.along_file:g}, {found.across_file:g}",
+                f"world's file: {friction_found.along_file:g}, {friction_found.across_file:g}",
             )
         )
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
@@ -253,8 +257,8 @@ def _fmt(value: float | None, decimals: int) -> str:
     return "–" if value is None else f"{value:.{decimals}f}"
 
 
-def _count(number: int, one: str, more: str = "") -> str:
-    return f"{number} {one if number == 1 else more or one + 's'}"
+def _count(number: int, singular: str, more: str = "") -> str:
+    return f"{number} {singular if number == 1 else more or singular + 's'}"
 
 
 def _pct(value: float) -> str:

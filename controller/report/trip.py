@@ -35,7 +35,7 @@ class Trip:
 
 def trip_of(record: RunRecord) -> Trip | None:
     """Return the trip of a record; None if safety did not stop the run."""
-    event = next((each for each in record.events if each.kind == "trip"), None)
+    event = next((trip_event for trip_event in record.events if trip_event.kind == "trip"), None)
     if event is None:
         return None
     robot = record.header.robot

@@ -151,13 +151,13 @@ class CommandTopics:
             why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
             self._command(Refused(why), stamp, "trajectory")
             return
-        times = [each.time_from_start for each in points]
-        time_s = np.array([each.sec + 1e-9 * each.nanosec for each in times])
+        times = [point.time_from_start for point in points]
+        time_s = np.array([duration.sec + 1e-9 * duration.nanosec for duration in times])
         try:
             values = (
-                _rows([each.positions for each in points]),
-                _rows([each.velocities for each in points]),
-                _rows([each.accelerations for each in points]),
+                _rows([point.positions for point in points]),
+                _rows([point.velocities for point in points]),
+                _rows([point.accelerations for point in points]),
             )
         except ValueError:
             why = "trajectory: its points have different numbers of values"
@@ -213,14 +213,14 @@ class CommandTopics:
     def on_goal_pose(self, message: Any) -> None:
         """Keep the place of a goal pose; a walk has no heading at its end."""
         header = message.header
-        at = message.pose.position
-        command: Command = GoTo(at.x, at.y)
+        place = message.pose.position
+        command: Command = GoTo(place.x, place.y)
         if header.frame_id != self.frame:
             command = Refused(
                 f"goal pose: frame {header.frame_id[:NAME_MAX]!r}; this run's poses have the "
                 f"frame {self.frame!r}: transform the goal"
             )
-        elif not (math.isfinite(at.x) and math.isfinite(at.y)):
+        elif not (math.isfinite(place.x) and math.isfinite(place.y)):
             command = Refused("goal pose: x or y is not a number")
         self._command(command, header.stamp, "goal pose")
 
@@ -265,7 +265,11 @@ def _replaces(command: Command, last: Command) -> bool:
 
 def _rows(values: list[Any]) -> Floats | None:
     """(N, K) array of a trajectory's points; None where none has any."""
-    return np.array([list(each) for each in values], dtype=float) if any(values) else None
+    return (
+        np.array([list(values_of_joint) for values_of_joint in values], dtype=float)
+        if any(values)
+        else None
+    )
 
 
 def _value(word: str) -> tuple[str, Any]:

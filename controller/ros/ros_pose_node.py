@@ -52,7 +52,7 @@ def serve(line: Connection, argument: str) -> None:
 def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
     """Return a message as a datagram; a message without a pose becomes a text that says why."""
     pose = message.pose.pose if has_covariance else message.pose
-    at = pose.position
+    place = pose.position
     turn = pose.orientation
     stamp = message.header.stamp
     covariance = None
@@ -67,7 +67,7 @@ def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
         PoseSample(
             sequence,
             stamp.sec + 1e-9 * stamp.nanosec,
-            np.array([at.x, at.y, at.z]),
+            np.array([place.x, place.y, place.z]),
             rotation,
             message.header.frame_id,
             covariance if is_known else None,
@@ -77,12 +77,12 @@ def pose_of(message: Any, sequence: int, *, has_covariance: bool) -> bytes:
 
 def poses_of(message: Any, child: str) -> Iterator[PoseStamped]:
     """Return the transforms of a ``TFMessage`` to one frame as poses."""
-    for each in message.transforms:
-        if each.child_frame_id == child:
-            at = each.transform.translation
-            turn = each.transform.rotation
-            pose = Pose(position=Point(x=at.x, y=at.y, z=at.z), orientation=turn)
-            yield PoseStamped(header=each.header, pose=pose)
+    for transform in message.transforms:
+        if transform.child_frame_id == child:
+            place = transform.transform.translation
+            turn = transform.transform.rotation
+            pose = Pose(position=Point(x=place.x, y=place.y, z=place.z), orientation=turn)
+            yield PoseStamped(header=transform.header, pose=pose)
 
 
 class _Sender:

@@ -11,20 +11,20 @@ from snakewalk.controller.run.run_keys import with_keys_of
 from snakewalk.controller.run.servo_setup import check_servos
 
 
-def load_body(name: str, keys: Mapping[str, object], beside: Path | None = None) -> RobotConfig:
+def load_body(name: str, keys: Mapping[str, object], folder: Path | None = None) -> RobotConfig:
     """Load a robot and replace values of its file.
 
     Args:
         name: a shipped robot, or a file.
         keys: as ``checked_keys`` returns them.
-        beside: folder of the run's file.
+        folder: folder of the run's file.
 
     Raises:
         ConfigError: every fault of the file.
         InputError: a key does not fit.
 
     """
-    return with_keys_of("robot", load_robot(name, beside), keys)
+    return with_keys_of("robot", load_robot(name, folder), keys)
 
 
 def assemble(
@@ -33,7 +33,7 @@ def assemble(
     body: RobotConfig,
     *,
     origin: str = "command line",
-    beside: Path | None = None,
+    folder: Path | None = None,
 ) -> tuple[RunConfig, WorldConfig]:
     """Check a run, apply the keys of run and world, and check its servos and its cycle rate.
 
@@ -42,7 +42,7 @@ def assemble(
         keys: as ``checked_keys`` returns them.
         body: the robot that runs.
         origin: name that messages use for the origin of the fields.
-        beside: folder of the run's file.
+        folder: folder of the run's file.
 
     Raises:
         InputError: one line per fault.
@@ -50,4 +50,4 @@ def assemble(
     """
     run = with_keys_of("run", checked(RunConfig, dict(fields), origin), keys)
     check_servos(run, body)
-    return run, with_keys_of("world", load_world(run.world, beside), keys)
+    return run, with_keys_of("world", load_world(run.world, folder), keys)

@@ -92,9 +92,9 @@ def on_ports(robot: RobotConfig, port: str | None) -> RobotConfig:
                 "--port 1-8=PORT,9-16=PORT"
             )
         return robot
-    found = parse_port_map(port) if is_port_map(port) else []
+    port_map = parse_port_map(port) if is_port_map(port) else []
     return with_keys(
-        robot, {"ports": [{"port": name, "ids": ids} for name, ids in found]}, f"--port {port}"
+        robot, {"ports": [{"port": name, "ids": ids} for name, ids in port_map]}, f"--port {port}"
     )
 
 
@@ -117,7 +117,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         fingerprint_file=_fingerprint_file(run),
         can_hold=run.safety.on_trip == "hold",
     )
-    name = port_map_text((each.port, each.ids) for each in robot.ports) or port
+    name = port_map_text((segment.port, segment.ids) for segment in robot.ports) or port
     return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
 
 
@@ -128,12 +128,12 @@ def _fingerprint_file(run: RunConfig) -> FingerprintFile | None:
 
 def is_split(robot: RobotConfig) -> bool:
     """Whether some servos are simulated and others real."""
-    return any(each.port == SIMULATED for each in robot.ports)
+    return any(segment.port == SIMULATED for segment in robot.ports)
 
 
 def real_ports(robot: RobotConfig) -> list[str]:
     """Ports of the segments with real servos."""
-    return [each.port for each in robot.ports if each.port != SIMULATED]
+    return [segment.port for segment in robot.ports if segment.port != SIMULATED]
 
 
 def _bus_on(
@@ -148,14 +148,14 @@ def bus_on_ports(
     """A bus for each segment; open ports are closed if another port cannot be opened."""
     parts = []
     with ExitStack() as opened:
-        for each in robot.ports:
-            if each.port == SIMULATED and simulated_line is not None:
-                bus = servo_bus(simulated_line, robot.models_on(each.ids))
+        for segment in robot.ports:
+            if segment.port == SIMULATED and simulated_line is not None:
+                bus = servo_bus(simulated_line, robot.models_on(segment.ids))
             else:
-                line = open_port(each.port, robot.servo.baud, clock)
-                bus = _bus_on(robot, line, each.ids)
+                line = open_port(segment.port, robot.servo.baud, clock)
+                bus = _bus_on(robot, line, segment.ids)
             opened.callback(bus.port.closePort)
-            parts.append((bus, each.ids))
+            parts.append((bus, segment.ids))
         opened.pop_all()
     return SegmentedBus(parts)
 

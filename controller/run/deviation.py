@@ -80,11 +80,14 @@ class Deviation:
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return the ground that the physics has."""
-        told = world.friction
-        back = None if told.back is None else told.back * self.along
-        changes = {"along": told.along * self.along, "across": told.across * self.across}
-        law = self.law or told.law
-        friction = told.model_copy(update=changes | {"back": back, "law": law})
+        world_friction = world.friction
+        back = None if world_friction.back is None else world_friction.back * self.along
+        changes = {
+            "along": world_friction.along * self.along,
+            "across": world_friction.across * self.across,
+        }
+        law = self.law or world_friction.law
+        friction = world_friction.model_copy(update=changes | {"back": back, "law": law})
         return world.model_copy(update={"friction": friction})
 
     def shaft_rad(self, joint_rad: Floats) -> Floats:
@@ -93,10 +96,12 @@ class Deviation:
 
     def mounting(self, robot: RobotConfig) -> "Mounting":
         """Return how the servos sit on the shafts."""
-        told = Mounting.of(robot)
+        stated_mounting = Mounting.of(robot)
         if self.slip_rad is None:
-            return told
-        return Mounting(told.sign, told.zero_rad - told.sign * self.slip_rad)
+            return stated_mounting
+        return Mounting(
+            stated_mounting.sign, stated_mounting.zero_rad - stated_mounting.sign * self.slip_rad
+        )
 
 
 NO_DEVIATION: Final = Deviation()

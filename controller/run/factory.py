@@ -92,17 +92,17 @@ def prepare_walk(
         InputError: as ``prepare_job``, and for other motions than a walk.
 
     """
-    found = prepare_job(name, keys=keys, on_paper=on_paper, **changes)
-    if isinstance(found, SteeredRun):
+    job = prepare_job(name, keys=keys, on_paper=on_paper, **changes)
+    if isinstance(job, SteeredRun):
         raise InputError(
-            f"run {found.run.name}: a gait along waypoints; run it by: snakewalk run {name}"
+            f"run {job.run.name}: a gait along waypoints; run it by: snakewalk run {name}"
         )
-    if not isinstance(found, WalkRun):
+    if not isinstance(job, WalkRun):
         raise InputError(
-            f"run {found.run.name}: motion {found.run.motion} is not a walk; run it by: "
+            f"run {job.run.name}: motion {job.run.motion} is not a walk; run it by: "
             f"snakewalk run {name}"
         )
-    return found
+    return job
 
 
 def prepare_job(
@@ -125,20 +125,20 @@ def prepare_job(
     """
     keys = checked_keys(keys)
     run = load_run(name)
-    beside = Path(name).parent if name.endswith(".toml") else None
+    folder = Path(name).parent if name.endswith(".toml") else None
     options = {key: value for key, value in changes.items() if value is not None}
-    options.setdefault("track", track_beside(run.track, beside))
-    if beside is not None and (beside / run.robot).is_file():
-        options.setdefault("robot", str(beside / run.robot))
+    options.setdefault("track", track_beside(run.track, folder))
+    if folder is not None and (folder / run.robot).is_file():
+        options.setdefault("robot", str(folder / run.robot))
     run = checked(RunConfig, run.model_dump() | options, "command line")
     run = with_keys_of("run", run, keys)
     _refuse_other_commands(run, on_paper)
     if run.pose is not None:
         pose_plugin(run.pose)
-    robot = run.walk.pitch.set_up(load_robot(run.robot, beside))
+    robot = run.walk.pitch.set_up(load_robot(run.robot, folder))
     robot = with_keys_of("robot", robot, keys)
     check_servos(run, robot)
-    world = with_keys_of("world", load_world(run.world, beside), keys)
+    world = with_keys_of("world", load_world(run.world, folder), keys)
     if run.motion not in MOTIONS:
         return _extension(run, robot, world)
     if run.motion == "gait":
@@ -219,8 +219,8 @@ def with_map(run: RunConfig, source: str | None) -> RunConfig:
 
 def changed(prepared: PreparedRun, **fields: object) -> PreparedRun:
     """Return a prepared run with changed fields, for example ``run`` or ``world``."""
-    made: PreparedRun = replace(prepared, **fields)  # type: ignore[type-var]
-    return made
+    prepared_run: PreparedRun = replace(prepared, **fields)  # type: ignore[type-var]
+    return prepared_run
 
 
 def prepare_playback(

@@ -64,7 +64,9 @@ class Hands:
 
     def _lost_device(self) -> str | None:
         local = [
-            cast("Keyboard | Gamepad", each) for each in self._devices if each is not self._page
+            cast("Keyboard | Gamepad", device)
+            for device in self._devices
+            if device is not self._page
         ]
         gone = [device.gone for device in local if device.gone is not None]
         if not gone:

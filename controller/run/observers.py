@@ -104,8 +104,10 @@ class Observers:
         self.page = page
         """The page of the run; None without a page."""
         self._all: list[RunObserver] = [*([] if page is None else [page]), *observers]
-        self._with_waypoints = [each for each in observers if isinstance(each, OffersWaypoints)]
-        self._with_stop = [each for each in self._all if isinstance(each, OffersStop)]
+        self._with_waypoints = [
+            observer for observer in observers if isinstance(observer, OffersWaypoints)
+        ]
+        self._with_stop = [observer for observer in self._all if isinstance(observer, OffersStop)]
         self._policy: Literal["stop", "warn"] = "stop"
         self._warn: Callable[[str, str], None] = lambda kind, text: None
         self._refusals = Refusals(lambda why: self._warn("refused", why))
@@ -123,30 +125,30 @@ class Observers:
 
     def on_row(self, topic: str, row: bytes) -> None:
         """Pass a row of the log on."""
-        for each in self._all:
-            each.on_row(topic, row)
+        for observer in self._all:
+            observer.on_row(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:
         """Pass a picture on."""
-        for each in self._all:
-            each.on_picture(image, time_s)
+        for observer in self._all:
+            observer.on_picture(image, time_s)
 
     def on_button(self, path: Path) -> None:
         """Pass the stop button on."""
-        for each in self._all:
-            each.on_button(path)
+        for observer in self._all:
+            observer.on_button(path)
 
     def waypoint_commands(self) -> list[str | Refused]:
         """Return the commands for waypoints since the last call."""
         commands: list[str | Refused] = [] if self.page is None else [*self.page.pressed()]
-        for each in self._with_waypoints:
-            commands += each.waypoint_commands()
+        for observer in self._with_waypoints:
+            commands += observer.waypoint_commands()
         return commands
 
     def lost(self) -> str | None:
         """Return which E-STOPs have failed, and why, or None."""
         now_s = self._now_s()
-        reasons = [why for each in self._with_stop if (why := each.lost(now_s)) is not None]
+        reasons = [why for observer in self._with_stop if (why := observer.lost(now_s)) is not None]
         return "; ".join(reasons) or None
 
     def stop_requested(self) -> str | None:
@@ -167,8 +169,8 @@ class Observers:
             return on_progress
 
         def progressed(progress: Progress) -> None:
-            for each in self._with_stop:
-                for why in each.rejected():
+            for observer in self._with_stop:
+                for why in observer.rejected():
                     self._refusals.add(why, progress.time_s)
             self._refusals.step(progress.time_s)
             on_progress(progress)

@@ -66,9 +66,9 @@ def film_look(look: str, header: Header) -> "SkinLook | None":
 
 
 def _look_plugin(look: str) -> LookPlugin:
-    found = find("look", look) or find("look", _BODY) or require("look", look, "--look", [SERVOS])
-    made: LookPlugin = found.load()()
-    return made
+    plugin = find("look", look) or find("look", _BODY) or require("look", look, "--look", [SERVOS])
+    look_plugin: LookPlugin = plugin.load()()
+    return look_plugin
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +116,12 @@ def write_artifacts(
     what = _what_made_it(folders)
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
-        made: Artifacts = require("results", "report", "--film").load()(
+        artifacts: Artifacts = require("results", "report", "--film").load()(
             record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
         )
-    for line in made.notes:
+    for line in artifacts.notes:
         LOGGER.warning("%s", line)
-    return made
+    return artifacts
 
 
 def show_result(
@@ -138,19 +138,19 @@ def show_result(
         SystemExit: with the exit code of the run if it is not 0.
 
     """
-    found = result.verdict.accepted(accept_dead_reckoning)
+    is_accepted = result.verdict.accepted(accept_dead_reckoning)
     with result.ending.noted():
         artifacts = write_artifacts(
             result.record, result.folder, result.summary, film=options.film, look=look
         )
-        _show(result, found, facts, artifacts, options.as_json)
-    if found.exit_code:
-        raise SystemExit(found.exit_code)
+        _show(result, is_accepted, facts, artifacts, options.as_json)
+    if is_accepted.exit_code:
+        raise SystemExit(is_accepted.exit_code)
 
 
 def _show(
     result: RunResult,
-    found: RunVerdict,
+    run_verdict: RunVerdict,
     facts: Mapping[str, object],
     artifacts: Artifacts,
     as_json: bool,
@@ -160,17 +160,23 @@ def _show(
     names = {"log": str(result.log), "summary": str(result.folder / SUMMARY)}
     files = {**names, **artifacts.to_dict()}
     if as_json:
-        stated = {"verdict": found.sentence, "cause": found.cause, "exit_code": found.exit_code}
-        stated["next_command"] = found.next_command
+        stated = {
+            "verdict": run_verdict.sentence,
+            "cause": run_verdict.cause,
+            "exit_code": run_verdict.exit_code,
+        }
+        stated["next_command"] = run_verdict.next_command
         show({**facts, **stated, **result.summary.evidence, **files}, True)
     else:
-        own = {key: value for key, value in facts.items() if key not in result.summary.evidence}
-        show({**own, "pose": found.evidence, **files}, False)
-    if found.explanation:
-        LOGGER.warning("%s", found.explanation)
+        other_facts = {
+            key: value for key, value in facts.items() if key not in result.summary.evidence
+        }
+        show({**other_facts, "pose": run_verdict.evidence, **files}, False)
+    if run_verdict.explanation:
+        LOGGER.warning("%s", run_verdict.explanation)
     if not as_json:
         shown = artifacts.report or result.log
-        print(f"{found.sentence}; {'report' if artifacts.report else 'log'}: {shown}")
+        print(f"{run_verdict.sentence}; {'report' if artifacts.report else 'log'}: {shown}")
 
 
 def by_evidence(result: RunResult, values: Mapping[str, object]) -> dict[str, object]:

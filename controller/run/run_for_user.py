@@ -83,6 +83,6 @@ def run_for_user(
         return result
 
 
-def _confirm(found: str) -> bool:
+def _confirm(question: str) -> bool:
     """Ask whether an interrupted chain may continue; the servos hold meanwhile."""
-    return typer.confirm(f"{found}; go on?", err=True)
+    return typer.confirm(f"{question}; go on?", err=True)

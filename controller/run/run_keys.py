@@ -53,8 +53,10 @@ def checked_keys(
         file, dot, rest = key.partition(".")
         if file not in _FIELDS or not (dot and all(rest.split("."))):
             faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
-        for own, option in (refused or {}).items():
-            if f"{key}.".startswith(f"{own}.") or (dot and own.startswith(f"{key}.")):
+        for refused_key, option in (refused or {}).items():
+            if f"{key}.".startswith(f"{refused_key}.") or (
+                dot and refused_key.startswith(f"{key}.")
+            ):
                 faults.append(f"{key}: is given by {option}")
     if faults:
         raise InputError(faults)
@@ -87,8 +89,8 @@ def with_keys_of(file: str, config: C, keys: Mapping[str, object]) -> C:
         InputError: one line per fault.
 
     """
-    own = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
-    return with_keys(config, own, f"{file} {config.name}") if own else config
+    file_keys = {k.removeprefix(f"{file}."): v for k, v in keys.items() if k.startswith(f"{file}.")}
+    return with_keys(config, file_keys, f"{file} {config.name}") if file_keys else config
 
 
 def with_compliance(run: RunConfig, on: bool | None) -> RunConfig:

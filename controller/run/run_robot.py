@@ -477,7 +477,7 @@ def _end_logged(ending: RunEnding, log: RunLog, clock: Clock) -> Iterator[None]:
 def _shadow(request: RunRequest, checked: CheckedRun, log: RunLog) -> ShadowPlugin:
     prepared = request.prepared
     start = checked.initial_pose if checked.port is None else None
-    made: ShadowPlugin = _shadow_plugin()(
+    shadow_plugin: ShadowPlugin = _shadow_plugin()(
         prepared.run,
         prepared.robot,
         prepared.world,
@@ -486,7 +486,7 @@ def _shadow(request: RunRequest, checked: CheckedRun, log: RunLog) -> ShadowPlug
         log,
         request.on_event,
     )
-    return made
+    return shadow_plugin
 
 
 def _shadow_plugin() -> Any:

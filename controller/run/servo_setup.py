@@ -112,17 +112,17 @@ def with_gains(robot: RobotConfig, *, pitch: bool, soft: Sequence[int] = ()) -> 
         changes["position_p_gain"] = changes["pitch_p_gain"] = min(soft)
     joints = []
     for joint, axis in zip(robot.joints, robot.all_axes, strict=False):  # there may be none
-        own: dict[str, float | None] = {}
+        gains: dict[str, float | None] = {}
         for key, least in (
             ("position_p_gain", changes.get("pitch_p_gain")),
             ("current_limit_a", changes.get("pitch_current_limit_a")),
         ):
             value = getattr(joint, key)
             if value is not None and least is not None and axis == "p":
-                own[key] = max(value, least)
+                gains[key] = max(value, least)
         if soft:
-            own["position_p_gain"] = None
-        joints.append(joint.model_copy(update=own))
+            gains["position_p_gain"] = None
+        joints.append(joint.model_copy(update=gains))
     return robot.model_copy(
         update={"servo": servo.model_copy(update=changes), "joints": tuple(joints)}
     )

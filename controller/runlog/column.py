@@ -187,10 +187,10 @@ def topic(
 ) -> Callable[[type[T]], type[T]]:
     """Return a decorator that makes a class the table of a topic and registers it."""
 
-    def register(made: type[T]) -> type[T]:
-        table = dataclass(frozen=True, slots=True)(made)
+    def register(table_type: type[T]) -> type[T]:
+        table = dataclass(frozen=True, slots=True)(table_type)
         hints = get_type_hints(table, include_extras=True)
-        columns = {each.name: _column(hints[each.name]) for each in fields(table)}  # type: ignore[arg-type]
+        columns = {field.name: _column(hints[field.name]) for field in fields(table)}  # type: ignore[arg-type]
         table.topic = Topic(name, columns, is_fast, only_changes, is_optional, watched)
         _registered.append(table)
         return table
@@ -210,7 +210,7 @@ def _column(hint: Any) -> Column:
         TypeError: it has none.
 
     """
-    found = [each for each in get_args(hint) if isinstance(each, Column)]
-    if len(found) != 1:
+    columns = [arg for arg in get_args(hint) if isinstance(arg, Column)]
+    if len(columns) != 1:
         raise TypeError(f"{hint}: each field of a topic is Annotated with one Column")
-    return found[0]
+    return columns[0]

@@ -78,10 +78,10 @@ def exact_text(values: NDArray[np.float64]) -> str:
 
 def rounded_texts(arrays: Sequence[NDArray[np.float64]]) -> list[str]:
     """JSON of ``floats`` for several arrays, (n,) or (n, m) each, at the cost of one."""
-    flat = np.concatenate([each.ravel() for each in arrays])
+    flat = np.concatenate([values.ravel() for values in arrays])
     if not math.isfinite(flat.dot(flat)):
-        return [encode(floats(each)) for each in arrays]
-    shapes = tuple([each.shape for each in arrays])
+        return [encode(floats(values)) for values in arrays]
+    shapes = tuple([values.shape for values in arrays])
     printed = np.empty(_NUMBER_BYTES * (len(flat) + len(shapes)), np.uint8)
     count = _print_rounded(flat, _lists(shapes), printed)
     if count < 0:
@@ -110,9 +110,9 @@ def _template(shapes: tuple[tuple[int, ...], ...], digits: str) -> str:
 @cache
 def _lists(shapes: tuple[tuple[int, ...], ...]) -> Ints:
     """(A, 2) rows of each array, 0 if it is one row, and numbers in a row."""
-    made = np.array([(0, *shape)[-2:] for shape in shapes], dtype=np.int64)
-    made.setflags(write=False)
-    return made
+    sizes = np.array([(0, *shape)[-2:] for shape in shapes], dtype=np.int64)
+    sizes.setflags(write=False)
+    return sizes
 
 
 @compiled(f"int64({readonly_array()}, {readonly_array('int64', 2)}, uint8[::1])")
@@ -122,28 +122,28 @@ def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
     The template is needed for large numbers, and for those so near the middle between two of six
     digits that their rounded product with a million does not decide which is printed.
     """
-    at = k = 0
+    position = k = 0
     for a in range(len(lists)):
         if a > 0:
-            out[at] = 10  # a new line
-            at += 1
+            out[position] = 10  # a new line
+            position += 1
         rows, columns = lists[a]
         if rows > 0:
-            out[at] = 91  # [
-            at += 1
+            out[position] = 91  # [
+            position += 1
         for row in range(max(rows, 1)):
             if row > 0:
-                out[at] = 44  # ,
-                at += 1
-            out[at] = 91
-            at += 1
+                out[position] = 44  # ,
+                position += 1
+            out[position] = 91
+            position += 1
             for column in range(columns):
                 if column > 0:
-                    out[at] = 44
-                    at += 1
+                    out[position] = 44
+                    position += 1
                 if np.signbit(values[k]):
-                    out[at] = 45  # -
-                    at += 1
+                    out[position] = 45  # -
+                    position += 1
                 scaled = abs(values[k]) * 1e6
                 k += 1
                 if scaled > 1e12 or abs(scaled - np.floor(scaled) - 0.5) <= 4e-16 * scaled:
@@ -154,17 +154,17 @@ def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:
                     digits += 1
                 for place in range(digits, -1, -1):
                     if place == digits - 6:
-                        out[at + place] = 46  # .
+                        out[position + place] = 46  # .
                     else:
-                        out[at + place] = 48 + left % 10
+                        out[position + place] = 48 + left % 10
                         left //= 10
-                at += digits + 1
-            out[at] = 93  # ]
-            at += 1
+                position += digits + 1
+            out[position] = 93  # ]
+            position += 1
         if rows > 0:
-            out[at] = 93
-            at += 1
-    return at
+            out[position] = 93
+            position += 1
+    return position
 
 
 def thinned(ground: HeightField) -> dict[str, Any]:

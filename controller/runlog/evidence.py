@@ -48,8 +48,8 @@ class PoseEvidence:
     def texts(self) -> dict[str, str]:
         """Kind, source and uncertainty as texts; an unknown uncertainty is left out."""
         off = {"pose_position_sd_m": self.position_m, "pose_heading_sd_rad": self.heading_rad}
-        known = {name: f"{value:g}" for name, value in off.items() if value is not None}
-        return {"pose_evidence": str(self.kind), "pose_source": self.source, **known}
+        limit_texts = {name: f"{value:g}" for name, value in off.items() if value is not None}
+        return {"pose_evidence": str(self.kind), "pose_source": self.source, **limit_texts}
 
     def row(self) -> dict[str, Any]:
         """The evidence as it is written to the log."""

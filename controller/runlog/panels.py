@@ -39,7 +39,7 @@ class CurveValues(NamedTuple):
 
 def panel_curves(record: RunRecord, panel: Panel) -> list[CurveValues]:
     """Curves of a panel that have a value at any time."""
-    return [each for each in _curves(record, panel) if np.isfinite(each.values).any()]
+    return [curve for curve in _curves(record, panel) if np.isfinite(curve.values).any()]
 
 
 def _curves(record: RunRecord, panel: Panel) -> Iterator[CurveValues]:
@@ -59,13 +59,13 @@ def _values(table: Table, name: str, curve: Curve) -> Floats:
     if not curve.joints:
         return values
     reduced = np.full(len(values), np.nan)
-    known = np.isfinite(values).any(axis=1)
-    some = values[known]
+    is_known = np.isfinite(values).any(axis=1)
+    some = values[is_known]
     match curve.joints:
         case "largest":
-            reduced[known] = np.nanmax(some, axis=1)
+            reduced[is_known] = np.nanmax(some, axis=1)
         case "least":
-            reduced[known] = np.nanmin(some, axis=1)
+            reduced[is_known] = np.nanmin(some, axis=1)
         case "mean":
-            reduced[known] = np.nanmean(some, axis=1)
+            reduced[is_known] = np.nanmean(some, axis=1)
     return reduced

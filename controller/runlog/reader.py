@@ -209,16 +209,16 @@ def _said_bytes(chunk: bytes) -> int:
 
 def _whole_records(data: bytes) -> tuple[int, bool, int]:
     """Bytes of complete records, whether the footer ends them, and their stated unpacked bytes."""
-    at = len(_MAGIC)
+    position = len(_MAGIC)
     opcode = 0
     unpacked = 0
-    while at + _HEAD.size <= len(data) and opcode != _FOOTER:
-        opcode, length = _HEAD.unpack_from(data, at)
-        if at + _HEAD.size + length > len(data):
-            return at, False, unpacked
+    while position + _HEAD.size <= len(data) and opcode != _FOOTER:
+        opcode, length = _HEAD.unpack_from(data, position)
+        if position + _HEAD.size + length > len(data):
+            return position, False, unpacked
         chunk = opcode == _CHUNK and length >= _CHUNK_HEAD.size
-        start = at + _HEAD.size
+        start = position + _HEAD.size
         unpacked += _said_bytes(data[start : start + length]) if chunk else length
-        at += _HEAD.size + length
-    complete = opcode == _FOOTER and data[at:] == _MAGIC
-    return at + (len(_MAGIC) if complete else 0), complete, unpacked
+        position += _HEAD.size + length
+    complete = opcode == _FOOTER and data[position:] == _MAGIC
+    return position + (len(_MAGIC) if complete else 0), complete, unpacked

@@ -238,7 +238,7 @@ class RunRecord:
         events = self.events
         values = [getattr(self, field.name) for field in fields(self)]
         return (
-            *(each for each in values if isinstance(each, Table)),
+            *(value for value in values if isinstance(value, Table)),
             PathTable(np.array([s for s, _ in self.paths]), [m for _, m in self.paths]),
             WaypointTable(np.array([s for s, _ in self.waypoints]), [m for _, m in self.waypoints]),
             EventTable(
@@ -305,7 +305,7 @@ _TIMES: Final = ("time_s", "deadline_s", "arrival_s")
 
 
 def _earlier(table: Table, start_s: float) -> Table:
-    known: Any = table
+    written: Any = table
     names = [name for name in _TIMES if hasattr(table, name)]
-    earlier: Table = replace(known, **{name: getattr(known, name) - start_s for name in names})
+    earlier: Table = replace(written, **{name: getattr(written, name) - start_s for name in names})
     return earlier

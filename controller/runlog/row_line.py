@@ -243,7 +243,7 @@ class ObserverEnd:
         self._waiting.append(line)
         self._waiting_bytes += len(line)
         while self._waiting_bytes > _WAITING_BYTES:
-            oldest = next(k for k, each in enumerate(self._waiting) if each != _END)
+            oldest = next(k for k, row in enumerate(self._waiting) if row != _END)
             self._waiting_bytes -= len(self._waiting[oldest])
             del self._waiting[oldest]
         self._flush()

@@ -28,23 +28,25 @@ class RowPrinter:
         self._topic = topic
         columns = topic.columns
         self._columns = tuple(columns.values())
-        self._required = {name for name, each in columns.items() if each.default is REQUIRED}
-        self._defaults = {name: each.default for name, each in columns.items()}
+        self._required = {name for name, column in columns.items() if column.default is REQUIRED}
+        self._defaults = {name: column.default for name, column in columns.items()}
         self._arrays = [
-            (at, (-1, 3) if each.shape == (LINK, 3) else (-1,))
-            for at, each in enumerate(columns.values())
-            if _is_printed_together(each)
+            (index, (-1, 3) if column.shape == (LINK, 3) else (-1,))
+            for index, column in enumerate(columns.values())
+            if _is_printed_together(column)
         ]
         """Places of the arrays of a fast topic that one call prints, and their shapes."""
         row_of_goals = _exact_row()
         self._numbers = [
-            at for at, each in enumerate(columns.values()) if each.kind in DIGITS and not each.shape
+            index
+            for index, column in enumerate(columns.values())
+            if column.kind in DIGITS and not column.shape
         ]
         """Places of single numbers, which the template prints if they are finite."""
         self._printers = [
-            (at, _printer(each, row_of_goals))
-            for at, each in enumerate(columns.values())
-            if at not in self._numbers and not _is_printed_together(each)
+            (index, _printer(column, row_of_goals))
+            for index, column in enumerate(columns.values())
+            if index not in self._numbers and not _is_printed_together(column)
         ]
         self._templates: dict[tuple[int, ...], str] = {}
         """Templates of rows, by the places of the unknown numbers."""
@@ -81,43 +83,49 @@ class RowPrinter:
         cells = [values[name] for name in self._defaults]
         places = []
         arrays = []
-        for at, shape in self._arrays:
-            value = cells[at]
+        for position, shape in self._arrays:
+            value = cells[position]
             if value is None:
-                cells[at] = "null"
+                cells[position] = "null"
                 continue
             array = np.asarray(value, dtype=float)
             arrays.append(array if array.ndim == len(shape) else array.reshape(shape))
-            places.append(at)
-        for at, printed in zip(places, rounded_texts(arrays), strict=True):
-            cells[at] = printed
-        for at, print_one in self._printers:
-            cells[at] = print_one(cells[at])
+            places.append(position)
+        for place, printed in zip(places, rounded_texts(arrays), strict=True):
+            cells[place] = printed
+        for cell_index, print_one in self._printers:
+            cells[cell_index] = print_one(cells[cell_index])
         unknown: tuple[int, ...] = ()
-        if not math.isfinite(sum([cells[at] for at in self._numbers])):
-            unknown = tuple([at for at in self._numbers if not math.isfinite(cells[at])])
-            for at in unknown:
-                cells[at] = self._unknown_text(at, cells[at])
+        if not math.isfinite(sum([cells[number_index] for number_index in self._numbers])):
+            unknown = tuple(
+                [
+                    number_index
+                    for number_index in self._numbers
+                    if not math.isfinite(cells[number_index])
+                ]
+            )
+            for unknown_index in unknown:
+                cells[unknown_index] = self._unknown_text(unknown_index, cells[unknown_index])
         template = self._templates.get(unknown)
         if template is None:
             template = self._templates[unknown] = self._row_template(unknown)
         return template % tuple(cells)
 
-    def _unknown_text(self, at: int, value: float) -> str:
+    def _unknown_text(self, index: int, value: float) -> str:
         """Return the JSON of a number that is not finite.
 
         Raises:
             ValueError: it is an exact number.
 
         """
-        column = self._columns[at]
+        column = self._columns[index]
         return text(value) if column.kind == "exact" else rounded_text(value)
 
     def _row_template(self, unknown: Sequence[int]) -> str:
-        known = set(self._numbers) - set(unknown)
+        finite_indices = set(self._numbers) - set(unknown)
         fields = [
-            f'"{name}":%{DIGITS[column.kind] if at in known else "s"}'
-            for at, (name, column) in enumerate(self._topic.columns.items())
+            f'"{name}":%{DIGITS[column.kind] if index in finite_indices else "s"}'
+            for index, (name, column) in enumerate(self._topic.columns.items())
         ]
         return "{" + ",".join(fields) + "}"
 
@@ -149,7 +157,7 @@ def _printer(column: Column, row_of_goals: Callable[[Any], str]) -> Callable[[An
         case "integer" if not column.shape:
             return lambda value: str(int(value))
         case "joints":
-            return lambda value: encode([int(each) for each in value])
+            return lambda value: encode([int(element) for element in value])
         case "integer" | "flag":
             return lambda value: flags_text(value.tobytes(), value.dtype.char)
         case _:

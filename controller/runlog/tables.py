@@ -105,8 +105,8 @@ def record_of(
         ),
         waypoints=waypoints,
         events=tuple(
-            Event(*each)
-            for each in zip(
+            Event(*columns)
+            for columns in zip(
                 events.time_s.tolist(), events.level, events.kind, events.text, strict=True
             )
         ),
@@ -125,7 +125,10 @@ def table_of(kind: type[T], rows: Sequence[Row], sizes: Mapping[str, int]) -> T:
     """
     columns = kind.topic.columns
     return kind(
-        **{each.name: _cells(each.name, columns[each.name], rows, sizes) for each in fields(kind)}  # type: ignore[arg-type]
+        **{
+            field.name: _cells(field.name, columns[field.name], rows, sizes)
+            for field in fields(kind)  # type: ignore[arg-type]
+        }
     )
 
 
@@ -134,7 +137,7 @@ def _joined(kind: type[T], parts: Sequence[T], last: T) -> T:
     if not parts:
         return last
     cells: dict[str, Any] = {}
-    for name in (each.name for each in fields(kind)):  # type: ignore[arg-type]
+    for name in (field.name for field in fields(kind)):  # type: ignore[arg-type]
         values = [getattr(part, name) for part in parts]
         if len(getattr(last, name)):
             values.append(getattr(last, name))
@@ -155,7 +158,7 @@ def _cells(name: str, column: Column, rows: Sequence[Row], sizes: Mapping[str, i
     if column.kind == "joints":
         return tuple(map(tuple, values))
     sizes = {**sizes, ANY: len(values[0]) if column.shape == (ANY,) and values else 0}
-    shape = [sizes[each] if isinstance(each, str) else each for each in column.shape]
+    shape = [sizes[size] if isinstance(size, str) else size for size in column.shape]
     if column.default is None and column.shape:
         unknown = np.full(shape, None).tolist()
         values = [unknown if value is None else value for value in values]

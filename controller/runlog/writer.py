@@ -106,9 +106,9 @@ class RunLog:
             finally:
                 self._file.close()
         except OSError as fault:
-            told = error if isinstance(error, OSError) else fault
-            told.filename = told.filename or str(self._part)
-            told.add_note(f"the run up to there: snakewalk log report {self._part}")
+            write_error = error if isinstance(error, OSError) else fault
+            write_error.filename = write_error.filename or str(self._part)
+            write_error.add_note(f"the run up to there: snakewalk log report {self._part}")
             if error is None:
                 raise
             return

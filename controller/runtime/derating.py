@@ -97,7 +97,7 @@ def allowed(
             limit_rad,
         ),
     )
-    rates, values, unit, limit = min(ratings, key=lambda each: float(each[0].min()))
+    rates, values, unit, limit = min(ratings, key=lambda rating: float(rating[0].min()))
     joint = int(np.argmin(rates))
     rate = LEAST + (1.0 - LEAST) * float(rates[joint])
     if rate >= 1.0:
@@ -209,7 +209,9 @@ class Derating:
         means = self._current_a, self._lag_rad
         now = UNLIMITED if unlimited else allowed(state, *means, safety, self._robot)
         if self._load is not None:
-            now = min(now, self._allowed_by_load(self._load, state), key=lambda each: each.rate)
+            now = min(
+                now, self._allowed_by_load(self._load, state), key=lambda allowance: allowance.rate
+            )
         if now.rate == self.rate:
             return self.rate
         time_s = FALL_S if now.rate < self.rate else RISE_S

@@ -357,17 +357,17 @@ class Drive:
         monitor = self._friction_monitor
         if monitor is None or sent is None:
             return
-        found = monitor.update(view, sent.goal_rad)
-        if found is None:
+        identified = monitor.update(view, sent.goal_rad)
+        if identified is None:
             return
         now_s = self._clock.now_s()
         self._log.add(
             FrictionTable,
             now_s,
-            along=found.friction.along,
-            across=found.friction.across,
-            along_95=found.along_95,
-            across_95=found.across_95,
+            along=identified.friction.along,
+            across=identified.friction.across,
+            along_95=identified.along_95,
+            across_95=identified.across_95,
         )
         text = monitor.event_text()
         if text is not None:

@@ -188,7 +188,7 @@ class _PaperBody:
         tangential = share * (tangential @ turn)
         normal = share[:, 0] * normal
         was_m_s = self._moving_m_s @ turn
-        held = self._balance(points, headings, shape_m_s, was_m_s, tangential, normal)
+        balance = self._balance(points, headings, shape_m_s, was_m_s, tangential, normal)
         velocity = self._velocity
         lever = np.stack([-points[:, 1], points[:, 0]], axis=1)
         moving = shape_m_s + velocity[:2] + velocity[2] * lever
@@ -196,7 +196,7 @@ class _PaperBody:
             friction_n(moving, headings, self._friction, weight_n) * normal[:, None]
             + weight_n * tangential
         )
-        if not held:
+        if not balance:
             self.slide = _worse(
                 self.slide, points, headings, self._friction, tangential, normal, step_s
             )

@@ -30,10 +30,10 @@ class FrictionEstimator(ABC):
 
         """
 
-    def accept(self, found: FoundFriction) -> None:
+    def accept(self, identified: FoundFriction) -> None:
         """Use a finding: the estimate if it contradicts the file, else the file's friction."""
-        self._confirmed = 0 if found.differs else self._confirmed + 1
-        friction = found.friction if found.differs else self._file
+        self._confirmed = 0 if identified.differs else self._confirmed + 1
+        friction = identified.friction if identified.differs else self._file
         if friction != self._used:
             self._used = friction
             self._use(friction)

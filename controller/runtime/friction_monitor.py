@@ -121,13 +121,15 @@ def _shapes(span: Span) -> tuple[Floats, Floats, Floats]:
     Last the times (n - 1,) between them, s.
     """
     last = len(span.views) - 1
-    at = np.array([*range(1, last, _STRIDE), last])
-    headings = np.array([span.views[k].headings_rad for k in at])
-    points = np.array([(span.views[k].link_m - span.views[k].centre_m)[:, :2] for k in at])
+    view_indices = np.array([*range(1, last, _STRIDE), last])
+    headings = np.array([span.views[k].headings_rad for k in view_indices])
+    points = np.array(
+        [(span.views[k].link_m - span.views[k].centre_m)[:, :2] for k in view_indices]
+    )
     mean = headings.mean(axis=1)[:, None]
     x, y, c, s = points[..., 0], points[..., 1], np.cos(mean), np.sin(mean)
     turned = np.stack([c * x + s * y, c * y - s * x], axis=-1)
-    return headings - mean, turned, np.diff(at) * span.cycle_s
+    return headings - mean, turned, np.diff(view_indices) * span.cycle_s
 
 
 class FrictionMonitor(FrictionEstimator):
@@ -173,11 +175,11 @@ class FrictionMonitor(FrictionEstimator):
                 span = Span(tuple(self._views), tuple(self._goals_rad[2:]), self._cycle_s)
                 self._replays = self._judge(span)
             del self._views[:-2], self._goals_rad[:-2]
-        found = next(self._replays, None)
-        if found is not None:
-            self.accept(found)
+        identified = next(self._replays, None)
+        if identified is not None:
+            self.accept(identified)
             self._rests = _RESTS if self._confirmed >= _SETTLED else 0
-        return found
+        return identified
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:
         """Replay a span, a hypothesis a cycle; the result comes last."""

@@ -105,8 +105,10 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
         sooner = np.count_nonzero(gaps < SHORT_RETURN * drawn.states)
         short[repeat], short_steps[repeat] = sooner / max(1, len(gaps)), sooner / done.steps
         per_state[repeat] = sooner / drawn.states
-        seen = np.cumsum(_first_visits(done))
-        visited += np.interp(_GRID * drawn.states, np.arange(len(seen)), seen / drawn.states)
+        visited_shares = np.cumsum(_first_visits(done))
+        visited += np.interp(
+            _GRID * drawn.states, np.arange(len(visited_shares)), visited_shares / drawn.states
+        )
     return StudyResult(
         graph=graph,
         rule=rule,
@@ -186,14 +188,14 @@ def graph_source(spec: str) -> Draw:
 
 def _file(path: Path) -> Draw:
     try:
-        found = getattr(nx, _READERS[path.suffix])(path)
+        source_graph = getattr(nx, _READERS[path.suffix])(path)
     except FileNotFoundError:
         raise InputError(f"graph {path}: no such file") from None
     except (nx.NetworkXError, ValueError, TypeError, ParseError, UnicodeDecodeError) as error:
         raise InputError(f"graph {path}: is no {path.suffix[1:]} file: {error}") from None
-    own: nx.Graph[Any] = nx.Graph(found)
-    number = {node: k for k, node in enumerate(own)}
-    edges = np.array([[number[a], number[b]] for a, b in own.edges], dtype=np.int64)
+    plain_graph: nx.Graph[Any] = nx.Graph(source_graph)
+    number = {node: k for k, node in enumerate(plain_graph)}
+    edges = np.array([[number[a], number[b]] for a, b in plain_graph.edges], dtype=np.int64)
     graph = graph_from_edges(len(number), edges.reshape(-1, 2))
     return lambda _: graph
 

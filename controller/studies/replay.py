@@ -136,13 +136,13 @@ def differences(
 def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
     cycle = record.cycle
     rows = len(record.cycle.time_s)
-    seen = replace(
+    measured_cycle = replace(
         cycle,
         measured_rad=np.where(valid[:rows], cycle.measured_rad, np.nan),
         velocity_rad_s=np.where(valid[:rows], cycle.velocity_rad_s, np.nan),
         current_a=np.where(valid[:rows], cycle.current_a, np.nan),
     )
-    return replace(record, cycle=seen)
+    return replace(record, cycle=measured_cycle)
 
 
 def _backend(record: RunRecord) -> Backend:
@@ -150,8 +150,8 @@ def _backend(record: RunRecord) -> Backend:
     initial_pose = header.initial_pose
     if initial_pose is None:
         first = record.cycle.measured_rad[0]
-        known = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
-        initial_pose = InitialPose(_start_heading_rad(header), known)
+        start_rad = first if np.isfinite(first).all() else np.zeros(header.robot.joint_count)
+        initial_pose = InitialPose(_start_heading_rad(header), start_rad)
     return simulated(
         header.run, header.robot, header.world, build_ground(header.world), initial_pose
     )

@@ -54,11 +54,11 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
     for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):
         settings |= flat(config.model_dump(mode="json"), table)
     off_rad = tracking_error_rad(cycle)
-    known = np.isfinite(off_rad)
-    count = np.maximum(known.sum(axis=1), 1)
-    squares = np.where(known, off_rad, 0.0) ** 2
+    is_known = np.isfinite(off_rad)
+    count = np.maximum(is_known.sum(axis=1), 1)
+    squares = np.where(is_known, off_rad, 0.0) ** 2
     rms_rad = np.sqrt(squares.sum(axis=1) / count)
-    rms_rad[~known.any(axis=1)] = np.nan
+    rms_rad[~is_known.any(axis=1)] = np.nan
     current_a = np.where(np.isfinite(cycle.current_a), np.abs(cycle.current_a), -1.0)
     largest_a = current_a.max(axis=1, initial=-1.0)
     return ComparedRun(
@@ -89,18 +89,18 @@ def differing(runs: Sequence[ComparedRun]) -> dict[str, list[Any]]:
     """Settings that are not the same in all runs, a value a run; None where one has no such key."""
     keys = dict.fromkeys(key for run in runs for key in run.settings)
     values = {key: [run.settings.get(key) for run in runs] for key in keys}
-    return {key: row for key, row in values.items() if any(one != row[0] for one in row)}
+    return {key: row for key, row in values.items() if any(value != row[0] for value in row)}
 
 
 def flat(table: Mapping[Any, Any], name: str = "") -> dict[str, Any]:
     """Values of a table and of the tables in it by dotted key; rows are numbered from 0."""
-    found: dict[str, Any] = {}
+    flat_values: dict[str, Any] = {}
     for key, value in table.items():
         where = f"{name}.{key}".removeprefix(".")
         if isinstance(value, Mapping):
-            found |= flat(value, where)
+            flat_values |= flat(value, where)
         elif isinstance(value, list) and any(isinstance(row, Mapping) for row in value):
-            found |= flat(dict(enumerate(value)), where)
+            flat_values |= flat(dict(enumerate(value)), where)
         else:
-            found[where] = value
-    return found
+            flat_values[where] = value
+    return flat_values

@@ -63,20 +63,20 @@ class Space:
 
     def values(self, unit: Floats) -> dict[str, Any]:
         """Parameters of a point (d,) of the unit cube."""
-        found: dict[str, Any] = {}
+        values_by_name: dict[str, Any] = {}
         for (name, span), u in zip(self.spans.items(), unit, strict=True):
             low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
             value = low + float(np.clip(u, 0.0, 1.0)) * (span.high - low)
-            found[name] = round(value) if span.kind is int else float(f"{value:.4g}")
-        return found
+            values_by_name[name] = round(value) if span.kind is int else float(f"{value:.4g}")
+        return values_by_name
 
     def unit(self, values: dict[str, Any]) -> Floats:
         """Return the point (d,) of the unit cube where parameters have these values."""
-        found = []
+        unit_values = []
         for name, span in self.spans.items():
             low = max(span.low, SLOWEST_HZ) if name == "frequency_hz" else span.low
-            found.append((float(values[name]) - low) / (span.high - low))
-        return np.asarray(np.clip(np.array(found), 0.0, 1.0))
+            unit_values.append((float(values[name]) - low) / (span.high - low))
+        return np.asarray(np.clip(np.array(unit_values), 0.0, 1.0))
 
 
 def points_of(
@@ -102,13 +102,13 @@ def points_of(
     space = Space.of(gait)
     place = (gait.name, file or robot.name, gait.world)
     replaced = tuple((keys or {}).items())
-    found = [Point(*place, 0, seed, seconds, keys=replaced)]
+    points = [Point(*place, 0, seed, seconds, keys=replaced)]
     refused = 0
     sobol = qmc.Sobol(
         len(space.spans), rng=np.random.default_rng([seed, crc32(gait.name.encode())])
     )
     for unit in _draws(sobol, int(np.ceil(np.log2(count * _TRIES)))):
-        if len(found) >= count:
+        if len(points) >= count:
             break
         values = space.values(unit)
         try:
@@ -116,9 +116,9 @@ def points_of(
         except InputError:
             refused += 1
             continue
-        number = len(found)
-        found.append(Point(*place, number, seed, seconds, values, replaced))
-    return found, refused
+        number = len(points)
+        points.append(Point(*place, number, seed, seconds, values, replaced))
+    return points, refused
 
 
 def _draws(sobol: qmc.Sobol, exponent: int) -> Iterator[Floats]:

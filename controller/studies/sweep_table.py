@@ -87,8 +87,8 @@ class SweepTable(CsvTable):
         """Append a finished point."""
         place = dict(zip(_PLACE, point.key, strict=True))
         values = GAITS[point.gait].of(dict(point.parameters)).params.model_dump()
-        found = place | {k: v for k, v in (asdict(row) | values).items() if v is not None}
-        self.append(found)
+        table_entry = place | {k: v for k, v in (asdict(row) | values).items() if v is not None}
+        self.append(table_entry)
 
 
 def number(row: dict[str, str], key: str) -> float:
@@ -148,9 +148,9 @@ class _Running:
 
 def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
     """Return one row per gait, robot and set of replaced values, in their order."""
-    found: dict[tuple[str, str, str], _Running] = {}
+    running_by_key: dict[tuple[str, str, str], _Running] = {}
     for row in rows:
-        found.setdefault((row["gait"], row["robot"], row["keys"]), _Running()).add(row)
+        running_by_key.setdefault((row["gait"], row["robot"], row["keys"]), _Running()).add(row)
     return [
         GaitDigest(
             gait=gait,
@@ -169,7 +169,7 @@ def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
             peak_c=_round(some.celsius, 1),
             default_slip=_round(_of(some.first, "slip"), 2),
         )
-        for (gait, robot, keys), some in found.items()
+        for (gait, robot, keys), some in running_by_key.items()
     ]
 
 
@@ -191,8 +191,8 @@ def _of(row: dict[str, str] | None, key: str) -> float:
 
 
 def _most(values: list[float]) -> float:
-    known = [value for value in values if math.isfinite(value)]
-    return max(known, default=math.nan)
+    finite_values = [value for value in values if math.isfinite(value)]
+    return max(finite_values, default=math.nan)
 
 
 def _round(value: float, digits: int) -> float | None:

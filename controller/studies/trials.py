@@ -116,22 +116,22 @@ def prepare_case(
         InputError: the run cannot be prepared, or the ground about its start is unsafe.
 
     """
-    found = _prepared(case, seed, changes)
-    found = changed(found, run=with_compliance(found.run, case.compliance))
+    prepared_run = _prepared(case, seed, changes)
+    prepared_run = changed(prepared_run, run=with_compliance(prepared_run.run, case.compliance))
     if case.relief != 1.0:
-        found = changed(found, world=found.world.with_relief(case.relief))
+        prepared_run = changed(prepared_run, world=prepared_run.world.with_relief(case.relief))
     if spread_m == 0.0:
-        return found
-    relief = found.planner.relief if isinstance(found, WalkRun) else None
-    start_m = np.array(found.run.start_m)
+        return prepared_run
+    relief = prepared_run.planner.relief if isinstance(prepared_run, WalkRun) else None
+    start_m = np.array(prepared_run.run.start_m)
     rng = np.random.default_rng(seed)
     for _ in range(_START_DRAWS):
         x_m, y_m = start_m + spread_m * rng.standard_normal(2)
         if relief is None or relief.safe(x_m, y_m):
-            moved = found.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
-            return changed(found, run=moved)
+            moved = prepared_run.run.model_copy(update={"start_m": (float(x_m), float(y_m))})
+            return changed(prepared_run, run=moved)
     raise InputError(
-        f"run {found.run.name}: no safe ground within {spread_m:g} m of the start "
+        f"run {prepared_run.run.name}: no safe ground within {spread_m:g} m of the start "
         f"({start_m[0]:.2f}, {start_m[1]:.2f}); move the start or give --start-spread 0"
     )
 
@@ -182,8 +182,8 @@ def config_digest(case: Case, changes: Mapping[str, object]) -> str:
         InputError: the case cannot be prepared.
 
     """
-    found = prepare_case(case, 0, 0.0, changes)
-    return digest(found.run, found.robot, found.world)
+    prepared_run = prepare_case(case, 0, 0.0, changes)
+    return digest(prepared_run.run, prepared_run.robot, prepared_run.world)
 
 
 def is_fixed(case: Case, spread_m: float, changes: Mapping[str, object]) -> bool:
@@ -342,11 +342,11 @@ class CaseSummary:
     """Runs in which the head link was over 90 degrees on its side."""
 
 
-def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
+def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
     """One row per case: complete runs, means and extremes, and reasons of failures."""
     rows: list[CaseSummary] = []
     for case in cases:
-        some = sorted((t for t in found if t.case == case), key=lambda t: t.seed)
+        some = sorted((t for t in all_trials if t.case == case), key=lambda t: t.seed)
         complete = sum(t.complete for t in some)
         first = sum(t.first_pass for t in some)
         rows.append(
@@ -390,15 +390,15 @@ def table(found: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
 
 
 def _evidence(some: Sequence[Trial]) -> str:
-    known = {f"{t.pose_evidence} ({t.pose_source})": None for t in some if t.pose_evidence}
-    return ", ".join(known)
+    sources = {f"{t.pose_evidence} ({t.pose_source})": None for t in some if t.pose_evidence}
+    return ", ".join(sources)
 
 
 def _truly_complete(some: Sequence[Trial]) -> str:
-    known = [t for t in some if np.isfinite(t.truly_reached)]
-    if not known:
+    finite_trials = [t for t in some if np.isfinite(t.truly_reached)]
+    if not finite_trials:
         return ""
-    return f"{sum(t.truly_reached == t.waypoints for t in known)} of {len(known)}"
+    return f"{sum(t.truly_reached == t.waypoints for t in finite_trials)} of {len(finite_trials)}"
 
 
 def wilson(successes: int, runs: int) -> tuple[float, float]:
@@ -431,15 +431,15 @@ def _number(value: object) -> float:
 
 
 def _mean(values: list[float] | list[int], digits: int) -> float | None:
-    known = [v for v in values if np.isfinite(v)]
-    return round(float(np.mean(known)), digits) if known else None
+    finite_values = [v for v in values if np.isfinite(v)]
+    return round(float(np.mean(finite_values)), digits) if finite_values else None
 
 
 def _deviation(values: list[float], digits: int) -> float | None:
-    known = [v for v in values if np.isfinite(v)]
-    return round(float(np.std(known, ddof=1)), digits) if len(known) > 1 else None
+    finite_values = [v for v in values if np.isfinite(v)]
+    return round(float(np.std(finite_values, ddof=1)), digits) if len(finite_values) > 1 else None
 
 
 def _most(values: list[float], digits: int) -> float | None:
-    known = [v for v in values if np.isfinite(v)]
-    return round(max(known), digits) if known else None
+    finite_values = [v for v in values if np.isfinite(v)]
+    return round(max(finite_values), digits) if finite_values else None

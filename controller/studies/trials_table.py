@@ -41,15 +41,15 @@ class TrialsTable(CsvTable):
 
     def finished(self, planned: Sequence[tuple[Case, int]]) -> list[Trial]:
         """The entries of ``planned`` that the table holds."""
-        found: list[Trial] = []
+        trials: list[Trial] = []
         for case, seed in planned:
             row = self.held(self._where(case, seed))
             if row is not None:
                 values: dict[str, object] = {key: row[key] for key in _MEASURED}
                 start_m = row["start_m"].split() or None
                 values |= {"case": case, "seed": seed, "start_m": start_m}
-                found.append(_TRIAL.validate_python(values))
-        return found
+                trials.append(_TRIAL.validate_python(values))
+        return trials
 
     def add(self, trial: Trial) -> None:
         """Append a finished trial."""

@@ -192,9 +192,9 @@ def tune(
         values = space.values(best.x)
         tuned = replace(start, number=1, parameters=values)
         others = range(seed + 1, seed + 1 + seeds)
-        one = partial(_scored, task=task)
-        before = tuple(pool.map(partial(one, start), others))
-        after = tuple(pool.map(partial(one, tuned), others))
+        score_of = partial(_scored, task=task)
+        before = tuple(pool.map(partial(score_of, start), others))
+        after = tuple(pool.map(partial(score_of, tuned), others))
     return Tuned(gait, body.name, aim, values, done, before, after)
 
 

@@ -109,11 +109,11 @@ class Analysis:
         """
         error = np.abs(self.pulse.body_error_rad)
         slope = self.slope_rad
-        seen = np.isfinite(error)
-        if seen.sum() < 3 or min(np.ptp(error[seen]), np.ptp(slope[seen])) < 1e-12:
+        is_finite = np.isfinite(error)
+        if is_finite.sum() < 3 or min(np.ptp(error[is_finite]), np.ptp(slope[is_finite])) < 1e-12:
             return None
-        points = float((error[seen] * slope[seen]).sum() / (slope[seen] ** 2).sum())
-        return points, float(np.corrcoef(error[seen], slope[seen])[0, 1])
+        points = float((error[is_finite] * slope[is_finite]).sum() / (slope[is_finite] ** 2).sum())
+        return points, float(np.corrcoef(error[is_finite], slope[is_finite])[0, 1])
 
     def _over_pulse(self, speed: Floats) -> float | None:
         """Ratio of a speed (S, N) to the pulse speed, weighted by squared slope."""
@@ -128,15 +128,17 @@ class Analysis:
         wave = self.wave
         pulse = self.pulse
         u = pulse.points_per_frame
-        known = np.isfinite(u)
+        is_known = np.isfinite(u)
         scale = track.rate_hz / track.angles_rad.shape[1]
-        spread = np.percentile(u[known], [25.0, 75.0]) * scale if known.any() else [np.nan] * 2
+        spread = (
+            np.percentile(u[is_known], [25.0, 75.0]) * scale if is_known.any() else [np.nan] * 2
+        )
         angle = self.undulation.angle_rad
         lateral = self.undulation.lateral
-        at = [0, 25, 50, 75, 99]
+        point_indices = [0, 25, 50, 75, 99]
         no_wave, no_pulse = wave.unknown_reason, self.pulse_unknown_reason
         points, correlation = self.error_slope or (None, None)
-        rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if known.any() else np.nan
+        rms = np.sqrt(np.nanmean(pulse.body_error_rad**2)) if is_known.any() else np.nan
 
         def of_wave(value: float) -> float | None:
             return None if no_wave else round(value, 3)
@@ -169,7 +171,7 @@ class Analysis:
             "pulse_points_per_frame": of_pulse(pulse.typical, 3),
             "pulse_not_told": no_pulse,
             "pulse_frames_compared": pulse.step,
-            "pulse_measured_share": round(float(known.mean()), 3),
+            "pulse_measured_share": round(float(is_known.mean()), 3),
             "wave_speed_body_lengths_s": None if no_wave else round(wave.pulse_body_lengths_s, 4),
             "one_pulse_error_rad": of_pulse(float(rms), 4),
             "one_pulse_error_over_slope_points": of_pulse(points, 3),
@@ -177,8 +179,10 @@ class Analysis:
             "travel": _number(self.travel, 3),
             "sliding_weight": _number(self.sliding, 3),
             "travel_not_told": self.travel_unknown_reason,
-            "angle_amplitude_rad": [round(float(angle[k]), 3) for k in at],
-            "lateral_amplitude_body_lengths": [round(float(lateral[k]), 4) for k in [*at[:4], -1]],
+            "angle_amplitude_rad": [round(float(angle[k]), 3) for k in point_indices],
+            "lateral_amplitude_body_lengths": [
+                round(float(lateral[k]), 4) for k in [*point_indices[:4], -1]
+            ],
             "bend_k_rad": round(float(np.median(track.bend_rad)), 3),
             "energy_kept": round(float(self.energy.mean()), 5),
             "energy_kept_least": round(float(self.energy.min()), 5),

@@ -57,8 +57,8 @@ def with_ends_in_place(points: Floats, number: Ints) -> tuple[Floats, tuple[str,
 def _exchanged_labels(points: Floats) -> Bools:
     """(T,) frames whose polyline becomes much shorter with its end points exchanged."""
     one_length, other_length = (
-        np.hypot(*np.diff(each, axis=1).transpose(2, 0, 1)).sum(axis=1)
-        for each in (points, _with_ends_exchanged(points))
+        np.hypot(*np.diff(labelled_points, axis=1).transpose(2, 0, 1)).sum(axis=1)
+        for labelled_points in (points, _with_ends_exchanged(points))
     )
     return np.asarray(other_length < _SHORTER * one_length)
 
@@ -71,7 +71,9 @@ def _exchanged_bodies(points: Floats, number: Ints) -> Bools:
     """(T,) frames that run against most of the others, between gaps."""
     step = np.hypot(*np.diff(points, axis=1).transpose(2, 0, 1))
     length = float(np.median(step.sum(axis=1)))
-    bodies = np.stack([_resampled(*each) for each in zip(points, step, strict=True)])
+    bodies = np.stack(
+        [_resampled(*body_and_step) for body_and_step in zip(points, step, strict=True)]
+    )
     same = _distance(bodies[1:], bodies[:-1])
     reverse = _distance(bodies[1:, ::-1], bodies[:-1])
     moved = np.minimum(same, reverse)
@@ -89,13 +91,13 @@ def _exchanged_bodies(points: Floats, number: Ints) -> Bools:
 def _resampled(body: Floats, step: Floats) -> Floats:
     """``_SAMPLES`` points (S, 2) evenly along the polyline through (P, 2) with steps (P - 1,)."""
     along = np.concatenate([[0.0], np.cumsum(step)])
-    at = np.linspace(0.0, along[-1], _SAMPLES)
-    return np.stack([np.interp(at, along, axis) for axis in body.T], axis=-1)
+    station = np.linspace(0.0, along[-1], _SAMPLES)
+    return np.stack([np.interp(station, along, axis) for axis in body.T], axis=-1)
 
 
-def _distance(one: Floats, other: Floats) -> Floats:
+def _distance(first: Floats, other: Floats) -> Floats:
     """(T,) root of the mean square distance of the points of bodies (T, S, 2)."""
-    return np.asarray(np.sqrt(((one - other) ** 2).sum(axis=2).mean(axis=1)))
+    return np.asarray(np.sqrt(((first - other) ** 2).sum(axis=2).mean(axis=1)))
 
 
 def _frames(which: Bools, number: Ints) -> str:

@@ -46,5 +46,5 @@ class FrameStatus(StrEnum):
 
 def statuses_named(words: Sequence[str]) -> list[FrameStatus]:
     """Statuses by their names in lower case; an empty list if one is unknown."""
-    known = {one.name.lower(): one for one in FrameStatus}
-    return [known[word] for word in words] if known.keys() >= set(words) else []
+    status_by_name = {frame_status.name.lower(): frame_status for frame_status in FrameStatus}
+    return [status_by_name[word] for word in words] if status_by_name.keys() >= set(words) else []

@@ -45,8 +45,8 @@ class PulseSpeed:
     @property
     def typical(self) -> float:
         """Median of U, points per frame; NaN if nothing was measured."""
-        known = np.isfinite(self.points_per_frame)
-        return float(np.median(self.points_per_frame[known])) if known.any() else float("nan")
+        is_known = np.isfinite(self.points_per_frame)
+        return float(np.median(self.points_per_frame[is_known])) if is_known.any() else float("nan")
 
 
 def measure_pulse_speed(
@@ -97,17 +97,17 @@ def measure_pulse_speed(
     n = np.arange(points)
     ahead, behind = n - NEIGHBOURS // 2 - 1 - shift, points - 2 - NEIGHBOURS // 2 - n + shift
     inside = (ahead > _EDGE) & (behind > _EDGE) & (np.abs(shift) < most - 0.5)
-    known = inside & (slope > LEAST_SLOPE * usual) & np.isfinite(best)
-    _forget_beyond(known, shift, most)
-    whole = _whole_body(shift, np.where(known, slope**2, 0.0))
+    is_known = inside & (slope > LEAST_SLOPE * usual) & np.isfinite(best)
+    _forget_beyond(is_known, shift, most)
+    body_shift = _whole_body(shift, np.where(is_known, slope**2, 0.0))
     return PulseSpeed(
-        points_per_frame=np.where(known, shift, np.nan) / step,
+        points_per_frame=np.where(is_known, shift, np.nan) / step,
         slope=slope,
-        error_rad=np.sqrt(np.where(known, best, np.nan) / NEIGHBOURS),
+        error_rad=np.sqrt(np.where(is_known, best, np.nan) / NEIGHBOURS),
         frame=later,
         step=step,
-        body_points_per_frame=whole / step,
-        body_error_rad=_estimate(before, whole) - now,
+        body_points_per_frame=body_shift / step,
+        body_error_rad=_estimate(before, body_shift) - now,
     )
 
 
@@ -122,34 +122,37 @@ def _estimate(before: Floats, shift: Floats) -> Floats:
     """``Theta_e(n) = Theta(n - U)``, (S, N), linear between points; NaN beyond the body."""
     last = before.shape[1] - 1
     place = np.arange(last + 1) - shift[:, None]
-    seen = (place >= 0.0) & (place <= last)
-    safe = np.where(seen, place, 0.0)
+    is_inside = (place >= 0.0) & (place <= last)
+    safe = np.where(is_inside, place, 0.0)
     low = np.minimum(safe.astype(np.int64), last - 1)
     start, end = (np.take_along_axis(before, low + k, axis=1) for k in (0, 1))
-    return np.where(seen, start + (safe - low) * (end - start), np.nan)
+    return np.where(is_inside, start + (safe - low) * (end - start), np.nan)
 
 
-def _forget_beyond(known: Bools, shift: Floats, most: int) -> None:
+def _forget_beyond(is_known: Bools, shift: Floats, most: int) -> None:
     """Clear chance fits next to neighbours whose shift comes from beyond the head or the tail.
 
     There the true shift is out of reach, and another shift may be a minimum. The neighbours are the
     known ones among ``most + NEIGHBOURS`` points towards the middle.
     """
-    for one, far in ((known, shift), (known[:, ::-1], -shift[:, ::-1])):  # from the tail: mirrored
-        for n in range(min(most + NEIGHBOURS, one.shape[1] // 2), -1, -1):
-            beside = slice(n + 1, n + 1 + most + NEIGHBOURS)
-            near = one[:, beside]
-            order = np.sort(np.where(near, far[:, beside], np.inf), axis=1)
+    for is_known_side, far in (
+        (is_known, shift),
+        (is_known[:, ::-1], -shift[:, ::-1]),
+    ):  # from the tail: mirrored
+        for n in range(min(most + NEIGHBOURS, is_known_side.shape[1] // 2), -1, -1):
+            window = slice(n + 1, n + 1 + most + NEIGHBOURS)
+            near = is_known_side[:, window]
+            order = np.sort(np.where(near, far[:, window], np.inf), axis=1)
             middle = np.maximum(near.sum(axis=1) - 1, 0) // 2  # the lower median
             usual = np.where(near.any(axis=1), order[np.arange(len(order)), middle], 0.0)
-            one[:, n] &= n - NEIGHBOURS // 2 - 1 - usual > -_SLACK
+            is_known_side[:, n] &= n - NEIGHBOURS // 2 - 1 - usual > -_SLACK
 
 
 def _pairs(number: Ints, step: int) -> tuple[Ints, Ints]:
     """Indices of later and earlier frames that are ``step`` apart."""
-    at = np.searchsorted(number, number - step)
-    later = np.flatnonzero(number[at] == number - step)
-    return later, at[later]
+    index = np.searchsorted(number, number - step)
+    later = np.flatnonzero(number[index] == number - step)
+    return later, index[later]
 
 
 def _fit(now: Floats, before: Floats, u: int) -> tuple[Floats, Floats]:

@@ -46,12 +46,12 @@ def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | No
     if Path(track).suffix != ".npz" or not Path(track).is_file():
         return None
     try:
-        held, _ = read_arrays(Path(track), {"joints_rad", "rate_hz", "robot"})
-        if len(held) < 3:
+        arrays, _ = read_arrays(Path(track), {"joints_rad", "rate_hz", "robot"})
+        if len(arrays) < 3:
             return None
-        joints = np.asarray(held["joints_rad"], dtype=float)
-        rate_hz = float(held["rate_hz"])
-        name = str(held["robot"])
+        joints = np.asarray(arrays["joints_rad"], dtype=float)
+        rate_hz = float(arrays["rate_hz"])
+        name = str(arrays["robot"])
     except (TypeError, ValueError, OSError):
         return None  # load_track raises with the reason
     if name != robot.name or joints.ndim != 2 or len(joints) < 2:

@@ -24,9 +24,9 @@ def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
     if int(distinct.sum()) < 4:
         raise ValueError("a body needs 4 distinct points")
     kept = points[distinct]
-    at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(kept, axis=0).T))])
-    spline = scipy.interpolate.make_interp_spline(at, kept)
-    fine = np.linspace(0.0, at[-1], segments * _FINE + 1)
+    arc_px = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(kept, axis=0).T))])
+    spline = scipy.interpolate.make_interp_spline(arc_px, kept)
+    fine = np.linspace(0.0, arc_px[-1], segments * _FINE + 1)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))])
     equal = np.interp(np.linspace(0.0, arc[-1], segments + 1), arc, fine)
     return np.asarray(spline(equal), dtype=float)

@@ -122,35 +122,37 @@ def track_from_points(
         raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
     number = np.arange(len(points)) if frame is None else frame
     number, rate_hz, uneven = _timed(name, number, time_s, rate_hz)
-    whole = np.asarray(np.isfinite(points).all(axis=(1, 2)))
-    whole[whole] = [_distinct(body) for body in points[whole]]
-    every = 1 if uneven else common_step(number[whole])
+    is_complete = np.asarray(np.isfinite(points).all(axis=(1, 2)))
+    is_complete[is_complete] = [_distinct(body) for body in points[is_complete]]
+    every = 1 if uneven else common_step(number[is_complete])
     if every > 1:
-        listed = (number - number[whole][0]) % every == 0
+        listed = (number - number[is_complete][0]) % every == 0
         points = points[listed]
-        whole = whole[listed]
+        is_complete = is_complete[listed]
         number = number[listed] // every
         status = [status[k] for k in np.flatnonzero(listed).tolist()] if status else ()
         rate_hz /= every
-    elif not uneven and is_mostly_every_nth(number[whole]):
+    elif not uneven and is_mostly_every_nth(number[is_complete]):
         time_s = number / rate_hz
         uneven = True
-        rate_hz = 1.0 / float(np.median(np.diff(time_s[whole])))
+        rate_hz = 1.0 / float(np.median(np.diff(time_s[is_complete])))
     absent = _absent(number, time_s if uneven else None, rate_hz)
-    dropped = int(len(points) - whole.sum())
+    dropped = int(len(points) - is_complete.sum())
     if time_s is not None and uneven:
-        points, number, nearest = _between(points, time_s - time_s[0], whole, rate_hz)
+        points, number, nearest = _between(points, time_s - time_s[0], is_complete, rate_hz)
         status = [status[k] for k in nearest.tolist()] if status else ()
-        whole = np.ones(len(points), dtype=bool)
-    if int(whole.sum()) < 2:
-        raise InputError(f"{name}: only {int(whole.sum())} of {len(points)} frames hold a midline")
-    kept = points[whole]
+        is_complete = np.ones(len(points), dtype=bool)
+    if int(is_complete.sum()) < 2:
+        raise InputError(
+            f"{name}: only {int(is_complete.sum())} of {len(points)} frames hold a midline"
+        )
+    kept = points[is_complete]
     even, length = _evenly(kept)
     return Track(
         name=name,
         angles_rad=_over_time(tangent_angles(even)),
         points=kept / length if scale_m is None else kept * scale_m,
-        time_s=(number[whole] - number[0]) / rate_hz,
+        time_s=(number[is_complete] - number[0]) / rate_hz,
         rate_hz=float(rate_hz),
         length_m=None if scale_m is None else length * scale_m,
         dropped=dropped,
@@ -158,7 +160,7 @@ def track_from_points(
         every=every,
         rate_assumed=rate_assumed,
         uneven=uneven,
-        status=tuple(status[k] for k in np.flatnonzero(whole).tolist()) if status else (),
+        status=tuple(status[k] for k in np.flatnonzero(is_complete).tolist()) if status else (),
     )
 
 
@@ -215,30 +217,34 @@ def _is_uneven(name: str, time_s: Floats, number: Ints) -> bool:
 
 
 def _between(
-    points: Floats, time_s: Floats, whole: Bools, rate_hz: float
+    points: Floats, time_s: Floats, is_complete: Bools, rate_hz: float
 ) -> tuple[Floats, Ints, Ints]:
     """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
 
     Times next to a frame without a body, or in long gaps, get no body.
     """
-    first = np.flatnonzero(whole[:-1] & whole[1:] & (np.diff(time_s) <= _JOINED / rate_hz))
+    first = np.flatnonzero(
+        is_complete[:-1] & is_complete[1:] & (np.diff(time_s) <= _JOINED / rate_hz)
+    )
     bodies = [points[:0]]
     numbers = [np.zeros(0, np.int64)]
     nearest = [np.zeros(0, np.int64)]
     for run in np.split(first, np.flatnonzero(np.diff(first) > 1) + 1):
         if not run.size:
             continue
-        own = np.append(run, run[-1] + 1)
-        at_s = time_s[own]
+        frames = np.append(run, run[-1] + 1)
+        at_s = time_s[frames]
         low, high = np.ceil(at_s[0] * rate_hz - 1e-9), np.floor(at_s[-1] * rate_hz + 1e-9)
         grid = np.arange(int(low), int(high) + 1)
         even_s = np.clip(grid / rate_hz, at_s[0], at_s[-1])
         bodies.append(
-            scipy.interpolate.make_interp_spline(at_s, points[own], k=min(3, len(own) - 1))(even_s)
+            scipy.interpolate.make_interp_spline(at_s, points[frames], k=min(3, len(frames) - 1))(
+                even_s
+            )
         )
         numbers.append(grid)
         middle = 0.5 * (at_s[1:] + at_s[:-1])
-        nearest.append(own[np.searchsorted(middle, even_s)])
+        nearest.append(frames[np.searchsorted(middle, even_s)])
     return np.concatenate(bodies), np.concatenate(numbers), np.concatenate(nearest)
 
 

@@ -85,9 +85,9 @@ def advance_of(body: Floats, number: Ints, step: int) -> Advance:
     ``body`` are points (T, N + 1, 2) in body lengths, at equal arcs; ``number`` (T,) frame numbers.
     """
     segments = body.shape[1] - 1
-    at = np.searchsorted(number, number - step)
-    later = np.flatnonzero(number[at] == number - step)
-    earlier = at[later]
+    index = np.searchsorted(number, number - step)
+    later = np.flatnonzero(number[index] == number - step)
+    earlier = index[later]
     middle = 0.5 * (body[:, 1:] + body[:, :-1])
     forward = body[:, :-1] - body[:, 1:]
     mean = forward[later] + forward[earlier]

@@ -123,18 +123,18 @@ def measure_wave(track: Track) -> Wave:
 
 def _of_runs(track: Track, number: Ints) -> Wave:
     curvature = smooth_curvature(track.angles_rad)
-    found = gapped_wave(number, curvature)
-    slope = _slope(found.mode)
-    cycle = 1.0 / max(abs(found.turns_a_frame), 1e-9)
+    wave = gapped_wave(number, curvature)
+    slope = _slope(wave.mode)
+    cycle = 1.0 / max(abs(wave.turns_a_frame), 1e-9)
     return Wave(
         waves=float(abs(slope)),
-        frequency_hz=abs(found.turns_a_frame) * track.rate_hz,
-        towards_tail=bool(slope * found.turns_a_frame < 0.0),
-        share=found.share if _bends(curvature) else 0.0,
-        headward=_headward(found.runs, cycle),
+        frequency_hz=abs(wave.turns_a_frame) * track.rate_hz,
+        towards_tail=bool(slope * wave.turns_a_frame < 0.0),
+        share=wave.share if _bends(curvature) else 0.0,
+        headward=_headward(wave.runs, cycle),
         frames_a_cycle=cycle,
-        cycles=sum(len(run) for run in found.runs) / cycle,
-        longest_cycles=max(len(run) for run in found.runs) / cycle,
+        cycles=sum(len(run) for run in wave.runs) / cycle,
+        longest_cycles=max(len(run) for run in wave.runs) / cycle,
     )
 
 

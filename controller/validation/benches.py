@@ -158,7 +158,7 @@ def _speed(time_s: Floats, place_m: Floats) -> float:
 
 def _pendulum(robot: RobotConfig, motion: PendulumMotion) -> dict[str, float]:
     time_s = np.arange(0.0, _PENDULUM_S, 1.0 / motion.rate_hz)
-    wanted = _TRAJECTORIES[motion.trajectory]
+    trajectory = _TRAJECTORIES[motion.trajectory]
     weight_n_m = motion.mass_kg * GRAVITY_M_S2 * motion.arm_m
     model = motors_of(robot)[0]
     plant = BenchPlant(
@@ -174,10 +174,10 @@ def _pendulum(robot: RobotConfig, motion: PendulumMotion) -> dict[str, float]:
     for k, now_s in enumerate(time_s):
         plant.advance(now_s, drive)
         angle_rad[k] = plant.position_rad[0]
-        drive.goal_rad[:] = wanted(np.maximum(time_s[k : k + 1] - motion.delay_s, 0.0))
+        drive.goal_rad[:] = trajectory(np.maximum(time_s[k : k + 1] - motion.delay_s, 0.0))
     settled = time_s >= _SETTLED_S
     late_s = np.arange(0.0, _MOST_LAG_S + 1e-9, _LAG_STEP_S)
-    errors = [_rms(angle_rad[settled] - wanted(time_s[settled] - lag)) for lag in late_s]
+    errors = [_rms(angle_rad[settled] - trajectory(time_s[settled] - lag)) for lag in late_s]
     return {"lag_s": float(late_s[np.argmin(errors)]), "rms_error_rad": errors[0]}
 
 

@@ -71,8 +71,8 @@ class Compared:
 
         A quotient of two rows does not count: both rows count themselves.
         """
-        own = self.over is None and math.isfinite(self.ratio)
-        return self.kind == "measured" and self.travels and own
+        is_comparable = self.over is None and math.isfinite(self.ratio)
+        return self.kind == "measured" and self.travels and is_comparable
 
 
 def compare(

@@ -88,7 +88,7 @@ def _section(name: str, measurement: PublishedResults, rows: Sequence[Compared])
         if row.cause:
             causes.setdefault(row.cause, []).append(row.row)
     for cause, names in causes.items():
-        of = "all" if len(names) == len(rows) else ", ".join(f"`{each}`" for each in names)
+        of = "all" if len(names) == len(rows) else ", ".join(f"`{row_name}`" for row_name in names)
         lines.append(f"- Most likely cause: {cause}. Rows: {of}.")
     return "\n".join(lines) + "\n"
 

@@ -206,13 +206,13 @@ class BrowserGamepad:
     def commands(self) -> list[str]:
         """Keys pressed since the last call; then, if a state has come, whether it is held."""
         with self._lock:
-            found = list(self._keys)
+            page_commands = list(self._keys)
             self._keys.clear()
             if self._is_new:
                 self._is_new = False
-                held = self.state is not None and self.state.is_enabled
-                found.append(hold_command(held, self._told_s))
-        return found
+                is_held = self.state is not None and self.state.is_enabled
+                page_commands.append(hold_command(is_held, self._told_s))
+        return page_commands
 
     async def serve(self, connection: Any) -> None:
         """Process the messages of one browser, one after another, until it leaves."""
@@ -234,8 +234,8 @@ def _pressed(before: PadState | None, state: PadState | None) -> list[str]:
     """
     if before is None or state is None:
         return []
-    found = [KEYS[k] for k in sorted(state.pressed - before.pressed) if k in KEYS]
+    keys = [KEYS[k] for k in sorted(state.pressed - before.pressed) if k in KEYS]
     for names, was, side in zip(STICK, before.sides, state.sides, strict=False):
         if side and side != was:
-            found.append(names[side > 0])
-    return found
+            keys.append(names[side > 0])
+    return keys

@@ -21,8 +21,8 @@ def fresh_commands(
 ) -> list[str | Refused]:
     """Return the commands of lines without those of a gamepad's state, and reasons for dropped."""
     commands = [in_time(line, now_s) for line in lines]
-    fresh = dead_man.sort_out([each for each in commands if isinstance(each, str)])
-    return [*fresh, *(each for each in commands if isinstance(each, Refused))]
+    fresh = dead_man.sort_out([command for command in commands if isinstance(command, str)])
+    return [*fresh, *(command for command in commands if isinstance(command, Refused))]
 
 
 def in_time(line: str, now_s: Callable[[], float]) -> str | Refused:

@@ -82,8 +82,8 @@ class Dashboard:
                 for panel in Panel
                 if not panel.is_of_one_joint and panel != Panel.CURRENT  # above, of all joints
             }
-            for each in self._panels.values():
-                each.visible = False
+            for joint_panel in self._panels.values():
+                joint_panel.visible = False
 
     def show_picture(self, jpeg: bytes) -> None:
         """Show the image of the run's camera; the first image makes the tab."""
@@ -119,10 +119,11 @@ class Dashboard:
             facts.append(f"{share:.0%} of the walk on wide waves")
         believes = "" if self._evidence.is_measured or not facts else "believed: "
         colour = _INK if self._evidence.is_measured else _WARN
-        known = f"<span style='color:{colour}'>pose: {escape(self._evidence.text)}</span>"
+        evidence_html = f"<span style='color:{colour}'>pose: {escape(self._evidence.text)}</span>"
         self._state.content = (
             f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "
-            f"{escape(self._robot.name)}<br>{time_s:.1f} s, {believes}{', '.join(facts)}<br>{known}"
+            f"{escape(self._robot.name)}<br>{time_s:.1f} s, "
+            f"{believes}{', '.join(facts)}<br>{evidence_html}"
             f"{self._contours}<br>{escape(text)}</div>"
         )
 
@@ -191,20 +192,23 @@ class Dashboard:
         if self._checks_pose:
             self._feed.content = _feed_lines(events)
         self._events.content = "".join(
-            f"<div style='padding:.15em .8em;font-size:12px;color:{_LEVELS.get(each.level, _INK)}'>"
-            f"{each.time_s:.1f} s &nbsp;{escape(each.kind)}: {escape(each.text)}</div>"
-            for each in reversed(events[-_EVENTS:])
+            "<div style='padding:.15em .8em;font-size:12px;"
+            f"color:{_LEVELS.get(event.level, _INK)}'>"
+            f"{event.time_s:.1f} s &nbsp;{escape(event.kind)}: {escape(event.text)}</div>"
+            for event in reversed(events[-_EVENTS:])
         )
 
 
 def _feed_lines(events: Sequence[Event]) -> str:
     """Return the newest facts of a checked pose, one a line, and the faults reported with them."""
-    begins = [k for k, each in enumerate(events) if each.kind == "pose"]
+    begins = [k for k, event in enumerate(events) if event.kind == "pose"]
     newest = events[begins[-1] :] if begins else ()
     lines = [
-        (_LEVELS.get(each.level, _INK), text)
-        for each in newest
-        for text in (each.text.split("; ") if each.kind == "pose" else (each.text,))
+        (_LEVELS.get(shown_event.level, _INK), text)
+        for shown_event in newest
+        for text in (
+            shown_event.text.split("; ") if shown_event.kind == "pose" else (shown_event.text,)
+        )
     ]
     return "".join(
         f"<div style='padding:.15em .8em;color:{colour}'>{escape(text)}</div>"
@@ -232,9 +236,9 @@ def _apart_a(record: RunRecord, rows: np.ndarray) -> Floats:
     """Currents (n, J) of some cycles less those of the shadow; NaN where it has no row."""
     time_s = record.cycle.time_s[rows]
     shadow = record.shadow
-    at = np.minimum(np.searchsorted(shadow.time_s, time_s), len(shadow.time_s) - 1)
-    same = (shadow.time_s[at] == time_s)[:, np.newaxis]
-    return np.where(same, record.cycle.current_a[rows] - shadow.current_a[at], np.nan)
+    shadow_index = np.minimum(np.searchsorted(shadow.time_s, time_s), len(shadow.time_s) - 1)
+    same = (shadow.time_s[shadow_index] == time_s)[:, np.newaxis]
+    return np.where(same, record.cycle.current_a[rows] - shadow.current_a[shadow_index], np.nan)
 
 
 def _spread(first: int, last: int) -> np.ndarray:
@@ -245,7 +249,7 @@ def _spread(first: int, last: int) -> np.ndarray:
 def _of_joints(names: Sequence[str]) -> dict[str, str]:
     """Colours of all joints, from dark at the head to light at the tail."""
     share = np.linspace(0.0, 0.75, len(names))[:, None]
-    dark, white = (np.array(colours.rgb(one)) for one in (colours.MEASURED, "#ffffff"))
+    dark, white = (np.array(colours.rgb(colour)) for colour in (colours.MEASURED, "#ffffff"))
     tones = np.rint(dark + share * (white - dark)).astype(int).tolist()
     return {
         name: f"#{red:02x}{green:02x}{blue:02x}"
@@ -262,9 +266,11 @@ def _curve_colours(panel: Panel) -> dict[str, str]:
 
 def _newest(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
     """Values (n,) of each curve of a panel that were the newest at some times."""
-    known = {each.curve.name: each.values[_rows_at(each.time_s, time_s)] for each in curves}
+    newest_values = {
+        curve.curve.name: curve.values[_rows_at(curve.time_s, time_s)] for curve in curves
+    }
     unknown = np.full(len(time_s), np.nan)
-    return [known.get(name, unknown) for name in _curve_colours(panel)]
+    return [newest_values.get(name, unknown) for name in _curve_colours(panel)]
 
 
 def _rows_at(of_s: Floats, time_s: Floats) -> np.ndarray:
@@ -274,23 +280,23 @@ def _rows_at(of_s: Floats, time_s: Floats) -> np.ndarray:
 
 def _bar(share: float, text: str) -> str:
     """A bar from the left; red where it nears its limit."""
-    known = np.isfinite(share)
-    width = 100.0 * min(max(share, 0.0), 1.0) if known else 0.0
+    is_known = np.isfinite(share)
+    width = 100.0 * min(max(share, 0.0), 1.0) if is_known else 0.0
     color = _BAD if width > 85.0 else _WARN if width > 60.0 else _GOOD
     return _box(
         f"<div style='width:{width:.0f}%;height:100%;background:{color};opacity:.55'></div>",
-        text if known else "",
+        text if is_known else "",
     )
 
 
 def _angle_bar(measured_rad: float, goal_rad: float, limit_rad: float) -> str:
     """A bar from the middle to where the joint is, and a stroke where it should be."""
-    here, goal = (
+    position_share, goal = (
         50.0 + 50.0 * min(max(value / limit_rad, -1.0), 1.0) if np.isfinite(value) else 50.0
         for value in (measured_rad, goal_rad)
     )
-    left = min(here, 50.0)
-    width = abs(here - 50.0)
+    left = min(position_share, 50.0)
+    width = abs(position_share - 50.0)
     return _box(
         f"<div style='position:absolute;left:{left:.1f}%;width:{width:.1f}%;height:100%;"
         f"background:{_GOOD};opacity:.55'></div><div style='position:absolute;left:{goal:.1f}%;"

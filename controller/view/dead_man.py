@@ -15,9 +15,9 @@ WITHOUT: Final = "pad=none"
 """Says that nobody has to hold a gamepad any more."""
 
 
-def hold_command(held: bool, at_s: float) -> str:
+def hold_command(is_held: bool, at_s: float) -> str:
     """Say that a gamepad was held, or was not, at a time of the machine's clock."""
-    return f"{HOLD}{held:d}@{at_s:.3f}"
+    return f"{HOLD}{is_held:d}@{at_s:.3f}"
 
 
 class DeadMan:

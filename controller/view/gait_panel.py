@@ -117,10 +117,13 @@ class GaitPanel:
     def _settle(self) -> None:
         """Let all inputs that nobody is moving show what runs."""
         self._collect()
-        known = {"gait": self._name, **{k: _shown(value) for k, value in self._values.items()}}
+        current_values = {
+            "gait": self._name,
+            **{k: _shown(value) for k, value in self._values.items()},
+        }
         for name, shown in {"gait": self._gait, **self._inputs}.items():
-            if name not in self._moved_s and shown.value != known[name]:
-                shown.value = known[name]
+            if name not in self._moved_s and shown.value != current_values[name]:
+                shown.value = current_values[name]
 
 
 def _shown(value: Any) -> Any:

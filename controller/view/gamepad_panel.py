@@ -68,8 +68,8 @@ class GamepadPanel:
 
     def commands(self) -> list[str]:
         """Buttons that were pressed in the tab since the last call."""
-        found = []
+        pad_commands = []
         while not self._pressed.empty():
-            found.append(self._pressed.get())
+            pad_commands.append(self._pressed.get())
             self._needed = False
-        return found
+        return pad_commands

@@ -54,7 +54,7 @@ class Gate:
     """Lets requests pass, or answers them itself."""
 
     def __init__(self, host: str, *inserts: Insert, freshness: Freshness | None = None) -> None:
-        self._inserts = {each.path: each for each in inserts}
+        self._inserts = {insert.path: insert for insert in inserts}
         self._freshness = Freshness() if freshness is None else freshness
         self._host = host
         self.token = secrets.token_urlsafe(16)
@@ -87,18 +87,18 @@ class Gate:
 
     def _is_expected(self, host: str) -> bool:
         """Whether a request may name this host: a name of another page may lead here."""
-        found = _HOST.fullmatch(host)
-        if found is None:
+        match = _HOST.fullmatch(host)
+        if match is None:
             return False
-        name = found["name"].lower().strip("[]").removesuffix(".")
+        name = match["name"].lower().strip("[]").removesuffix(".")
         if self._host in _LOCAL or name in _LOCAL:
             return name in _LOCAL
         if name == self._host.lower().removesuffix("."):
             return True
         if self._host not in _ANY:
             return False
-        own, _, _ = socket.gethostname().lower().partition(".")
-        return _is_address(name) or name.partition(".")[0] == own
+        host_name, _, _ = socket.gethostname().lower().partition(".")
+        return _is_address(name) or name.partition(".")[0] == host_name
 
     def guard(self, serve: Serve) -> Serve:
         """Return a ``websockets`` server that asks this gate before its own ``process_request``.
@@ -119,7 +119,7 @@ class Gate:
                     _ask_for_plain(request)
                 passed: Response | None = process_request(connection, request)
                 if has_script and passed is not None:
-                    _add_scripts(passed, [each.script for each in inserts.values()])
+                    _add_scripts(passed, [insert.script for insert in inserts.values()])
                 return passed
 
             async def handle(connection: Any) -> None:
@@ -152,8 +152,8 @@ class Gate:
 
     def is_shut(self, host: str, port: int) -> bool:
         """Whether a request that names another host is refused: the gate is where it should be."""
-        here = "127.0.0.1" if host == "0.0.0.0" else host
-        with socket.create_connection((here, port), _CHECK_S) as line:
+        check_host = "127.0.0.1" if host == "0.0.0.0" else host
+        with socket.create_connection((check_host, port), _CHECK_S) as line:
             line.sendall(b"GET / HTTP/1.1\r\nHost: elsewhere.example\r\nOrigin: http://x\r\n\r\n")
             return line.recv(64).startswith(b"HTTP/1.1 403")
 
@@ -188,7 +188,7 @@ def _ask_for_plain(request: Request) -> None:
 
 def _add_scripts(response: Response, scripts: Sequence[str]) -> None:
     """Put scripts into a page, before everything else."""
-    head = "<head>" + "".join(f"<script>{each}</script>" for each in scripts)
+    head = "<head>" + "".join(f"<script>{script}</script>" for script in scripts)
     response.body = response.body.replace(b"<head>", head.encode(), 1)
     del response.headers["Content-Length"]
     response.headers["Content-Length"] = str(len(response.body))

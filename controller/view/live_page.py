@@ -148,15 +148,15 @@ class _LivePage:
 
     def _commands(self) -> list[str]:
         """Inputs that were set in the page since the last call."""
-        found = []
+        commands = []
         if self._gait_panel is not None:
-            found += self._gait_panel.commands(self._asked_s) + self._gamepad.commands()
+            commands += self._gait_panel.commands(self._asked_s) + self._gamepad.commands()
         if self._waypoint_panel is not None:
-            found += self._waypoint_panel.commands()
+            commands += self._waypoint_panel.commands()
         if self._gamepad_panel is not None:
             self._gamepad_panel.show(steers=self._gait_panel is not None)
-            found += self._gamepad_panel.commands()
-        return found
+            commands += self._gamepad_panel.commands()
+        return commands
 
     def _take(self, topic: str, row: dict[str, Any]) -> None:
         if topic == BUTTON:
@@ -239,7 +239,9 @@ class _LivePage:
                 dashboard.show_servos(now, -1, -1 if len(now.slow.time_s) else None)
             if now_s - self._curves_s >= _CURVES_S:
                 self._curves_s = now_s
-                past = self._record({topic: list(each) for topic, each in self._rows.items()})
+                past = self._record(
+                    {topic: list(rows_of_topic) for topic, rows_of_topic in self._rows.items()}
+                )
                 dashboard.show_curves(past, len(past.cycle.time_s) - 1)
                 scene.show_paths(past.paths, float(past.cycle.time_s[-1]))
                 scene.show_trail(past.pose.centre_m)

@@ -34,9 +34,11 @@ class LiveView(ObserverProcess):
 
     """
 
-    def __init__(self, at: str = "127.0.0.1:8080") -> None:
+    def __init__(self, position: str = "127.0.0.1:8080") -> None:
         require_extra("the page needs", "viser")
-        super().__init__(_serve, *host_and_port(at), what="page", fault=f"--view-at {at}")
+        super().__init__(
+            _serve, *host_and_port(position), what="page", fault=f"--view-at {position}"
+        )
         self.url = str(self.said["url"])
         """To be opened in a browser; contains the token."""
         self._picture: bytes | None = None
@@ -76,8 +78,8 @@ class LiveView(ObserverProcess):
         import cv2  # noqa: PLC0415  an extra
 
         self._picture_s = time_s
-        whole, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-        if whole:
+        is_encoded, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+        if is_encoded:
             shown = base64.b64encode(data.tobytes()).decode()
             self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
 
@@ -97,17 +99,17 @@ def _serve(line: socket.socket, host: str, port: int) -> None:
     serve(line, host, port)
 
 
-def host_and_port(at: str) -> tuple[str, int]:
+def host_and_port(address: str) -> tuple[str, int]:
     """Read HOST or HOST:PORT; the port is 8080 unless given.
 
     Raises:
         InputError: it is neither.
 
     """
-    host, colon, port = at.rpartition(":")
+    host, colon, port = address.rpartition(":")
     if not colon:
-        host = at
+        host = address
         port = "8080"
     if not host or not port.isdigit() or not 0 <= int(port) <= 65_535:
-        raise InputError(f"--view-at {at}: expected HOST or HOST:PORT, e.g. 127.0.0.1:8080")
+        raise InputError(f"--view-at {address}: expected HOST or HOST:PORT, e.g. 127.0.0.1:8080")
     return host, int(port)

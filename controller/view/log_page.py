@@ -55,7 +55,9 @@ class _Shown:
             scene.show_paths(record.paths, at_s)
             scene.show_trail(record.pose.centre_m[: pose + 1])
             board.show_curves(record, cycle)
-            board.show_events(tuple(each for each in record.events if each.time_s <= at_s + 1e-9))
+            board.show_events(
+                tuple(event for event in record.events if event.time_s <= at_s + 1e-9)
+            )
 
 
 class LogPage:
@@ -85,7 +87,10 @@ class LogPage:
             raise InputError(f"--view-at {host}:{port}: {fault.strerror or fault}") from None
         first = next(iter(records.values()))
         self._begin_s = _begin_s(first)
-        longest_s = max(float(each.cycle.time_s[-1]) - _begin_s(each) for each in records.values())
+        longest_s = max(
+            float(log_record.cycle.time_s[-1]) - _begin_s(log_record)
+            for log_record in records.values()
+        )
         self._end_s = self._begin_s + longest_s
         gui = self.server.gui
         panel = gui.add_panel()
@@ -97,7 +102,7 @@ class LogPage:
             self._play = gui.add_button("play  (Space)", icon=viser.Icon.PLAYER_PLAY)
             self._apart: viser.GuiCheckboxHandle | None = None
             if len(records) > 1:
-                self._same = len({each.header.world for each in records.values()}) == 1
+                self._same = len({log_record.header.world for log_record in records.values()}) == 1
                 self._apart = gui.add_checkbox("side by side", not self._same)
         float_above(panel)
         self._play.on_click(lambda event: self.toggle())
@@ -135,22 +140,22 @@ class LogPage:
         self._curves_s = now_s if curves else self._curves_s
         moved = self._lay_out()
         with self.server.atomic():
-            for each in self._shown:
-                each.draw(self.time_s - self._begin_s, curves=curves, again=moved)
+            for shown_log in self._shown:
+                shown_log.draw(self.time_s - self._begin_s, curves=curves, again=moved)
 
     def _lay_out(self) -> bool:
         """Put the second log next to the first, or onto it; return whether that has changed."""
         if self._apart is None:
             return False
-        apart = self._apart.value
+        distance_m = self._apart.value
         other = self._shown[1].scene
-        if apart == self._is_apart:
+        if distance_m == self._is_apart:
             return False
-        self._is_apart = apart
-        right_m, left_m = (_sides_m(each.record)[k] for k, each in enumerate(self._shown))
-        other.aside_m = np.array([0.0, right_m - left_m - _GAP_M if apart else 0.0, 0.0])
-        flat = all(each.record.header.ground is None for each in self._shown)
-        other.hide_ground(flat or (self._same and not apart))
+        self._is_apart = distance_m
+        right_m, left_m = (_sides_m(shown_log.record)[k] for k, shown_log in enumerate(self._shown))
+        other.aside_m = np.array([0.0, right_m - left_m - _GAP_M if distance_m else 0.0, 0.0])
+        flat = all(shown_log.record.header.ground is None for shown_log in self._shown)
+        other.hide_ground(flat or (self._same and not distance_m))
         return True
 
 

@@ -149,10 +149,10 @@ class BodyScene:
 
     def show_trail(self, centre_m: Floats) -> None:
         """Draw where the centre of the body, (n, 3), has been."""
-        known = centre_m[np.isfinite(centre_m).all(axis=1)]
-        step = max(1, len(known) // _TRAIL_POINTS)
-        if len(known) > step:
-            self._line(f"{self._root}/trail", known[::step, :2], _TRAIL, 2.0)
+        finite_values = centre_m[np.isfinite(centre_m).all(axis=1)]
+        step = max(1, len(finite_values) // _TRAIL_POINTS)
+        if len(finite_values) > step:
+            self._line(f"{self._root}/trail", finite_values[::step, :2], _TRAIL, 2.0)
 
     def ground_m(
         self, origin_m: Sequence[float], direction: Sequence[float]
@@ -168,8 +168,8 @@ class BodyScene:
         before, behind = above_m[below[0] - 1 : below[0] + 1]
         if before <= 0.0:  # from below, or through the border
             return None
-        found = points_m[below[0]] - along * _RAY_STEP_M * behind / (behind - before)
-        return float(found[0]), float(found[1])
+        ground_point = points_m[below[0]] - along * _RAY_STEP_M * behind / (behind - before)
+        return float(ground_point[0]), float(ground_point[1])
 
     def _is_drawn(self, points_m: Floats) -> Bools:
         """Which of points (n, 2) lie on the ground that is drawn."""
@@ -213,8 +213,8 @@ class BodyScene:
     def _leg_links(self) -> viser.BatchedMeshHandle:
         joints = self._robot.limb_joints
         limbs = self._robot.limbs
-        lengths_m = np.array([limbs[each.pair].segments_m[each.place] for each in joints])
-        radii_m = np.array([limbs[each.pair].foot_radius_m for each in joints])
+        lengths_m = np.array([limbs[joint.pair].segments_m[joint.place] for joint in joints])
+        radii_m = np.array([limbs[joint.pair].foot_radius_m for joint in joints])
         colors = self._colors[1 + np.arange(len(joints)) % 2].astype(np.uint8)
         return self._cylinders("legs", lengths_m, radii_m, colors)
 
@@ -283,12 +283,12 @@ class BodyScene:
             return
         parts = solids(thing)
         meshes = [_mesh_of(part) for part in parts]
-        starts = np.cumsum([0, *(len(each.vertices) for each in meshes[:-1])])
+        starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
         *color, opacity = parts[0].colour
         self._scene.add_mesh_simple(
             f"{self._root}/obstacle",
-            np.concatenate([each.vertices for each in meshes]),
-            np.concatenate([each.faces + k for each, k in zip(meshes, starts, strict=True)]),
+            np.concatenate([mesh.vertices for mesh in meshes]),
+            np.concatenate([mesh.faces + k for mesh, k in zip(meshes, starts, strict=True)]),
             color=np.array(color),
             opacity=opacity if opacity < 1.0 else None,
             side="double",
@@ -312,7 +312,7 @@ class BodyScene:
         radius_m = self._header.plan.waypoint_radius_m
         heights_m = self._height_m(self._waypoints_m)
         for number, (point_m, z_m) in enumerate(zip(self._waypoints_m, heights_m, strict=True)):
-            at = (float(point_m[0]), float(point_m[1]), float(z_m))
+            position = (float(point_m[0]), float(point_m[1]), float(z_m))
             name = f"{self._root}/waypoints/{number}"
             self._waypoints.append(
                 self._scene.add_icosphere(
@@ -322,7 +322,7 @@ class BodyScene:
                     subdivisions=3 if self._is_measured else 2,
                     opacity=0.35,
                     wireframe=not self._is_measured,
-                    position=at,
+                    position=position,
                 )
             )
             self._scene.add_label(f"{name}/label", str(number + 1), position=(0.0, 0.0, radius_m))
@@ -394,7 +394,7 @@ def contours_m(field: HeightField, step_m: float) -> Floats:
     corners_m, faces = surface(field)
     height = corners_m[:, 2]
     first, last = math.ceil(height.min() / step_m), math.floor(height.max() / step_m)
-    found = []
+    result = []
     for level_m in step_m * np.arange(first, last + 1):
         above = height > level_m
         count = above[faces].sum(axis=1)
@@ -407,5 +407,5 @@ def contours_m(field: HeightField, step_m: float) -> Floats:
         for other in others:
             share = (level_m - alone[:, 2]) / (other[:, 2] - alone[:, 2])
             ends.append(alone + share[:, None] * (other - alone))
-        found.append(np.stack(ends, axis=1))
-    return np.concatenate(found) if found else np.zeros((0, 2, 3))
+        result.append(np.stack(ends, axis=1))
+    return np.concatenate(result) if result else np.zeros((0, 2, 3))

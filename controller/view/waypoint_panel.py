@@ -43,10 +43,10 @@ class WaypointPanel:
 
     def commands(self) -> list[str]:
         """Clicks since the last call, for a ``LiveCourse``."""
-        found = []
+        result = []
         while not self._commands.empty():
-            found.append(self._commands.get())
-        return found
+            result.append(self._commands.get())
+        return result
 
     def show(self, kind: str, text: str) -> None:
         """Show the event of the log that answers a click."""

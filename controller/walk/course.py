@@ -38,12 +38,14 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
 
     The path continues straight beyond its end: the last carrot does not turn the body around.
     """
-    at = along_m + carrot_m
-    carrot = path.position(min(at, path.length_m))
-    if at > path.length_m:
+    carrot_along_m = along_m + carrot_m
+    carrot = path.position(min(carrot_along_m, path.length_m))
+    if carrot_along_m > path.length_m:
         before = path.position(path.length_m - 0.05)
         step = carrot - before
-        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (at - path.length_m)
+        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (
+            carrot_along_m - path.length_m
+        )
     return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
 
 
@@ -153,8 +155,10 @@ class Course:
 
     def ahead_m(self, reach_m: float) -> Floats:
         """(2,) the point ``reach_m`` ahead on the path, at most the next waypoint."""
-        at = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
-        return np.asarray(self.path.position(at))  # the path's end if it leads to no waypoint yet
+        target_along_m = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
+        return np.asarray(
+            self.path.position(target_along_m)
+        )  # the path's end if it leads to no waypoint yet
 
     @property
     def next_waypoint(self) -> tuple[Floats, float] | None:
@@ -289,12 +293,12 @@ class Course:
                 self._lay(self._followers_m[1].copy(), heading_rad())
                 self.replanned = why
             return
-        found: list[_Onward] = []
+        onwards: list[_Onward] = []
         for at_m in dict.fromkeys((join_m, max(join_m, path.length_m - _KEPT_M))):
             if is_clear(path.piece_m(join_m, at_m)):
                 with suppress(InputError):
-                    found.append(self._onward(at_m))
-        best = min(found, key=lambda each: each.length_m, default=None)
+                    onwards.append(self._onward(at_m))
+        best = min(onwards, key=lambda onward: onward.length_m, default=None)
         if best is not None and best.path is not path:
             self.path = best.path
             self._passed_m = best.passed_m
@@ -352,7 +356,7 @@ class Course:
 
         """
         path = self.path
-        behind = [at for at in self._passed_m if at <= join_m]
+        behind = [passed_m for passed_m in self._passed_m if passed_m <= join_m]
         left_m, kept_m = self.waypoints_m[len(behind) :], path.piece_m(0.0, join_m)
         if not len(left_m):
             return _Onward(path, self._passed_m, path.length_m)
@@ -364,13 +368,15 @@ class Course:
         if abs(wrap(more.heading_rad(0.05) - heading)) > _BEND_RAD:
             more = self._plan(points_m, heading, avoid_m=avoid_m, number=number)
         more_m = more.piece_m(0.0, more.length_m)
-        passes = [at + join_m for at in self._passes(more, left_m)]
+        passes = [pass_m + join_m for pass_m in self._passes(more, left_m)]
         gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
         beyond_m = float(np.hypot(*np.diff(gaps_m, axis=0).T).sum())
-        whole = SplinePath.tabulated(np.vstack([kept_m, more_m[1:]]))
+        tabulated = SplinePath.tabulated(np.vstack([kept_m, more_m[1:]]))
         # tabulating again shortens the path slightly: keep its last waypoint within it
-        passes = [at if math.isinf(at) else min(at, whole.length_m) for at in passes]
-        return _Onward(whole, [*behind, *passes], whole.length_m + _BEYOND * beyond_m)
+        passes = [
+            pass_m if math.isinf(pass_m) else min(pass_m, tabulated.length_m) for pass_m in passes
+        ]
+        return _Onward(tabulated, [*behind, *passes], tabulated.length_m + _BEYOND * beyond_m)
 
     def _failing(self, centre_m: Floats) -> str | None:
         if self._is_stalled:
@@ -433,7 +439,7 @@ class Course:
         """
         passes = path.passes(waypoints_m)
         on = True
-        for k, (waypoint, at) in enumerate(zip(waypoints_m, passes, strict=True)):
-            on = on and float(np.hypot(*(path.position(at) - waypoint))) <= self._radius_m
-            passes[k] = at if on else math.inf
+        for k, (waypoint, pass_m) in enumerate(zip(waypoints_m, passes, strict=True)):
+            on = on and float(np.hypot(*(path.position(pass_m) - waypoint))) <= self._radius_m
+            passes[k] = pass_m if on else math.inf
         return passes

@@ -121,19 +121,19 @@ def _bends(q: Floats, slope: Floats, turn: Floats) -> None:
 
 
 @compiled("void(float64[:, ::1], float64, float64[::1])", makes_arrays=False)
-def _spline(q: Floats, at: float, goal: Floats) -> None:
-    """Write the quadratic B-spline through table ``q`` (n, J) at ``at`` into ``goal`` (J,)."""
+def _spline(q: Floats, position: float, goal: Floats) -> None:
+    """Write the quadratic B-spline of table ``q`` (n, J) at ``position`` into ``goal`` (J,)."""
     last = len(q) - 1
-    middle = int(min(max(np.rint(at), 0.0), float(last)))
-    t = at - middle + 0.5
+    middle = int(min(max(np.rint(position), 0.0), float(last)))
+    t = position - middle + 0.5
     before = 0.5 * (1.0 - t) ** 2
-    here = 0.5 + t - t * t
+    base = 0.5 + t - t * t
     after = 0.5 * t * t
     for joint in range(len(goal)):
-        own = q[middle, joint]
+        middle_rad = q[middle, joint]
         low, high = q[max(middle - 1, 0), joint], q[min(middle + 1, last), joint]
         if middle == 0:
-            low = 2.0 * own - high
+            low = 2.0 * middle_rad - high
         if middle == last:  # a table of one row is constant
-            high = 2.0 * own - low
-        goal[joint] = before * low + here * own + after * high
+            high = 2.0 * middle_rad - low
+        goal[joint] = before * low + base * middle_rad + after * high

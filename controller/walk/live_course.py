@@ -182,5 +182,5 @@ class LiveCourse(MotionWrapper, OnCourse):
 
 
 def _shown(point_m: Floats) -> str:
-    x_m, y_m = (round(float(at), 2) + 0.0 for at in point_m)  # avoids -0.00
+    x_m, y_m = (round(float(coordinate), 2) + 0.0 for coordinate in point_m)  # avoids -0.00
     return f"({x_m:.2f}, {y_m:.2f})"

@@ -230,8 +230,8 @@ class Pilot(OnCourse):
     def restart(self, view: BodyView, restart: Callable[[Floats], None]) -> None:
         """Start again from rest with the measured body (N,); calls ``restart`` of the chooser."""
         points = self._chooser.track.points
-        at = (np.arange(points) + 0.5) * self._links / points - 0.5
-        restart(np.interp(at, np.arange(self._links), view.headings_rad))
+        position = (np.arange(points) + 0.5) * self._links / points - 0.5
+        restart(np.interp(position, np.arange(self._links), view.headings_rad))
         if self._twin is not None:
             self._twin.forget()
         if self._asker is not None:
@@ -403,16 +403,18 @@ class Pilot(OnCourse):
     def path_pose(self, view: BodyView) -> PathPose:
         """Pose of the body, and its path ahead."""
         offset, aim = self._aim(view)
-        at = round(self.along_m / PATH_STEP_M)
-        return PathPose(self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), at)
+        path_row = round(self.along_m / PATH_STEP_M)
+        return PathPose(
+            self.head, offset, view.centre_m[:2].copy(), aim, self._path_table(), path_row
+        )
 
     def _path_table(self) -> TabulatedPath:
         path = self.path
         course = self.course
         made_of = path, course.reached
         if self._table is None or self._table_of != made_of:
-            whole = np.arange(0.0, path.length_m, PATH_STEP_M)
-            points_m = path.position(np.append(whole, path.length_m))
+            stations_m = np.arange(0.0, path.length_m, PATH_STEP_M)
+            points_m = path.position(np.append(stations_m, path.length_m))
             waypoint_m, passed_m = course.next_waypoint or (None, np.inf)
             self._table = TabulatedPath.of(points_m, waypoint_m, passed_m / PATH_STEP_M)
             self._table_of = made_of

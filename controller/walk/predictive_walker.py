@@ -189,8 +189,8 @@ class PredictiveWalker:
         self._bends = best.bends
         error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
         near = option.near
-        seen = self._star.distinct
-        return Decision(option.state, error, float(bend), near, seen, self._carrier_rad)
+        distinct = self._star.distinct
+        return Decision(option.state, error, float(bend), near, distinct, self._carrier_rad)
 
     @property
     def _is_new(self) -> bool:
@@ -198,7 +198,7 @@ class PredictiveWalker:
 
     def _best(self) -> _Tried:
         """Cheapest piece with an accepted body; else the cheapest of all."""
-        ranked = sorted(self._tried, key=lambda each: each.cost_m2)
+        ranked = sorted(self._tried, key=lambda trial: trial.cost_m2)
         return next(filter(self._may_be_made, ranked), ranked[0])
 
     def _may_be_made(self, tried: _Tried) -> bool:
@@ -209,16 +209,16 @@ class PredictiveWalker:
         """On steep ground try the best piece on a simulated body; if it fails, try others."""
         if not self.try_piece or self._walk.tries == 0 or not self.steering.is_steep(pose):
             return best
-        found = self._on_twin(pose, best)
-        if found.cost_m2 <= _TROUBLE_M2 or self._lost:
-            return found
-        for each in self._others(pose, best):
-            tried = self._on_twin(pose, each)
-            if tried.cost_m2 < found.cost_m2:
-                found = tried
-        if found.option is not best.option:
+        on_twin = self._on_twin(pose, best)
+        if on_twin.cost_m2 <= _TROUBLE_M2 or self._lost:
+            return on_twin
+        for other in self._others(pose, best):
+            tried = self._on_twin(pose, other)
+            if tried.cost_m2 < on_twin.cost_m2:
+                on_twin = tried
+        if on_twin.option is not best.option:
             self._until = self._at  # another state begins
-        return found
+        return on_twin
 
     def _on_twin(self, pose: PathPose, piece: _Tried) -> _Tried:
         """Return the piece with its cost and progress on the simulated body."""
@@ -231,7 +231,7 @@ class PredictiveWalker:
 
         Without an answer about the best piece on paper, another one must be good.
         """
-        found: _Tried | None = None
+        best_answered: _Tried | None = None
         is_best_known = False
         for number, rolled in self.answers().items():
             if rolled is not None and number < len(self._asked):
@@ -239,17 +239,17 @@ class PredictiveWalker:
                 tried = self._asked[number]
                 tried = tried._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
                 is_best_known = is_best_known or tried.piece_rad is best.piece_rad
-                if found is None or tried.cost_m2 < found.cost_m2:
-                    found = tried
+                if best_answered is None or tried.cost_m2 < best_answered.cost_m2:
+                    best_answered = tried
         self._asked = []
-        if found is None:
+        if best_answered is None:
             return best
-        self._in_trouble = found.cost_m2 > _TROUBLE_M2
+        self._in_trouble = best_answered.cost_m2 > _TROUBLE_M2
         if self._in_trouble and not is_best_known:
             return best
-        if found.option is not best.option:
+        if best_answered.option is not best.option:
             self._until = self._at  # another state begins
-        return found
+        return best_answered
 
     def _ask_about(self, pose: PathPose) -> Iterator[bool]:
         best = self._best()
@@ -261,7 +261,7 @@ class PredictiveWalker:
             yield from self._screen(pose, [best.option], FAR)
         chosen = [best, *self._unlike(best)]
         self._asked = [*chosen[1:2], best, *chosen[2:]] if self._in_trouble else chosen
-        self.ask(pose, [each.piece_rad for each in self._asked])
+        self.ask(pose, [trial.piece_rad for trial in self._asked])
 
     def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
         """Dissimilar pieces, cheapest first: of the current state, and of others."""
@@ -277,16 +277,16 @@ class PredictiveWalker:
     def _unlike(self, best: _Tried) -> list[_Tried]:
         """Judged pieces that differ from the best and each other, cheapest first."""
         chosen = [best]
-        for each in sorted(self._tried, key=lambda each: each.cost_m2):
+        for trial in sorted(self._tried, key=lambda option_trial: option_trial.cost_m2):
             if len(chosen) == self._walk.tries:
                 break
-            same = [other.bends for other in chosen if other.option is each.option]
+            same = [other.bends for other in chosen if other.option is trial.option]
             if (
                 len(same) < 3
-                and all(np.abs(each.bends - bends).max() >= 0.7 for bends in same)
-                and self._may_be_made(each)
+                and all(np.abs(trial.bends - bends).max() >= 0.7 for bends in same)
+                and self._may_be_made(trial)
             ):
-                chosen.append(each)
+                chosen.append(trial)
         return chosen[1:]
 
     def _judge(self, pose: PathPose) -> Iterator[bool]:
@@ -317,22 +317,22 @@ class PredictiveWalker:
         for _ in range(2):
             middle = self._best_so_far()
             yield from self._screen(pose, [middle.option], hexagon(middle.bends))
-            costs_m2 = [each.cost_m2 for each in self._tried[-6:]]
-            found = vertex(middle.bends, middle.cost_m2, costs_m2)
-            yield from self._screen(pose, [middle.option], found.bends[None])
+            costs_m2 = [trial.cost_m2 for trial in self._tried[-6:]]
+            minimum = vertex(middle.bends, middle.cost_m2, costs_m2)
+            yield from self._screen(pose, [middle.option], minimum.bends[None])
             best = self._best_so_far()
-            if found.enclosed and (best is middle or best is self._tried[-1]):
+            if minimum.enclosed and (best is middle or best is self._tried[-1]):
                 break
 
     def _screen(self, pose: PathPose, options: list[_Option], bends: Floats) -> Iterator[bool]:
         """Roll out every option with every row of ``bends`` (C, 2)."""
-        tried = [(option, each) for option in options for each in bends]
+        tried = [(option, bend) for option in options for bend in bends]
         for k in range(0, len(tried), _BATCH):
             self._roll(pose, tried[k : k + _BATCH])
             yield True
 
     def _best_so_far(self) -> _Tried:
-        return min(self._tried, key=lambda each: each.cost_m2)
+        return min(self._tried, key=lambda trial: trial.cost_m2)
 
     def _roll(self, pose: PathPose, tried: list[tuple[_Option, Floats]]) -> None:
         points = self.track.points
@@ -340,7 +340,7 @@ class PredictiveWalker:
         for row, (option, _) in zip(pieces, tried, strict=True):
             row[:] = option.wave_rad[:points]
         bases = np.array([option.base_rad for option, _ in tried])
-        bends = np.array([each for _, each in tried])
+        bends = np.array([bend for _, bend in tried])
         _bend(pieces, bases, bends, self._walk.bend_limit_rad, points)
         cost_m2, progress = self.steering.judge(pose, pieces)
         self._tried += [
@@ -365,11 +365,11 @@ class PredictiveWalker:
         points = self.track.points
         walk = self._walk
         if self._lost:
-            return [self._serpenoid(each) for each in SERPENOIDS]
-        share, at = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
+            return [self._serpenoid(serpenoid) for serpenoid in SERPENOIDS]
+        share, phase = (1.0, 0) if carrier is None else (walk.climb_share, self._phase(carrier))
         carried = np.zeros(self._walked + points + 1)
         if carrier is not None:
-            carried = carrier.wave_rad(at - 1 + np.arange(len(carried)), points)
+            carried = carrier.wave_rad(phase - 1 + np.arange(len(carried)), points)
         placed = self.track.last_rad - share * self._shapes[:, -1] - carried[0]
         error = wrap(placed + pose.offset_rad - pose.aim_rad)
         ranks, near = self._star.order(error, walk.heading_tolerance_rad, walk.nearest_count, _REST)
@@ -377,16 +377,16 @@ class PredictiveWalker:
         waves = share * self._waves_rad(states) + carried[1:]
         rough = self._roughness(placed[states, None] + waves[:, : self._walked])
         return [
-            _Option(int(states[k]), near, float(placed[states[k]]), waves[k], carrier, at)
+            _Option(int(states[k]), near, float(placed[states[k]]), waves[k], carrier, phase)
             for k in np.argsort(rough, kind="stable")[: walk.candidates]
         ]
 
     def _serpenoid(self, carrier: SerpenoidParameters) -> _Option:
         points = self.track.points
-        at = self._phase(carrier)
-        waves = carrier.wave_rad(at - 1 + np.arange(self._walked + points + 1), points)
+        phase = self._phase(carrier)
+        waves = carrier.wave_rad(phase - 1 + np.arange(self._walked + points + 1), points)
         base = self.track.last_rad - waves[0]
-        return _Option(SERPENOID, 1, float(base), waves[1:], carrier, at)
+        return _Option(SERPENOID, 1, float(base), waves[1:], carrier, phase)
 
     def _phase(self, carrier: SerpenoidParameters) -> int:
         """Next sample of a carrier: it continues, or begins as the track bends."""
@@ -400,9 +400,9 @@ class PredictiveWalker:
         shapes = self._shapes[states][:, ::-1]
         join = round(_JOIN * shapes.shape[1]) + 2
         joined = np.linspace(shapes[:, -1], shapes[:, 0], join, axis=1)
-        whole = np.concatenate([shapes, joined[:, 1:-1]], axis=1)
+        curves_rad = np.concatenate([shapes, joined[:, 1:-1]], axis=1)
         count = self._walked + self.track.points
-        return np.take(whole, np.arange(1, count + 1), axis=1, mode="wrap")
+        return np.take(curves_rad, np.arange(1, count + 1), axis=1, mode="wrap")
 
     def _roughness(self, angles_rad: Floats) -> Floats:
         """Mean square (n,) of the joints' accelerations on angles (n, m), arbitrary units."""

@@ -200,10 +200,10 @@ class SideRolls(MotionWrapper, OnCourse):
         if self._walker.outlook >= _SLOW:
             return None
         plans = self._planner.tried(pose, self._walker, target_m, view.heading_rad)
-        found = [self._tried(plan, view, twin) for plan in plans]
+        tried_plans = [self._tried(plan, view, twin) for plan in plans]
         travel = _TRY_AGAIN_BODIES * self._walker.track.points
         self._walks_until = self._pilot.head + travel
-        return max(found, key=lambda plan: plan.speed_m_s, default=None)
+        return max(tried_plans, key=lambda plan: plan.speed_m_s, default=None)
 
     def _tried(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
         roll = _RollOnTwin(

@@ -129,9 +129,9 @@ class SteeredGait(OnCourse):
         else:
             self._stop_profile.go_on()
         aim = aim_rad(course.path, centre_m, course.along_m, self._carrot_m)
-        wanted = TURN_PER_RAD * float(wrap(aim - heading_rad))
+        turn_goal = TURN_PER_RAD * float(wrap(aim - heading_rad))
         part_s = self._stop_profile.step(dt_s)
-        self._turn.step(part_s, np.clip([wanted], -TURN_LIMIT, TURN_LIMIT))
+        self._turn.step(part_s, np.clip([turn_goal], -TURN_LIMIT, TURN_LIMIT))
         self._phase_rad = (self._phase_rad + part_s * self._rate_rad_s) % TURN
         self.cycles += part_s * self._rate_rad_s / TURN
         return self.goal_rad()

@@ -113,15 +113,18 @@ class Steering:
         if pulse < 0.5 * _SPAN_SEGMENTS:
             return
         self._past_tree = self._begin(before, Drift(), self._past_tree)
-        made = self._past_tree.roll(np.empty((1, 0)), pulse)
-        gap_m = pose.centre_m - made.centre_m[0]
+        predicted = self._past_tree.roll(np.empty((1, 0)), pulse)
+        gap_m = pose.centre_m - predicted.centre_m[0]
         mean = pose.offset_rad + float(self._track.body_rad(pose.head).mean())
         c, s = np.cos(mean), np.sin(mean)
-        turn = float(wrap(pose.offset_rad - made.offset_rad[0]))
-        seen = c * gap_m[0] + s * gap_m[1], c * gap_m[1] - s * gap_m[0], turn
+        turn = float(wrap(pose.offset_rad - predicted.offset_rad[0]))
+        measured_motion = c * gap_m[0] + s * gap_m[1], c * gap_m[1] - s * gap_m[0], turn
         was = self.drift.ahead_m, self.drift.left_m, self.drift.turn_rad
         self.drift = Drift(
-            *(w + _UPDATE * (float(v) / pulse - w) for v, w in zip(seen, was, strict=True))
+            *(
+                w + _UPDATE * (float(v) / pulse - w)
+                for v, w in zip(measured_motion, was, strict=True)
+            )
         )
 
     def roll_out(self, pose: PathPose, pieces_rad: Floats) -> Rolled:

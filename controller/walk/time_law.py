@@ -82,7 +82,7 @@ class TimeLaw:
         if self.joints.grow():
             self._look_ahead()
         slew = -self._slew if self._stopping else self._slew
-        at, self.speed_segments_s = _moved(
+        travelled, self.speed_segments_s = _moved(
             self.head - self._first,
             self.speed_segments_s,
             dt_s,
@@ -91,7 +91,7 @@ class TimeLaw:
             self._allowed,
             self._slope,
         )
-        self.head = min(self._first + at, float(self.joints.last))
+        self.head = min(self._first + travelled, float(self.joints.last))
         return self.head
 
     def goal_rad(self) -> Floats:
@@ -113,11 +113,11 @@ class TimeLaw:
 
 
 @compiled("float64(float64[::1], float64)")
-def _limit_at(allowed: Floats, at: float) -> float:
+def _limit_at(allowed: Floats, position: float) -> float:
     """Speed limit between two places; its square is linear, as in uniform braking."""
-    at = min(max(at, 0.0), len(allowed) - 1.0)
-    low = max(min(int(at), len(allowed) - 2), 0)
-    part = at - low
+    position = min(max(position, 0.0), len(allowed) - 1.0)
+    low = max(min(int(position), len(allowed) - 2), 0)
+    part = position - low
     if part == 0.0:
         return float(allowed[low])
     return float(np.sqrt(allowed[low] ** 2 * (1.0 - part) + allowed[low + 1] ** 2 * part))
@@ -128,7 +128,7 @@ def _limit_at(allowed: Floats, at: float) -> float:
     makes_arrays=False,
 )
 def _moved(
-    at: float,
+    position: float,
     speed: float,
     dt_s: float,
     slew: float,
@@ -137,11 +137,11 @@ def _moved(
     slope: Floats,
 ) -> tuple[float, float]:
     """Return place (from the tables' start) and speed after ``dt_s``; ``slew`` < 0 stops."""
-    bend = slope[max(min(int(at), len(slope) - 1), 0)]
+    bend = slope[max(min(int(position), len(slope) - 1), 0)]
     thrust = min(abs(slew), half_acceleration / max(bend, _TINY))
-    limit = min(_limit_at(allowed, at), _limit_at(allowed, at + speed * dt_s))
+    limit = min(_limit_at(allowed, position), _limit_at(allowed, position + speed * dt_s))
     speed = max(0.0, min(limit, speed + (thrust if slew > 0.0 else -thrust) * dt_s))
-    return at + speed * dt_s, speed
+    return position + speed * dt_s, speed
 
 
 @compiled("void(float64[::1], float64[::1], float64, float64, float64, float64[::1])")
@@ -158,9 +158,9 @@ def _allow(
         allowed[k] = cruise
     for k in range(len(slope)):
         by_bend = np.sqrt(half_acceleration / max(turn[k], _TINY))
-        here = min(speed_limit / max(slope[k], _TINY), by_bend)
+        limit_here = min(speed_limit / max(slope[k], _TINY), by_bend)
         for near in range(max(k - 1, 0), min(k + 2, len(slope))):
-            allowed[near] = min(allowed[near], here)
+            allowed[near] = min(allowed[near], limit_here)
 
 
 @compiled("void(float64[::1], float64[::1], float64)")

@@ -72,10 +72,10 @@ class TwinRollout:
         view = self._seen[-1]
         bodies = self.bodies(move, _LONGEST_S)
         while not is_over():
-            found = next(bodies, None)
-            if found is None:
+            next_view = next(bodies, None)
+            if next_view is None:
                 break
-            view = found
+            view = next_view
             followed.note(view.centre_m[:2], self._dt_s)
         return followed.rolled(view.headings_rad, view.link_m[:, :2] - view.centre_m[:2])
 

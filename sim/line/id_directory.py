@@ -52,8 +52,8 @@ class IdDirectory:
         for bus_id, rows in first.items():
             plain = len(rows) == 1 and bus_id not in second and not self.mute[rows[0]]
             self.rows[bus_id] = rows[0] if plain else SPECIAL
-        for each in second:
-            self.rows[each] = SPECIAL
+        for second_id in second:
+            self.rows[second_id] = SPECIAL
 
     def present(self) -> list[int]:
         """Rows of all receiving servos."""

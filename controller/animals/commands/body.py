@@ -143,7 +143,7 @@ def body(
     check_picture(picture)
     if not 0.1 <= aspect <= 10.0:
         raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
-    made = _Made(output, picture, force, as_json)
+    body_options = _Made(output, picture, force, as_json)
     given = is_skin(track)
     _check_options(
         track,
@@ -157,10 +157,10 @@ def body(
         raise InputError("--frame: is for --image and --posed")
     how = Cut(37 if curves is None else curves, 2 if order is None else order, forward, up, surface)
     if given:
-        made.refuse(textured=True)
-        made.skin(body_skin(track, how), animate, fps)
+        body_options.refuse(textured=True)
+        body_options.skin(body_skin(track, how), animate, fps)
         return
-    made.refuse(textured=bool(image))
+    body_options.refuse(textured=bool(image))
     shots = shots_of(image or [], frame or [])
     measured = _measure(track, shots, side, aspect)
     if animate is not None:
@@ -170,10 +170,10 @@ def body(
         skin = model_skin(
             measured.model, worn.picture, Path(track).stem, how, around=worn.is_around
         )
-        made.skin(replace(skin, facts=skin.facts | worn.facts), animate, fps)
+        body_options.skin(replace(skin, facts=skin.facts | worn.facts), animate, fps)
         return
     pose_frame = posed_frame(shots, frame or [])
-    made.solid(measured, _skeleton(track, measured.points, pose_frame) if posed else None)
+    body_options.solid(measured, _skeleton(track, measured.points, pose_frame) if posed else None)
 
 
 @dataclass(frozen=True)
@@ -203,26 +203,30 @@ class _Made:
 
     def solid(self, body: _Measured, skeleton: Floats | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
-        one = body.model
+        body_model = body.model
         worn = body.texture
-        mesh = body_mesh(one, straight() if skeleton is None else skeleton)
+        mesh = body_mesh(body_model, straight() if skeleton is None else skeleton)
         corners = len(mesh.vertices)
         if worn.is_around:
             mesh, _ = picture_around(mesh)
         files = self._write(mesh, worn.picture)
         if self.picture is not None:
-            _plots().draw_body(self.picture, one, mesh, worn.picture, worn.shown)
+            _plots().draw_body(self.picture, body_model, mesh, worn.picture, worn.shown)
         show(
             {
                 "files": files,
                 "vertices": corners,
                 "triangles": len(mesh.faces),
-                "length_m": one.length_m,
-                "widths": "measured" if one.measured else "a plain spindle: the track holds none",
-                "thickest_over_length": round(2.0 * float(one.half_width.max()), 4),
-                "height_over_width": round(float(one.half_height.max() / one.half_width.max()), 3),
+                "length_m": body_model.length_m,
+                "widths": "measured"
+                if body_model.measured
+                else "a plain spindle: the track holds none",
+                "thickest_over_length": round(2.0 * float(body_model.half_width.max()), 4),
+                "height_over_width": round(
+                    float(body_model.half_height.max() / body_model.half_width.max()), 3
+                ),
                 "texture": None,
-                "body_profile": list(one.profile),
+                "body_profile": list(body_model.profile),
             }
             | worn.facts,
             self.as_json,
@@ -314,10 +318,10 @@ def _measure(track: str, shots: Sequence[Shot], side: Path | None, aspect: float
         recording = embedded(track)
         return _Measured(model.spindle(recording.length_m), recording.points, SkinPicture())
     top = model.read_silhouettes(Path(track))
-    seen = None if side is None else model.read_silhouettes(side)
-    body = model.body_model(top, seen, aspect)
+    silhouettes = None if side is None else model.read_silhouettes(side)
+    body = model.body_model(top, silhouettes, aspect)
     points = top.points * [1.0, -1.0] if top.pixels else top.points
-    return _Measured(body, points, skin_picture(shots, top, seen, body))
+    return _Measured(body, points, skin_picture(shots, top, silhouettes, body))
 
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:

@@ -34,10 +34,10 @@ def film(
         raise InputError(f"{folder}: is not empty; --force writes into it")
     with ProgressBar("frames", transient=True) as bar:
         truth = render(folder, options, on_progress=bar.update)
-    found: dict[str, object] = {
+    facts: dict[str, object] = {
         "folder": str(folder),
         "frames": truth.frames,
         "rate_hz": round(truth.rate_hz, 3),
         "length_px": options.length_px,
     }
-    show(found, as_json)
+    show(facts, as_json)

@@ -70,7 +70,7 @@ def match(
     check_npz(output)
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
-    known = None if truth is None else load_postures(truth)
+    true_postures = None if truth is None else load_postures(truth)
     if footage.suffix.lower() in MIDLINES:
         if side is not None:
             raise InputError(f"{footage}: midlines have no side view; --side goes with images")
@@ -87,11 +87,11 @@ def match(
                 length_m=length,
                 on_progress=bar.update,
             )
-    accuracy = None if known is None else compare(matched.postures, known)
+    accuracy = None if true_postures is None else compare(matched.postures, true_postures)
     with atomic_write(output) as part:
         save_postures(part, matched.postures)
     if picture is not None:
-        pictures()[0].draw_match(picture, matched.postures, known, matched.film, footage)
+        pictures()[0].draw_match(picture, matched.postures, true_postures, matched.film, footage)
     facts = matched.facts.to_dict()
     if accuracy is not None:
         facts |= accuracy.to_dict()

@@ -41,13 +41,13 @@ def synthesise(
     """Join segments of a film in a new order, at random or through control points."""
     check_picture(picture)
     check_npz(output)
-    made = synthesise_motion(load_postures(postures), options)
+    motion = synthesise_motion(load_postures(postures), options)
     with atomic_write(output) as part:
-        made.save(part)
+        motion.save(part)
     if picture is not None:
-        pictures()[1].draw_synthesis(picture, made, options)
-    _warn(made.facts)
-    show(made.facts.to_dict() | {"track": str(output)}, as_json)
+        pictures()[1].draw_synthesis(picture, motion, options)
+    _warn(motion.facts)
+    show(motion.facts.to_dict() | {"track": str(output)}, as_json)
 
 
 def _warn(facts: SynthesisFacts) -> None:

@@ -97,40 +97,40 @@ def people(
     gait = scaled(GAITS[motion], step_height, step_length, cycle)
     person = Person.of(stature, girth)
     worn, texture = _worn(person, mesh, forward, up)
-    made = animate(person.skeleton, gait, feet, in_place=True)
+    person_motion = animate(person.skeleton, gait, feet, in_place=True)
     rig = person.rig if worn is None else worn
     with atomic_write(output) as part:
         write_skin(
             part,
             rig,
-            made.bones,
+            person_motion.bones,
             person.texture if worn is None else texture,
             gait.name,
             both_sides=True,
         )
     if picture is not None:
-        rest, stages = _view().stages_of_cycle(person, made, (worn, texture))
+        rest, stages = _view().stages_of_cycle(person, person_motion, (worn, texture))
         pictures()[2].draw_person(picture, person, rest, stages, f"{gait.name}, feet: {feet}")
     if film is not None:
         _film(film, person, gait, feet, cycles, (worn, texture))
     files = {"mesh": mesh, "animation": output, "film": film, "picture": picture}
     facts: dict[str, object] = {"motion": gait.name, "feet": str(feet)}
     named = {key: None if file is None else str(file) for key, file in files.items()}
-    show(facts | _facts(person, gait, made, rig) | named, as_json)
+    show(facts | _facts(person, gait, person_motion, rig) | named, as_json)
 
 
-def _facts(person: Person, gait: PersonGait, made: PersonMotion, rig: Rig) -> dict[str, object]:
+def _facts(person: Person, gait: PersonGait, motion: PersonMotion, rig: Rig) -> dict[str, object]:
     return {
         "cycle_s": round(gait.cycle_s, 3),
-        "speed_m_s": round(made.speed_m_s, 3),
-        "feet_slide_m": round(_slide_m(made), 4),
-        "lowest_sole_m": round(_lowest_m(person, made), 4),
+        "speed_m_s": round(motion.speed_m_s, 3),
+        "feet_slide_m": round(_slide_m(motion), 4),
+        "lowest_sole_m": round(_lowest_m(person, motion), 4),
         "bones": len(person.skeleton.parent),
         "boundary_curves": sum(len(part.curves_m) for part in person.parts),
         "vertices": len(rig.mesh.vertices),
         "triangles": len(rig.mesh.faces),
         "frames": FRAMES,
-        "skin_minus_surface_m": round(_difference_m(person, made), 4),
+        "skin_minus_surface_m": round(_difference_m(person, motion), 4),
     }
 
 
@@ -140,7 +140,7 @@ def _check(output: Path, film: Path | None, picture: Path | None, force: bool) -
         raise InputError(f"{output}: a person who moves is written as .glb; change the ending")
     if film is not None and film.suffix.lower() != ".mp4":
         raise InputError(f"{film}: a film ends in .mp4; change the ending")
-    refuse_to_overwrite([output, *(one for one in (film, picture) if one is not None)], force)
+    refuse_to_overwrite([output, *(path for path in (film, picture) if path is not None)], force)
     if picture is not None:
         check_picture(picture)
     if film is not None or picture is not None:
@@ -179,10 +179,10 @@ def _film(
         view.film_person(part, person, motion, worn, title, bar.update)
 
 
-def _slide_m(made: PersonMotion) -> float:
+def _slide_m(motion: PersonMotion) -> float:
     """Largest distance that a foot slides on the ground in one step."""
-    feet = made.feet
-    travel = made.speed_m_s * made.bones.time_s
+    feet = motion.feet
+    travel = motion.speed_m_s * motion.bones.time_s
     place = feet.ahead_m + travel[:, None]
     slides = [0.0]
     for k in range(2):
@@ -193,16 +193,17 @@ def _slide_m(made: PersonMotion) -> float:
     return max(slides)
 
 
-def _lowest_m(person: Person, made: PersonMotion) -> float:
+def _lowest_m(person: Person, motion: PersonMotion) -> float:
     """Lowest corner of the skin over the cycle."""
     return min(
-        float(posed_m(person.rig, made.bones, k)[:, 2].min()) for k in range(len(made.bones.time_s))
+        float(posed_m(person.rig, motion.bones, k)[:, 2].min())
+        for k in range(len(motion.bones.time_s))
     )
 
 
-def _difference_m(person: Person, made: PersonMotion) -> float:
+def _difference_m(person: Person, motion: PersonMotion) -> float:
     """Largest distance of the played skin from the solved surface, at a quarter of the cycle."""
     k = FRAMES // 4
-    bones = made.bones
+    bones = motion.bones
     solved = person.solved_m(bones.front_m[k], bones.rotation[k])
     return float(np.linalg.norm(posed_m(person.rig, bones, k) - solved, axis=1).max())

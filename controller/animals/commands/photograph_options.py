@@ -54,13 +54,17 @@ def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
             f"--frame: give one, or one for each --image; there are {len(frames)} frames and "
             f"{len(images)} images"
         )
-    each = list(frames) * len(images) if len(frames) == 1 else list(frames) or [0] * len(images)
-    return tuple(Shot(*_view(one), frame) for one, frame in zip(images, each, strict=True))
+    frames_of_images = (
+        list(frames) * len(images) if len(frames) == 1 else list(frames) or [0] * len(images)
+    )
+    return tuple(
+        Shot(*_view(image), frame) for image, frame in zip(images, frames_of_images, strict=True)
+    )
 
 
 def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:
     """Frame of ``--posed``: that of the first photograph from above, or from below."""
-    of_top = [one.frame for one in shots if one.view in _OF_TOP]
+    of_top = [shot.frame for shot in shots if shot.view in _OF_TOP]
     return of_top[0] if of_top else 0 if shots or not frames else frames[0]
 
 
@@ -84,15 +88,19 @@ def skin_picture(
     """
     if not shots:
         return SkinPicture()
-    shown = tuple(_shown(one, top, side) for one in shots)
-    files = [str(one.file) for one in shots]
-    if [one.view for one in shots] == ["top"]:
+    shown = tuple(_shown(shot, top, side) for shot in shots)
+    files = [str(shot.file) for shot in shots]
+    if [shot.view for shot in shots] == ["top"]:
         facts: dict[str, object] = {"texture": files[0], "texture_seen": 0.5}
         return SkinPicture(unroll(*shown[0]), False, shown, facts)
-    made = blend(
-        [Photograph(*seen, VIEWS[one.view]) for one, seen in zip(shots, shown, strict=True)], body
+    blended = blend(
+        [
+            Photograph(*silhouette_view, VIEWS[shot.view])
+            for shot, silhouette_view in zip(shots, shown, strict=True)
+        ],
+        body,
     )
-    for file, gain in zip(files, made.gains, strict=True):
+    for file, gain in zip(files, blended.gains, strict=True):
         if gain is None:
             LOGGER.warning(
                 "%s: shows no part of the body that %s or a matched photograph shows; its "
@@ -102,37 +110,37 @@ def skin_picture(
             )
     facts = {
         "texture": files,
-        "texture_seen": round(made.seen, 3),
+        "texture_seen": round(blended.seen, 3),
         "texture_gains": [
-            None if gain is None else [round(x, 3) for x in gain] for gain in made.gains
+            None if gain is None else [round(x, 3) for x in gain] for gain in blended.gains
         ],
     }
-    return SkinPicture(made.picture, True, shown, facts)
+    return SkinPicture(blended.picture, True, shown, facts)
 
 
-def _shown(one: Shot, top: Silhouettes, side: Silhouettes | None) -> tuple[Image, Floats, Floats]:
+def _shown(shot: Shot, top: Silhouettes, side: Silhouettes | None) -> tuple[Image, Floats, Floats]:
     """Image, skeleton and radii in it."""
-    track = top if one.view in _OF_TOP else side
+    track = top if shot.view in _OF_TOP else side
     if track is None:
         raise InputError(
-            f"{one.file}: a photograph from the {one.view} needs the skeletons in it; "
+            f"{shot.file}: a photograph from the {shot.view} needs the skeletons in it; "
             "give their .npz as --side"
         )
-    check_frame(str(one.file), track.points, one.frame)
-    image = _read_picture(one.file)
-    points = track.points[one.frame]
+    check_frame(str(shot.file), track.points, shot.frame)
+    image = _read_picture(shot.file)
+    points = track.points[shot.frame]
     if not track.pixels:
         raise InputError(
-            f"{one.file}: the track holds no places in pictures (points_px, skeletons)"
+            f"{shot.file}: the track holds no places in pictures (points_px, skeletons)"
         )
     rows, columns = image.shape[:2]
     x, y = points.T
     if x.min() < -1.0 or y.min() < -1.0 or x.max() > columns or y.max() > rows:
         raise InputError(
-            f"{one.file}: the skeleton does not lie in this picture of {columns} x {rows} pixels; "
+            f"{shot.file}: the skeleton does not lie in this picture of {columns} x {rows} pixels; "
             "say which --frame of the track it shows"
         )
-    return image, points, track.radius[one.frame]
+    return image, points, track.radius[shot.frame]
 
 
 def _read_picture(image: Path) -> Image:

@@ -82,13 +82,17 @@ def stride(
     refuse_to_overwrite(written, force)
     if picture is not None:
         check_picture(picture)
-    held = load_keypoints(keypoints, rate, min_score, choice_of(individual, None, plane))
-    made = measure_animal(held, names, animal, output.stem, length_m, view)
+    keypoints_of_film = load_keypoints(
+        keypoints, rate, min_score, choice_of(individual, None, plane)
+    )
+    measured = measure_animal(keypoints_of_film, names, animal, output.stem, length_m, view)
     with atomic_write(output) as part:
-        part.write_text(made.text(), encoding="utf-8")
+        part.write_text(measured.text(), encoding="utf-8")
     if picture is not None:
         from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415  --picture: an extra
 
-        draw_stride(made.stride, picture, f"{keypoints.name}: {made.stride.cycles:.1f} cycles")
+        draw_stride(
+            measured.stride, picture, f"{keypoints.name}: {measured.stride.cycles:.1f} cycles"
+        )
     files = {"animal": str(output), "picture": None if picture is None else str(picture)}
-    show(made.facts() | files, as_json)
+    show(measured.facts() | files, as_json)

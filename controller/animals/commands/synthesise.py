@@ -187,17 +187,17 @@ def _snake(
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
         raise InputError(f"--look {look}: is for --film and --glb")
-    made = SnakeSynthesis(prepared, tongue).synthesise(frames)
+    walk = SnakeSynthesis(prepared, tongue).synthesise(frames)
     with atomic_write(files["track"]) as part:
-        made.save(part, files["track"].stem, f"snakewalk animal synthesise of {prepared.run.track}")
+        walk.save(part, files["track"].stem, f"snakewalk animal synthesise of {prepared.run.track}")
     draw_walk(
-        made, prepared.ground, files["picture"], f"{prepared.run.name}: {prepared.world.name}"
+        walk, prepared.ground, files["picture"], f"{prepared.run.name}: {prepared.world.name}"
     )
     if worn is not None and "skin" in files:
-        worn.write(made, files["skin"])
+        worn.write(walk, files["skin"])
     if worn is not None and "film" in files:
-        worn.film(made, prepared, files["film"])
-    return made.facts(), made.complete
+        worn.film(walk, prepared, files["film"])
+    return walk.facts(), walk.complete
 
 
 def _with_legs(
@@ -214,12 +214,12 @@ def _with_legs(
         from snakewalk.controller.animals.legged.animal_film import AnimalBody  # noqa: PLC0415  --film and --glb: an extra
 
         body = AnimalBody.of(config)
-    made = synthesise_animal(prepared, config, frames)
+    animal_motion = synthesise_animal(prepared, config, frames)
     with atomic_write(files["track"]) as part:
-        made.save(part, files["track"].stem)
-    draw_animal(made, files["picture"], f"{config.name} on {prepared.world.name}")
+        animal_motion.save(part, files["track"].stem)
+    draw_animal(animal_motion, files["picture"], f"{config.name} on {prepared.world.name}")
     if body is not None and "skin" in files:
-        body.write(made, files["skin"])
+        body.write(animal_motion, files["skin"])
     if body is not None and "film" in files:
-        body.film(made, prepared, files["film"])
-    return made.facts(), made.complete
+        body.film(animal_motion, prepared, files["film"])
+    return animal_motion.facts(), animal_motion.complete

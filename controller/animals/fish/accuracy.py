@@ -32,7 +32,7 @@ class Accuracy:
     def to_dict(self) -> dict[str, object]:
         """Medians and 95th percentiles, degrees and percent of body length."""
         spine = np.degrees(self.angles_rad)
-        found: dict[str, object] = {
+        facts: dict[str, object] = {
             "angle_error_deg": np.median(spine, axis=0).round(2).tolist(),
             "angle_error_95_deg": np.percentile(spine, 95.0, axis=0).round(2).tolist(),
             "head_error_deg": _two(np.degrees(self.head_rad)),
@@ -41,45 +41,45 @@ class Accuracy:
             "turned_round": self.turned_round,
         }
         if self.pitch_rad is not None and self.height is not None:
-            found["pitch_error_deg"] = _two(np.degrees(self.pitch_rad))
-            found["height_error_percent"] = _two(100.0 * self.height)
-        return found
+            facts["pitch_error_deg"] = _two(np.degrees(self.pitch_rad))
+            facts["height_error_percent"] = _two(100.0 * self.height)
+        return facts
 
 
-def compare(found: Postures, truth: Postures) -> Accuracy:
+def compare(estimated: Postures, truth: Postures) -> Accuracy:
     """Compare frame by frame.
 
     Raises:
         InputError: films of different length, other joints, or no frame in common.
 
     """
-    if found.frames != truth.frames or found.joints_at != truth.joints_at:
+    if estimated.frames != truth.frames or estimated.joints_at != truth.joints_at:
         raise InputError(
             f"{truth.name}: {truth.frames} frames of {len(truth.joints_at)} spine angles cannot be "
-            f"compared with {found.frames} of {len(found.joints_at)}"
+            f"compared with {estimated.frames} of {len(estimated.joints_at)}"
         )
-    both = found.found & truth.found
+    both = estimated.found & truth.found
     if not both.any():
         raise InputError(f"{truth.name}: no frame has a posture in both")
-    turn = found.head_rad[both] - truth.head_rad[both]
+    turn = estimated.head_rad[both] - truth.head_rad[both]
     head = np.abs(np.arctan2(np.sin(turn), np.cos(turn)))
-    here = found.points()[both] / found.length
+    points = estimated.points()[both] / estimated.length
     there = truth.points()[both] / truth.length
-    here, there = here - here.mean(axis=(0, 1)), there - there.mean(axis=(0, 1))
-    ratio = float((here * there).sum() / (here * here).sum())
+    points, there = points - points.mean(axis=(0, 1)), there - there.mean(axis=(0, 1))
+    ratio = float((points * there).sum() / (points * points).sum())
     pitch = height = None
-    if found.pitch_rad is not None and truth.pitch_rad is not None:
-        known = np.isfinite(found.pitch_rad[both])
-        pitch = np.abs(found.pitch_rad[both] - truth.pitch_rad[both])[known]
-    if found.height is not None and truth.height is not None:
-        off = ratio * found.height[both] / found.length - truth.height[both] / truth.length
+    if estimated.pitch_rad is not None and truth.pitch_rad is not None:
+        has_pitch = np.isfinite(estimated.pitch_rad[both])
+        pitch = np.abs(estimated.pitch_rad[both] - truth.pitch_rad[both])[has_pitch]
+    if estimated.height is not None and truth.height is not None:
+        off = ratio * estimated.height[both] / estimated.length - truth.height[both] / truth.length
         off = off[np.isfinite(off)]
         height = np.abs(off - np.median(off))
     return Accuracy(
-        angles_rad=np.abs(found.angles_rad[both] - truth.angles_rad[both]),
+        angles_rad=np.abs(estimated.angles_rad[both] - truth.angles_rad[both]),
         head_rad=head,
         length_ratio=ratio,
-        skeleton=np.hypot(*(there - ratio * here).transpose(2, 0, 1)).mean(axis=1),
+        skeleton=np.hypot(*(there - ratio * points).transpose(2, 0, 1)).mean(axis=1),
         turned_round=int(np.count_nonzero(head > np.pi / 2)),
         pitch_rad=pitch,
         height=height,

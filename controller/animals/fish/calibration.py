@@ -52,15 +52,15 @@ def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film
         raise InputError(f"{name}: the body is {length:.0f} px long; at least {SHORTEST_PX:.0f}")
     model = model.sized(length)
     for _ in range(2):
-        found: list[tuple[SilhouetteFrame, Match]] = []
+        matches: list[tuple[SilhouetteFrame, Match]] = []
         for frame, line in usable:
             match = search(frame, model, midline_starts(model, line))
             if match is not None and np.isfinite(match.value):
-                found.append((frame, match))
-        if not found:
+                matches.append((frame, match))
+        if not matches:
             raise InputError(f"{name}: no posture of the model fits any of {len(sample)} frames")
-        found.sort(key=lambda pair: -pair[1].value)
-        good = found[: max(1, (len(found) + 1) // 2)]
+        matches.sort(key=lambda pair: -pair[1].value)
+        good = matches[: max(1, (len(matches) + 1) // 2)]
         model = replace(model, half_width=_widths(model, good))
         sizes = np.array([_size(model, frame, match) for frame, match in good])
         grown = np.median(sizes, axis=0)
@@ -71,8 +71,10 @@ def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film
 
 def _with_fins(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> FishModel:
     """Fins of the largest V: those that stand out from the body widen what is read off there."""
-    made = [model.with_fins(length) for length in FINS]
-    return max(made, key=lambda one: float(np.median([_value(one, *pair) for pair in good])))
+    variants = [model.with_fins(length) for length in FINS]
+    return max(
+        variants, key=lambda variant: float(np.median([_value(variant, *pair) for pair in good]))
+    )
 
 
 def _value(model: FishModel, frame: SilhouetteFrame, match: Match) -> float:
@@ -90,9 +92,9 @@ def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floa
     """(STATIONS,) half widths in body lengths: median over frames of the silhouette's depth."""
     rows = []
     for frame, match in good:
-        at = match.parameters
+        parameters = match.parameters
         deep = cv2.distanceTransform(frame.mask.astype(np.uint8), cv2.DIST_L2, 5)
-        line = model.midline(at[:2], float(at[2]), at[3:])
+        line = model.midline(parameters[:2], float(parameters[2]), parameters[3:])
         column = np.clip(np.rint(line[:, 0]), 0, deep.shape[1] - 1).astype(int)
         row = np.clip(np.rint(-line[:, 1]), 0, deep.shape[0] - 1).astype(int)
         rows.append(deep[row, column])
@@ -115,10 +117,12 @@ def _size(model: FishModel, frame: SilhouetteFrame, match: Match) -> tuple[float
         if size[0] < 0.5 or size[1] < 0.3:
             return float("-inf")
         grown = model.sized(model.length_px * float(size[0]), width=float(size[1]))
-        at = match.parameters.copy()
-        at[:2] += ahead * size[2]
-        return TopViewFit(target, grown).value(at)
+        parameters = match.parameters.copy()
+        parameters[:2] += ahead * size[2]
+        return TopViewFit(target, grown).value(parameters)
 
     first = np.array([0.05, 0.1, 0.03 * model.length_px])
-    found, _ = pattern_search(value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200)
-    return float(found[0]), float(found[1])
+    size_values, _ = pattern_search(
+        value, np.array([1.0, 1.0, 0.0]), first, halvings=4, evaluations=200
+    )
+    return float(size_values[0]), float(size_values[1])

@@ -45,10 +45,10 @@ def render(
     (folder / "top").mkdir(parents=True, exist_ok=True)
     _write(folder / "top-background.png", top.background())
     side_rows = round(2.2 * length_px)
-    beside = FishScene(side_rows, columns, options.seed + 1)
+    side_scene = FishScene(side_rows, columns, options.seed + 1)
     if options.side:
         (folder / "side").mkdir(exist_ok=True)
-        _write(folder / "side-background.png", beside.background())
+        _write(folder / "side-background.png", side_scene.background())
     for k, body in enumerate(spine):
         body_px = body * length_px + shift
         picture = top.top(body_px, half_width, options.fins * length_px)
@@ -57,7 +57,7 @@ def render(
             height_px = height[k] * length_px - 0.5 * side_rows
             _write(
                 folder / "side" / f"{k:05d}.png",
-                _side_view(beside, model, body, body_px[:, 0], height_px),
+                _side_view(side_scene, model, body, body_px[:, 0], height_px),
             )
         on_progress(k + 1, len(spine))
     with atomic_write(folder / "truth.npz") as part:
@@ -80,10 +80,10 @@ def _side_view(
     """
     step = np.gradient(body, axis=0)
     across = np.abs(step[:, 1]) / np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
-    at = np.linspace(0.0, 1.0, len(body))
+    place = np.linspace(0.0, 1.0, len(body))
     stations = np.linspace(0.0, 1.0, len(model.half_width))
-    wide_px = np.interp(at, stations, model.half_width * model.length_px) * across
-    high_px = np.interp(at, stations, model.half_height * model.length_px)
+    wide_px = np.interp(place, stations, model.half_width * model.length_px) * across
+    high_px = np.interp(place, stations, model.half_height * model.length_px)
     return scene.side(np.column_stack([x_px, height_px]), wide_px, high_px)
 
 
@@ -92,26 +92,26 @@ def _truth(motion: str | None, build: str, frames: int | None) -> tuple[Postures
     model = fish_model(build)
     if motion is not None:
         track = load_track(motion)
-        whole = postures_of_track(track, model.joints_at)
-        known = whole.found
-        unit = whole.length
+        all_postures = postures_of_track(track, model.joints_at)
+        is_matched = all_postures.found
+        unit = all_postures.length
         truth = replace(
-            whole,
-            base=whole.base[known][:frames] / unit,
-            head_rad=whole.head_rad[known][:frames],
-            angles_rad=whole.angles_rad[known][:frames],
+            all_postures,
+            base=all_postures.base[is_matched][:frames] / unit,
+            head_rad=all_postures.head_rad[is_matched][:frames],
+            angles_rad=all_postures.angles_rad[is_matched][:frames],
             length_m=None,
         )
         spine = track.points[:frames] / unit
         return truth, spine, np.zeros(spine.shape[:2])
-    whole = swim(build=build)
+    all_postures = swim(build=build)
     truth = replace(
-        whole,
-        base=whole.base[:frames],
-        head_rad=whole.head_rad[:frames],
-        angles_rad=whole.angles_rad[:frames],
-        height=None if whole.height is None else whole.height[:frames],
-        pitch_rad=None if whole.pitch_rad is None else whole.pitch_rad[:frames],
+        all_postures,
+        base=all_postures.base[:frames],
+        head_rad=all_postures.head_rad[:frames],
+        angles_rad=all_postures.angles_rad[:frames],
+        height=None if all_postures.height is None else all_postures.height[:frames],
+        pitch_rad=None if all_postures.pitch_rad is None else all_postures.pitch_rad[:frames],
     )
     zero = np.zeros(truth.frames)
     height = zero if truth.height is None else truth.height

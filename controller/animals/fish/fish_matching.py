@@ -82,7 +82,7 @@ def match_footage(
     """
     model = fish_model(build)
     above = open_film(top, background, rate_hz)
-    beside = None if side is None else open_film(side, side_background, rate_hz)
+    side_footage = None if side is None else open_film(side, side_background, rate_hz)
     total = above.footage.count
     done = 0
 
@@ -96,7 +96,7 @@ def match_footage(
         total,
         model,
         rate_hz=above.footage.rate_hz,
-        side=None if beside is None else beside.frames,
+        side=None if side_footage is None else side_footage.frames,
         length_m=length_m,
         name=top.name,
         on_progress=count,

@@ -115,18 +115,22 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
             capture=max(_CAPTURE * source.length, radius),
             around=around,
         )
-        found = steered(
+        steered_motion = steered(
             compose(pieces, sequence, options.blend_s, around.start),
             points,
             sequence.reached_at,
             0.5 * radius,
         )
         reached = {
-            "reached_s": [round(at / pieces.rate_hz, 2) for at in found.reached_at],
-            "reached_within": [round(float(off) / source.length, 4) for off in found.distance],
-            "steered_deg": round(float(np.degrees(found.turn_rad)), 1),
+            "reached_s": [
+                round(frame_index / pieces.rate_hz, 2) for frame_index in steered_motion.reached_at
+            ],
+            "reached_within": [
+                round(float(off) / source.length, 4) for off in steered_motion.distance
+            ],
+            "steered_deg": round(float(np.degrees(steered_motion.turn_rad)), 1),
         }
-        composed = found.motion
+        composed = steered_motion.motion
     else:
         rng = np.random.default_rng(options.seed)
         sequence = random_sequence(pieces, options.seconds, rng, around)
@@ -201,13 +205,13 @@ def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
             )
     others = []
     for file in options.avoid:
-        held, _ = read_arrays(file, {"base", "rate_hz"})
-        if set(held) != {"base", "rate_hz"}:
+        arrays, _ = read_arrays(file, {"base", "rate_hz"})
+        if set(arrays) != {"base", "rate_hz"}:
             raise InputError(
                 f"{file}: is not a track of snakewalk animal fish synthesise; make one"
             )
-        base = np.asarray(held["base"], float)
-        rate_hz = float(held["rate_hz"])
+        base = np.asarray(arrays["base"], float)
+        rate_hz = float(arrays["rate_hz"])
         time_s = np.arange(len(base)) / rate_hz
         even = np.arange(0.0, time_s[-1] + 1e-9, 1.0 / source.rate_hz)
         others.append(np.column_stack([np.interp(even, time_s, base[:, k]) for k in (0, 1)]))

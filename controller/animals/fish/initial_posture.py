@@ -46,20 +46,20 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
         _beyond(smooth, float(depth[tuple(path[0])])),
         _beyond(smooth[::-1], float(depth[tuple(path[-1])])),
     ]
-    whole = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
-    return np.asarray((whole + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
+    joined = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
+    return np.asarray((joined + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
 
 
 def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
     """Parameters (3 + J,) of a midline, base x, y, head, angles, with the head at either end."""
-    found = []
+    midlines = []
     for points in (midline, midline[::-1]):
         head, angles = midline_angles(points, model.joints_at)
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        at = model.joints_at[0] * chord[-1]
-        base = [np.interp(at, chord, points[:, k]) for k in range(2)]
-        found.append(np.array([*base, head, *angles]))
-    return found
+        place = model.joints_at[0] * chord[-1]
+        base = [np.interp(place, chord, points[:, k]) for k in range(2)]
+        midlines.append(np.array([*base, head, *angles]))
+    return midlines
 
 
 def _beyond(points: Floats, reach: float) -> Floats:

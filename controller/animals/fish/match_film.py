@@ -107,10 +107,10 @@ def match_film(
             lost[tracked.reason] = lost.get(tracked.reason, 0) + 1
         if side_view is not None and side_frames is not None:
             frame = next(side_frames, None)
-            found = None
+            side_match = None
             if frame is not None and match is not None:
-                found = side_view.search(frame, match.parameters)
-            sides.append(no_side if found is None else found[0])
+                side_match = side_view.search(frame, match.parameters)
+            sides.append(no_side if side_match is None else side_match[0])
         on_progress()
     parameters = np.array(rows)
     if int(np.isfinite(parameters[:, 2]).sum()) < 2:
@@ -160,27 +160,27 @@ def track_film(
             last = None
             yield TrackedFrame(None, frame.reason or "no silhouette")
             continue
-        found: Match | None = None
+        previous: Match | None = None
         starts = midline_starts(model, line)
         if last is not None:
             ahead = last.copy()
             ahead[:3] += moved
-            aligned = [at for at in starts if np.cos(at[2] - last[2]) > 0.0]
-            found = search(frame, model, [ahead, last, *aligned], near=ahead[:2], from_level=1)
-        if found is None or found.value < LEAST_VALUE:
-            found = _search_anew(frame, model, starts, travel if last is None else None)
-        if found is None or found.value < LEAST_VALUE:
+            aligned = [start for start in starts if np.cos(start[2] - last[2]) > 0.0]
+            previous = search(frame, model, [ahead, last, *aligned], near=ahead[:2], from_level=1)
+        if previous is None or previous.value < LEAST_VALUE:
+            previous = _search_anew(frame, model, starts, travel if last is None else None)
+        if previous is None or previous.value < LEAST_VALUE:
             last = None
             yield TrackedFrame(None, "no posture fits")
             continue
-        here = found.parameters.copy()
+        parameters = previous.parameters.copy()
         if last is not None:
-            here[2] = last[2] + np.angle(np.exp(1j * (here[2] - last[2])))
-            moved = (here - last)[:3]
+            parameters[2] = last[2] + np.angle(np.exp(1j * (parameters[2] - last[2])))
+            moved = (parameters - last)[:3]
         else:
             moved = np.zeros(3)
-        last = here
-        yield TrackedFrame(Match(here, found.value))
+        last = parameters
+        yield TrackedFrame(Match(parameters, previous.value))
 
 
 def _search_anew(
@@ -221,20 +221,20 @@ def _with_height(
 ) -> FishModel:
     """Scale the model's height to the side view ([TH] 3.2.3)."""
     pairs = [
-        (tracked.match.parameters, beside)
-        for above, beside in zip(top, side, strict=True)
+        (tracked.match.parameters, side_frame)
+        for above, side_frame in zip(top, side, strict=True)
         for tracked in track_film([above], model)
         if tracked.match is not None
     ][::3]
-    first = [SideView(model, camera).search(frame, at) for at, frame in pairs]
+    first = [SideView(model, camera).search(frame, parameters) for parameters, frame in pairs]
 
     def median_value(factor: float) -> float:
         view = SideView(model.sized(model.length_px, height=factor), camera)
         values = []
-        for (at, frame), start in zip(pairs, first, strict=True):
+        for (parameters, frame), start in zip(pairs, first, strict=True):
             view.last = None if start is None else start[0]
-            found = view.search(frame, at)
-            values.append(-np.inf if found is None else found[1])
+            side_match = view.search(frame, parameters)
+            values.append(-np.inf if side_match is None else side_match[1])
         return float(np.median(values or [-np.inf]))
 
     factors = _HEIGHT_FACTORS
@@ -249,6 +249,6 @@ def _with_height(
 def _unwrapped(angle_rad: Floats) -> Floats:
     """Turn jumps of 2 pi out, also across missing frames."""
     out = angle_rad.copy()
-    known = np.isfinite(out)
-    out[known] = np.unwrap(out[known])
+    is_known = np.isfinite(out)
+    out[is_known] = np.unwrap(out[is_known])
     return out

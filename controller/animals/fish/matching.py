@@ -108,12 +108,12 @@ def _edges(grey: Image, area: Image, width_px: int) -> Image | None:
         return None
     contrast = abs(float(grey[inside].mean()) - float(grey[~inside].mean()))
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0)
-    found = cv2.Canny(smooth, 0.5 * contrast, 1.2 * contrast)
+    edges = cv2.Canny(smooth, 0.5 * contrast, 1.2 * contrast)
     block = inside.astype(np.uint8)
     near = np.ones((5, 5), dtype=np.uint8)
     rim = cv2.dilate(block, near) - cv2.erode(block, near)
-    found = np.where(rim > 0, found, 0).astype(np.uint8)
-    if not found.any():
+    edges = np.where(rim > 0, edges, 0).astype(np.uint8)
+    if not edges.any():
         return None
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width_px, width_px))
-    return np.asarray(cv2.dilate(found, disc), dtype=np.uint8)
+    return np.asarray(cv2.dilate(edges, disc), dtype=np.uint8)

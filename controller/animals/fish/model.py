@@ -79,16 +79,16 @@ class FishModel:
         points = np.zeros((STATIONS, 3))
         points[1:, 0] = -np.cumsum(np.cos(tangents)) * piece
         points[1:, 1] = -np.cumsum(np.sin(tangents)) * piece
-        at = self.joints_at[0] * (STATIONS - 1)
-        low = int(at)
-        points -= points[low] * (low + 1 - at) + points[low + 1] * (at - low)
+        place = self.joints_at[0] * (STATIONS - 1)
+        low = int(place)
+        points -= points[low] * (low + 1 - place) + points[low + 1] * (place - low)
         points = pitched(points[:, :2], np.array(head_rad), np.array(pitch_rad))
         points[:, : len(base_px)] += base_px
         return points
 
     def with_fins(self, length: float) -> Self:
         """Return the same body with pectoral fins; between their ends its width is interpolated."""
-        first, last = (round(at * (STATIONS - 1)) for at in PECTORAL)
+        first, last = (round(station * (STATIONS - 1)) for station in PECTORAL)
         wide = self.half_width.copy()
         if length > 0.0:
             ends = [first - 2, last + 2]
@@ -104,19 +104,19 @@ class FishModel:
         along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
         left = np.column_stack([-along[:, 1], along[:, 0]])
         across = left * (self.half_width * self.length_px)[:, None]
-        one, other = flat + across, flat - across
+        side_line, other = flat + across, flat - across
         if self.fin > 0.0:
-            first, last = (round(at * (STATIONS - 1)) for at in PECTORAL)
+            first, last = (round(station * (STATIONS - 1)) for station in PECTORAL)
             k = (first + last) // 2
             reach = self.fin * self.length_px
-            one, other = (
+            side_line, other = (
                 np.concatenate([side[: first + 1], side[[first, last]] + tip, side[last:]])
                 for side, tip in (
-                    (one, reach * (_ASIDE * left[k] - _BACK * along[k])),
+                    (side_line, reach * (_ASIDE * left[k] - _BACK * along[k])),
                     (other, reach * (-_ASIDE * left[k] - _BACK * along[k])),
                 )
             )
-        return np.asarray(np.concatenate([one, other[::-1]]))
+        return np.asarray(np.concatenate([side_line, other[::-1]]))
 
 
 def pitched(points: Floats, head_rad: Floats, pitch_rad: Floats) -> Floats:
@@ -130,10 +130,10 @@ def pitched(points: Floats, head_rad: Floats, pitch_rad: Floats) -> Floats:
 
 def turn_shares(joints_at: tuple[float, ...], pieces: int) -> Floats:
     """(pieces, J) share of each spine angle that has been turned at the middle of each piece."""
-    at = np.array(joints_at)
-    spread = np.gradient(at) if len(at) > 1 else np.array([0.2])
+    places = np.array(joints_at)
+    spread = np.gradient(places) if len(places) > 1 else np.array([0.2])
     middle = (np.arange(pieces) + 0.5) / pieces
-    return np.asarray(np.clip((middle[:, None] - at) / spread + 0.5, 0.0, 1.0))
+    return np.asarray(np.clip((middle[:, None] - places) / spread + 0.5, 0.0, 1.0))
 
 
 def fish_model(build: str, length_px: float = 1.0) -> FishModel:
@@ -150,13 +150,13 @@ def fish_model(build: str, length_px: float = 1.0) -> FishModel:
     stations = np.linspace(0.0, 1.0, STATIONS)
 
     def profile(knots: tuple[tuple[float, float], ...]) -> Floats:
-        at, size = np.array(knots).T
-        return np.asarray(np.interp(stations, at, size))
+        place, size = np.array(knots).T
+        return np.asarray(np.interp(stations, place, size))
 
     if build == "carp":
-        at = tuple(k / 7 for k in range(2, 6))
-        return FishModel(length_px, at, profile(_CARP), profile(_CARP_HIGH), build)
+        joint_places = tuple(k / 7 for k in range(2, 6))
+        return FishModel(length_px, joint_places, profile(_CARP), profile(_CARP_HIGH), build)
     if build == "eel":
-        at = tuple(k / 9 for k in range(1, 9))
-        return FishModel(length_px, at, profile(_EEL), profile(_EEL) * 1.3, build)
+        joint_places = tuple(k / 9 for k in range(1, 9))
+        return FishModel(length_px, joint_places, profile(_EEL), profile(_EEL) * 1.3, build)
     raise InputError(f"{build}: no such build of a fish; there are carp and eel")

@@ -34,36 +34,36 @@ def pattern_search(
     """
     used = 0
 
-    def score(at: Floats) -> float:
+    def score(point: Floats) -> float:
         nonlocal used
         used += 1
-        return value(at)
+        return value(point)
 
-    def explore(at: Floats, best: float, size: Floats) -> tuple[Floats, float]:
-        at = at.copy()
+    def explore(point: Floats, best: float, size: Floats) -> tuple[Floats, float]:
+        point = point.copy()
         for k in np.flatnonzero(size):
-            here = at[k]
+            coordinate = point[k]
             for sign in (1.0, -1.0):
-                at[k] = here + sign * size[k]
-                found = score(at)
-                if found > best:
-                    best = found
+                point[k] = coordinate + sign * size[k]
+                trial_value = score(point)
+                if trial_value > best:
+                    best = trial_value
                     break
-                at[k] = here
-        return at, best
+                point[k] = coordinate
+        return point, best
 
-    here = np.array(start, dtype=float)
+    point = np.array(start, dtype=float)
     best = score(start)
     size = np.array(steps, dtype=float)
     for _ in range(halvings + 1):
         while used < evaluations:
-            there, found = explore(here, best, size)
-            if found <= best:
+            there, trial_cost = explore(point, best, size)
+            if trial_cost <= best:
                 break
-            while found > best and used < evaluations:
-                leap = there + (there - here)
-                here = there
-                best = found
-                there, found = explore(leap, score(leap), size)
+            while trial_cost > best and used < evaluations:
+                leap = there + (there - point)
+                point = there
+                best = trial_cost
+                there, trial_cost = explore(leap, score(leap), size)
         size *= 0.5
-    return here, best
+    return point, best

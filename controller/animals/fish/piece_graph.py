@@ -78,9 +78,9 @@ class PieceGraph:
         lasting = [k for k in by_rule if k in self.lasting]
         if lasting or by_rule:
             return lasting or by_rule, True
-        begin = np.array([one.begin_speed for one in self.pieces])
-        apart = np.abs(begin - self.pieces[piece].end_speed)
-        return np.flatnonzero(apart <= apart.min() + 1e-12).tolist(), False
+        begin = np.array([candidate.begin_speed for candidate in self.pieces])
+        speed_gap = np.abs(begin - self.pieces[piece].end_speed)
+        return np.flatnonzero(speed_gap <= speed_gap.min() + 1e-12).tolist(), False
 
 
 def speed_classes(begin: Floats, end: Floats, classes: int = CLASSES) -> tuple[Ints, Ints]:
@@ -126,11 +126,11 @@ def _rise(postures: Postures) -> Floats | None:
     if postures.height is None or postures.pitch_rad is None:
         return None
     rise = np.column_stack([postures.height, postures.pitch_rad])
-    known = np.flatnonzero(np.isfinite(rise).all(axis=1))
-    if len(known) < 2:
+    indices = np.flatnonzero(np.isfinite(rise).all(axis=1))
+    if len(indices) < 2:
         return None
     every = np.arange(len(rise))
-    return np.column_stack([np.interp(every, known, rise[known, k]) for k in (0, 1)])
+    return np.column_stack([np.interp(every, indices, rise[indices, k]) for k in (0, 1)])
 
 
 def _piece(postures: Postures, segment: MotionSegment, rise: Floats | None) -> Piece:

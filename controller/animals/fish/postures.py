@@ -84,9 +84,9 @@ def skeleton(base: Floats, tangents_rad: Floats, base_at: float, length: float) 
     step = np.stack([np.cos(tangents_rad), np.sin(tangents_rad)], axis=-1) * (length / SEGMENTS)
     points = np.zeros((len(base), SEGMENTS + 1, 2))
     points[:, 1:] = -np.cumsum(step, axis=1)
-    at = base_at * SEGMENTS
-    low = int(at)
-    origin = points[:, low] * (low + 1 - at) + points[:, low + 1] * (at - low)
+    place = base_at * SEGMENTS
+    low = int(place)
+    origin = points[:, low] * (low + 1 - place) + points[:, low + 1] * (place - low)
     return np.asarray(points + (base - origin)[:, None, :])
 
 
@@ -94,17 +94,17 @@ def fit_angles(tangents_rad: Floats, joints_at: tuple[float, ...]) -> tuple[Floa
     """Head direction (T,) and spine angles (T, J) nearest to tangent angles (T, N)."""
     turns = turn_shares(joints_at, tangents_rad.shape[1])
     basis = np.column_stack([np.ones(len(turns)), -turns])
-    found = np.linalg.lstsq(basis, tangents_rad.T, rcond=None)[0]
-    return np.asarray(found[0]), np.asarray(found[1:].T)
+    solution = np.linalg.lstsq(basis, tangents_rad.T, rcond=None)[0]
+    return np.asarray(solution[0]), np.asarray(solution[1:].T)
 
 
 def postures_of_track(track: Track, joints_at: tuple[float, ...]) -> Postures:
     """Read postures off tracked midlines: no images needed; frames that are missing are NaN."""
     head, angles = fit_angles(track.angles_rad, joints_at)
-    at = joints_at[0] * SEGMENTS
-    low = int(at)
+    place = joints_at[0] * SEGMENTS
+    low = int(place)
     even = np.stack([equal_arc_length(body) for body in track.points])
-    base = even[:, low] * (low + 1 - at) + even[:, low + 1] * (at - low)
+    base = even[:, low] * (low + 1 - place) + even[:, low + 1] * (place - low)
     frame = np.rint((track.time_s - track.time_s[0]) * track.rate_hz).astype(int)
     total = int(frame[-1]) + 1
 
@@ -171,7 +171,7 @@ def load_postures(path: Path) -> Postures:
 
     """
     try:
-        held, _ = read_arrays(path)
+        arrays, _ = read_arrays(path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; snakewalk animal fish match writes one") from None
     except IsADirectoryError:
@@ -180,28 +180,28 @@ def load_postures(path: Path) -> Postures:
         raise InputError(
             f"{path}: holds no postures; snakewalk animal fish match writes them, as .npz"
         ) from None
-    missing = _POSTURES - held.keys()
+    missing = _POSTURES - arrays.keys()
     if missing:
         raise InputError(
             f"{path}: lacks {', '.join(sorted(missing))}; "
             "postures come from snakewalk animal fish match"
         )
-    length_m = float(held.get("length_m", np.array(np.nan)))
-    joints_at = tuple(float(at) for at in held["joints_at"])
+    length_m = float(arrays.get("length_m", np.array(np.nan)))
+    joints_at = tuple(float(joint) for joint in arrays["joints_at"])
     return Postures(
-        base=held["base"],
-        head_rad=held["head_rad"],
-        angles_rad=held["angles_rad_spine"],
+        base=arrays["base"],
+        head_rad=arrays["head_rad"],
+        angles_rad=arrays["angles_rad_spine"],
         joints_at=joints_at,
-        rate_hz=float(held["rate_hz"]),
+        rate_hz=float(arrays["rate_hz"]),
         length_m=length_m if np.isfinite(length_m) else None,
-        height=held.get("height"),
-        pitch_rad=held.get("pitch_rad"),
-        value=held.get("value"),
-        model=_model(path, held, joints_at),
-        name=str(held.get("name", path.stem)),
-        source=str(held.get("source", "not stated")),
-        licence=str(held.get("licence", "not stated")),
+        height=arrays.get("height"),
+        pitch_rad=arrays.get("pitch_rad"),
+        value=arrays.get("value"),
+        model=_model(path, arrays, joints_at),
+        name=str(arrays.get("name", path.stem)),
+        source=str(arrays.get("source", "not stated")),
+        licence=str(arrays.get("licence", "not stated")),
     )
 
 
@@ -223,13 +223,16 @@ def _names(path: Path) -> set[str]:
         return set()
 
 
-def _model(path: Path, held: dict[str, Any], joints_at: tuple[float, ...]) -> FishModel | None:
+def _model(path: Path, arrays: dict[str, Any], joints_at: tuple[float, ...]) -> FishModel | None:
     """The fish that was matched, where the file holds it."""
-    if not held.keys() >= {*_SECTIONS, "build", "length_px"}:
+    if not arrays.keys() >= {*_SECTIONS, "build", "length_px"}:
         return None
-    wide, high = (np.asarray(held[key], float) for key in _SECTIONS)
-    if any(one.shape != (STATIONS,) or not np.isfinite(one).all() for one in (wide, high)):
+    wide, high = (np.asarray(arrays[key], float) for key in _SECTIONS)
+    if any(
+        profile_values.shape != (STATIONS,) or not np.isfinite(profile_values).all()
+        for profile_values in (wide, high)
+    ):
         raise InputError(f"{path}: {' and '.join(_SECTIONS)} must be {STATIONS} numbers each")
-    size = float(held["length_px"])
-    fin = float(held.get("fin", 0.0))
-    return FishModel(size, joints_at, wide, high, str(held["build"]), fin)
+    size = float(arrays["length_px"])
+    fin = float(arrays.get("fin", 0.0))
+    return FishModel(size, joints_at, wide, high, str(arrays["build"]), fin)

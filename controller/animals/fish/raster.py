@@ -91,5 +91,5 @@ def draw_pieces(canvas: Image, window: Window, pieces_px: list[Floats]) -> None:
     """Fill convex pieces on a cleared canvas."""
     canvas[:] = 0
     points = window.sixteenths(np.concatenate(pieces_px))
-    for piece in np.split(points, np.cumsum([len(one) for one in pieces_px])[:-1]):
+    for piece in np.split(points, np.cumsum([len(piece_px) for piece_px in pieces_px])[:-1]):
         cv2.fillConvexPoly(canvas, piece, 255, lineType=cv2.LINE_AA, shift=_SHIFT)

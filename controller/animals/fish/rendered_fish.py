@@ -69,11 +69,11 @@ class FishScene:
         image = self._ground.copy()
         rows, columns = _box(image.shape, points, width.max() + 3.0 + fin_px)
         y, x = np.mgrid[rows, columns]
-        here = np.column_stack([x.ravel(), -y.ravel()]).astype(float)
-        far, near = cKDTree(points).query(here)
+        pixels = np.column_stack([x.ravel(), -y.ravel()]).astype(float)
+        far, near = cKDTree(points).query(pixels)
         covered = np.clip(width[near] - far + 0.5, 0.0, 1.0).reshape(x.shape)
         for root, tip in _fin_ends(points, width, fin_px):
-            covered = np.maximum(covered, _blade(here, root, tip).reshape(x.shape))
+            covered = np.maximum(covered, _blade(pixels, root, tip).reshape(x.shape))
         across = np.clip(far / np.maximum(width[near], 1e-9) * 31.0, 0, 63).astype(int)
         grey = self.conditions.fish + self._back[across, near].reshape(x.shape)
         return self._composite(image, rows, columns, covered, grey)
@@ -84,8 +84,8 @@ class FishScene:
         Each section appears as an ellipse, ``half_wide_px`` along x.
         """
         points, wide = _fine(midline_px, half_wide_px)
-        apart = np.hypot(*np.diff(points[::2], axis=0).T).max()
-        wide = np.maximum(wide, max(0.7, 1.5 * float(apart)))  # no gaps between sections
+        spacing_px = np.hypot(*np.diff(points[::2], axis=0).T).max()
+        wide = np.maximum(wide, max(0.7, 1.5 * float(spacing_px)))  # no gaps between sections
         high = _fine(midline_px, half_high_px)[1]
         image = self._ground.copy()
         rows, columns = _box(image.shape, points, max(high.max(), wide.max()) + 3.0)
@@ -103,18 +103,20 @@ class FishScene:
     def _composite(
         self, image: Floats, rows: slice, columns: slice, covered: Floats, grey: Floats
     ) -> Image:
-        whole = np.zeros_like(image)
-        whole[rows, columns] = covered
+        full_cover = np.zeros_like(image)
+        full_cover[rows, columns] = covered
         if self.conditions.shadow:
-            soft = shift(gaussian_filter(whole, 6.0), (7.0, 5.0), order=1)
+            soft = shift(gaussian_filter(full_cover, 6.0), (7.0, 5.0), order=1)
             image = image - self.conditions.shadow * soft
         image[rows, columns] += covered * (grey - image[rows, columns])
         return self._film(image)
 
     def _film(self, image: Floats) -> Image:
-        seen = gaussian_filter(image, self.conditions.blur_px) if self.conditions.blur_px else image
-        seen = seen + self._rng.normal(size=image.shape) * self.conditions.noise
-        return np.clip(np.rint(seen), 0, 255).astype(np.uint8)
+        noisy = (
+            gaussian_filter(image, self.conditions.blur_px) if self.conditions.blur_px else image
+        )
+        noisy = noisy + self._rng.normal(size=image.shape) * self.conditions.noise
+        return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
 def _fin_ends(points: Floats, width: Floats, length: float) -> list[tuple[Floats, Floats]]:
@@ -132,18 +134,18 @@ def _fin_ends(points: Floats, width: Floats, length: float) -> list[tuple[Floats
 def _blade(places: Floats, root: Floats, tip: Floats) -> Floats:
     """(n,) how much of each pixel a fin covers, which widens a little to its round tip."""
     length = float(np.hypot(*(tip - root)))
-    way = (tip - root) / length
+    direction = (tip - root) / length
     away = places - root
-    on = np.clip(away @ way, 0.0, length)
-    gap = np.hypot(*(away - on[:, None] * way).T)
+    on = np.clip(away @ direction, 0.0, length)
+    gap = np.hypot(*(away - on[:, None] * direction).T)
     return np.asarray(np.clip(length * (0.14 + 0.08 * on / length) - gap + 0.5, 0.0, 1.0))
 
 
 def _fine(points: Floats, size: Floats) -> tuple[Floats, Floats]:
-    at = np.linspace(0.0, 1.0, _FINE)
-    known = np.linspace(0.0, 1.0, len(points))
-    fine = np.column_stack([np.interp(at, known, points[:, k]) for k in range(2)])
-    return fine, np.interp(at, np.linspace(0.0, 1.0, len(size)), size)
+    place = np.linspace(0.0, 1.0, _FINE)
+    stations = np.linspace(0.0, 1.0, len(points))
+    fine = np.column_stack([np.interp(place, stations, points[:, k]) for k in range(2)])
+    return fine, np.interp(place, np.linspace(0.0, 1.0, len(size)), size)
 
 
 def _box(shape: tuple[int, ...], points: Floats, margin: float) -> tuple[slice, slice]:

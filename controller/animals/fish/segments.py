@@ -49,18 +49,18 @@ class MotionSegment:
 
 def basic_frames(angles_rad: Floats, reference_rad: Floats, within_rad: float) -> Bools:
     """(T,) whether all spine angles (T, J) are within ``within_rad`` of the reference (J,)."""
-    apart = np.abs(angles_rad - reference_rad).max(axis=1)
-    return np.asarray(np.isfinite(apart) & (apart <= within_rad))
+    difference_rad = np.abs(angles_rad - reference_rad).max(axis=1)
+    return np.asarray(np.isfinite(difference_rad) & (difference_rad <= within_rad))
 
 
 def commonest_posture(angles_rad: Floats, within_rad: float) -> Floats:
     """(J,) the frame's posture that the motion comes back to most often."""
-    known = angles_rad[np.isfinite(angles_rad).all(axis=1)]
-    best = known[0]
+    finite_angles = angles_rad[np.isfinite(angles_rad).all(axis=1)]
+    best = finite_angles[0]
     most = -1
-    for posture in known[:: max(1, len(known) // 400)]:
-        at = basic_frames(angles_rad, posture, within_rad)
-        visits = int(np.count_nonzero(at[1:] & ~at[:-1])) + int(at[0])
+    for posture in finite_angles[:: max(1, len(finite_angles) // 400)]:
+        is_basic = basic_frames(angles_rad, posture, within_rad)
+        visits = int(np.count_nonzero(is_basic[1:] & ~is_basic[:-1])) + int(is_basic[0])
         if visits > most:
             best = posture
             most = visits
@@ -88,17 +88,17 @@ def segment_motion(
     edge = np.flatnonzero(np.diff(np.concatenate([[False], basic, [False]]).astype(int)))
     runs = list(zip(edge[::2].tolist(), (edge[1::2] - 1).tolist(), strict=True))
     speed = speeds(postures)
-    found: list[MotionSegment] = []
+    segments: list[MotionSegment] = []
     left_at: int | None = None
     for first, last in runs:
         long = (last - first) >= max(1, round(how.glide_s * postures.rate_hz))
         enter, leave = (first, last) if long else ((first + last) // 2,) * 2
         if left_at is not None and bool(postures.found[left_at : enter + 1].all()):
-            found.append(_segment(postures, speed, left_at, enter, how, beat=True))
+            segments.append(_segment(postures, speed, left_at, enter, how, beat=True))
         if long:
-            found.append(_segment(postures, speed, first, last, how, beat=False))
+            segments.append(_segment(postures, speed, first, last, how, beat=False))
         left_at = leave
-    if not found:
+    if not segments:
         closest = float(np.nanmin(np.abs(postures.angles_rad - reference).max(axis=1)))
         raise InputError(
             f"{postures.name}: the basic posture occurs {len(runs)} times, which "
@@ -106,7 +106,7 @@ def segment_motion(
             f"the limit is {np.degrees(how.within_rad):.1f}; raise --within, or use "
             "--reference commonest"
         )
-    return merge(found, how.merge_rad)
+    return merge(segments, how.merge_rad)
 
 
 def merge(segments: list[MotionSegment], merge_rad: float) -> list[MotionSegment]:
@@ -143,11 +143,11 @@ def speeds(postures: Postures) -> Floats:
         base = np.column_stack([base, postures.height])
     out = np.full(postures.frames, np.nan)
     for k in range(postures.frames):
-        at = np.arange(max(0, k - half), min(postures.frames, k + half + 1))
-        at = at[np.isfinite(base[at]).all(axis=1)]
-        if len(at) > 1:
-            time = (at - at.mean()) / postures.rate_hz
-            out[k] = float(np.linalg.norm(time @ base[at] / (time @ time)))
+        window = np.arange(max(0, k - half), min(postures.frames, k + half + 1))
+        window = window[np.isfinite(base[window]).all(axis=1)]
+        if len(window) > 1:
+            time = (window - window.mean()) / postures.rate_hz
+            out[k] = float(np.linalg.norm(time @ base[window] / (time @ time)))
     return out
 
 

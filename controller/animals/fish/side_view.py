@@ -34,16 +34,16 @@ def align(
             nor has a length there.
 
     """
-    here, there = [], []
-    for above, beside in zip(top, side, strict=True):
-        wide = [np.flatnonzero(frame.mask.any(axis=0)) for frame in (above, beside)]
+    top_ends, there = [], []
+    for above, side_frame in zip(top, side, strict=True):
+        wide = [np.flatnonzero(frame.mask.any(axis=0)) for frame in (above, side_frame)]
         if all(len(columns) for columns in wide):
-            here += [wide[0][0], wide[0][-1]]
+            top_ends += [wide[0][0], wide[0][-1]]
             there += [wide[1][0], wide[1][-1]]
-    if len(here) < 4 or np.ptp(here) < 10:
+    if len(top_ends) < 4 or np.ptp(top_ends) < 10:
         raise InputError(f"{name}: the fish is not seen in both views at the same time")
-    scale, offset = np.polyfit(np.array(here, dtype=float), np.array(there, dtype=float), 1)
-    left = np.array(there, dtype=float) - (scale * np.array(here, dtype=float) + offset)
+    scale, offset = np.polyfit(np.array(top_ends, dtype=float), np.array(there, dtype=float), 1)
+    left = np.array(there, dtype=float) - (scale * np.array(top_ends, dtype=float) + offset)
     if not 0.05 < scale < 20.0 or float(np.std(left)) > 0.2 * float(np.ptp(there)):
         raise InputError(
             f"{name}: the two views do not show the same motion along x; are they of one moment, "
@@ -86,10 +86,10 @@ class SideView:
         window = Window(left, top, right - left, bottom - top, scale)
         target = Target(frame, window, 3)
 
-        def value(at: Floats) -> float:
-            if abs(at[1]) > _LIMIT_RAD:
+        def value(tilt: Floats) -> float:
+            if abs(tilt[1]) > _LIMIT_RAD:
                 return float("-inf")
-            return target.value_of_pieces(self.pieces(parameters, at))
+            return target.value_of_pieces(self.pieces(parameters, tilt))
 
         middle = -0.5 * float(rows[0] + rows[-1])
         fresh = [np.array([middle, pitch]) for pitch in (0.0, 0.3, -0.3)]
@@ -101,11 +101,11 @@ class SideView:
             ]
             return max(ends, key=lambda end: end[1])
 
-        found = best(fresh if self.last is None else [self.last])
-        if found[1] < LEAST_VALUE:
-            found = best(fresh)
-        self.last = found[0]
-        return found
+        side_fit = best(fresh if self.last is None else [self.last])
+        if side_fit[1] < LEAST_VALUE:
+            side_fit = best(fresh)
+        self.last = side_fit[0]
+        return side_fit
 
     def pieces(self, parameters: Floats, side: Floats) -> list[Floats]:
         """Convex pieces in pixels of the side view, for a posture and (height, pitch)."""

@@ -102,25 +102,27 @@ def silhouette_frame(
 
     """
     plain = grey(image)
-    found = silhouette_of(plain, background, polarity)
+    silhouette = silhouette_of(plain, background, polarity)
     mask = np.zeros(plain.shape, dtype=bool)
-    if found.area_px > 0.0:
-        left, top = (int(at) for at in found.origin_px)
-        rows, columns = found.level.shape
+    if silhouette.area_px > 0.0:
+        left, top = (int(coordinate) for coordinate in silhouette.origin_px)
+        rows, columns = silhouette.level.shape
         edge = max(4, max(rows, columns) // 4)
         part = (
             slice(max(0, top - edge), top + rows + edge),
             slice(max(0, left - edge), left + columns + edge),
         )
-        apart = cv2.GaussianBlur(contrast(plain[part], background[part], polarity), (3, 3), 0.0)
-        low = max(_THIN * found.threshold, float(np.median(apart)) + _SURE)
-        _, label = cv2.connectedComponents((apart > low).astype(np.uint8), connectivity=8)
+        smooth_contrast = cv2.GaussianBlur(
+            contrast(plain[part], background[part], polarity), (3, 3), 0.0
+        )
+        low = max(_THIN * silhouette.threshold, float(np.median(smooth_contrast)) + _SURE)
+        _, label = cv2.connectedComponents((smooth_contrast > low).astype(np.uint8), connectivity=8)
         core = np.zeros(label.shape, dtype=bool)
-        core[top - part[0].start :, left - part[1].start :][:rows, :columns] = found.mask
+        core[top - part[0].start :, left - part[1].start :][:rows, :columns] = silhouette.mask
         kept = np.unique(label[core])
         mask[part] = np.isin(label, kept[kept > 0])
     return SilhouetteFrame(
-        plain, mask, "" if found.status is FrameStatus.GOOD else str(found.status)
+        plain, mask, "" if silhouette.status is FrameStatus.GOOD else str(silhouette.status)
     )
 
 

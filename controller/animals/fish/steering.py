@@ -48,7 +48,7 @@ def steered(
     pitch = np.zeros(motion.frames)
     samples = round(_SEARCH_S * motion.rate_hz)
     begin = 0
-    at = []
+    frame_indices = []
     turned = 0.0
     for number, (point, guess) in enumerate(zip(points, reached_at, strict=True), 1):
         # each later point needs a later frame
@@ -61,13 +61,13 @@ def steered(
             head[begin : frame + 1] += turn
             pitch[begin : frame + 1] += rise
             turned = max(turned, float(np.abs(turn).max()), float(np.abs(rise).max()))
-        at.append(frame)
+        frame_indices.append(frame)
         begin = frame
     moved = replace(motion, base=place[:, :2], head_rad=head)
     if points.shape[1] == 3 and motion.pitch_rad is not None:
         moved = replace(moved, height=place[:, 2], pitch_rad=motion.pitch_rad + pitch)
-    distance = np.linalg.norm(place[at] - points, axis=1)
-    return Steered(moved, tuple(at), distance, turned)
+    distance = np.linalg.norm(place[frame_indices] - points, axis=1)
+    return Steered(moved, tuple(frame_indices), distance, turned)
 
 
 def _place(motion: Postures, dimensions: int) -> Floats:
@@ -87,9 +87,9 @@ def _bend(place: Floats, begin: int, end: int, missing: Floats) -> tuple[Floats,
     place[begin : end + 1] += grown[:, None] * missing
     place[end + 1 :] += missing
     slope = 30.0 * share**2 * (1.0 - share) ** 2 / max(far[-1], 1e-12)
-    way = np.gradient(before, axis=0) if len(before) > 1 else np.zeros_like(before)
-    pace = np.maximum(np.hypot(way[:, 0], way[:, 1]), 1e-12)
-    old = way[:, :2] / pace[:, None]
+    direction = np.gradient(before, axis=0) if len(before) > 1 else np.zeros_like(before)
+    pace = np.maximum(np.hypot(direction[:, 0], direction[:, 1]), 1e-12)
+    old = direction[:, :2] / pace[:, None]
     new = old + slope[:, None] * missing[:2]
     cross = old[:, 0] * new[:, 1] - old[:, 1] * new[:, 0]
     turn = np.where(pace > 1e-9, np.arctan2(cross, (old * new).sum(axis=1)), 0.0)

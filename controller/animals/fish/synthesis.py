@@ -77,7 +77,7 @@ class _Aim:
     around: Surroundings
     capture: float = 0.0
 
-    def nearest(self, path: Floats, way: Floats, point: int) -> int | None:
+    def nearest(self, path: Floats, travelled: Floats, point: int) -> int | None:
         """Index of the place of a path at which a point is reached; None: not on this path."""
         missing = self.points[point] - path
         off = np.linalg.norm(missing, axis=1)
@@ -85,7 +85,7 @@ class _Aim:
         if len(near) or self.capture <= 0.0:
             return int(near[0]) if len(near) else None
         aside = np.hypot(missing[:, 0], missing[:, 1])
-        reached = (aside <= self.capture) & (off <= STEERED * way)
+        reached = (aside <= self.capture) & (off <= STEERED * travelled)
         near = np.flatnonzero(reached)
         return int(near[np.argmin(off[near])]) if len(near) else None
 
@@ -122,13 +122,13 @@ def _begin(around: Surroundings, dimensions: int) -> _Node:
 def _first_free(pieces: PieceGraph, drawn: list[_Node], crowded: int, aim: _Aim) -> _Node:
     """Return the first sequence that can go on without coming too near; else the best one."""
     ends = []
-    for one in drawn:
-        if one.crowded > crowded:
-            ends.append((one.crowded, -one.clearance))
+    for candidate in drawn:
+        if candidate.crowded > crowded:
+            ends.append((candidate.crowded, -candidate.clearance))
             continue
-        ends.append(_escape(pieces, one, aim))
+        ends.append(_escape(pieces, candidate, aim))
         if ends[-1][0] == crowded:
-            return one
+            return candidate
     return drawn[min(range(len(ends)), key=ends.__getitem__)]
 
 
@@ -137,12 +137,12 @@ def _escape(pieces: PieceGraph, node: _Node, aim: _Aim) -> tuple[int, float]:
     beam = [node]
     for _ in range(_LOOK):
         grown = [
-            _take(pieces, one, k, by_rule, aim)
-            for one in beam
-            for choice, by_rule in [_choice(pieces, one)]
+            _take(pieces, beam_node, k, by_rule, aim)
+            for beam_node in beam
+            for choice, by_rule in [_choice(pieces, beam_node)]
             for k in choice
         ]
-        grown.sort(key=lambda one: (one.crowded, -one.clearance))
+        grown.sort(key=lambda grown_node: (grown_node.crowded, -grown_node.clearance))
         beam = grown[:_LOOK_BEAM]
     return beam[0].crowded, -beam[0].clearance
 
@@ -186,19 +186,19 @@ def sequence_through(
             "above alone; give X,Y, or match the film with --side"
         )
     aim = _Aim(points, radius, around, capture)
-    here = _begin(around, dimensions)
-    while len(here.reached_at) < len(points):
-        if here.samples / pieces.rate_hz > limit_s:
-            point = ",".join(f"{value:g}" for value in points[len(here.reached_at)])
+    begin = _begin(around, dimensions)
+    while len(begin.reached_at) < len(points):
+        if begin.samples / pieces.rate_hz > limit_s:
+            point = ",".join(f"{value:g}" for value in points[len(begin.reached_at)])
             turns = [np.degrees(piece.head_rad[-1]) for piece in pieces.pieces]
             raise InputError(
-                f"control point {len(here.reached_at) + 1} at {point} is not reached within "
+                f"control point {len(begin.reached_at) + 1} at {point} is not reached within "
                 f"{limit_s:g} s: the segments turn from {min(turns):.0f} to {max(turns):.0f} "
                 "degrees; give a larger --radius, other points, or --mirror"
             )
-        here = _ahead(pieces, here, aim, depth)
-    reached_s = tuple(k / pieces.rate_hz for k in here.reached_at)
-    return PieceSequence(here.order, here.forced, reached_s, here.reached_at, here.crowded)
+        begin = _ahead(pieces, begin, aim, depth)
+    reached_s = tuple(k / pieces.rate_hz for k in begin.reached_at)
+    return PieceSequence(begin.order, begin.forced, reached_s, begin.reached_at, begin.crowded)
 
 
 def compose(
@@ -233,7 +233,7 @@ def compose(
     lifted = join(rise, samples) if len(rise) == len(parts) else None
     return Postures(
         base=join(base, samples),
-        head_rad=join([one[:, None] for one in head], samples)[:, 0],
+        head_rad=join([heading[:, None] for heading in head], samples)[:, 0],
         angles_rad=join([part.angles_rad for part in parts], samples),
         joints_at=pieces.joints_at,
         rate_hz=pieces.rate_hz,
@@ -246,15 +246,15 @@ def compose(
 def junctions(pieces: PieceGraph, sequence: PieceSequence) -> list[int]:
     """Frames of the composed motion at which a new piece begins."""
     lengths = [len(pieces.pieces[k].head_rad) - 1 for k in sequence.order]
-    return [int(at) for at in np.cumsum(lengths[:-1])]
+    return [int(junction) for junction in np.cumsum(lengths[:-1])]
 
 
-def _ahead(pieces: PieceGraph, here: _Node, aim: _Aim, depth: int) -> _Node:
+def _ahead(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth: int) -> _Node:
     """Return the first piece of the best sequence found."""
-    reached = len(here.reached_at)
-    beam = [here]
+    reached = len(first_node.reached_at)
+    beam = [first_node]
     best = None
-    first = len(here.order)
+    first = len(first_node.order)
     for level in range(depth):
         grown = [
             _take(pieces, node, k, by_rule, aim)
@@ -272,7 +272,7 @@ def _ahead(pieces: PieceGraph, here: _Node, aim: _Aim, depth: int) -> _Node:
         raise ValueError("depth must be 1 or more")
     if aim.around.any:  # a free sequence of full length shows that the fish can go on
         best = beam[0]
-    node = here
+    node = first_node
     for k in best.order[first : first + 1]:
         node = _take(pieces, node, k, _is_by_rule(pieces, node, k), aim)
     return node
@@ -304,19 +304,19 @@ def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim)
     if len(node.base) == 3 and part.rise is not None:
         path = np.column_stack([path, node.base[2] + part.rise[:, 0]])
     step = np.diff(path[:, :2], axis=0)
-    way = node.way + np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+    travelled = node.way + np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
     reached = node.reached_at
-    at = 1
+    start = 1
     while len(reached) < len(aim.points):
-        found = aim.nearest(path[at:], way[at:], len(reached))
-        if found is None:
+        nearest = aim.nearest(path[start:], travelled[start:], len(reached))
+        if nearest is None:
             break
-        at += found
-        missing = aim.points[len(reached)] - path[at]
+        start += nearest
+        missing = aim.points[len(reached)] - path[start]
         if np.linalg.norm(missing) > aim.radius:  # from here on the motion is steered through it
-            path[at:] += missing
-        reached = (*reached, node.samples + at)
-        way = way - way[at]
+            path[start:] += missing
+        reached = (*reached, node.samples + start)
+        travelled = travelled - travelled[start]
     crowded = False
     clearance = np.inf
     head_rad = node.head_rad + float(part.head_rad[-1])
@@ -334,7 +334,7 @@ def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim)
         samples=node.samples + len(path) - 1,
         forced=node.forced + (not by_rule),
         reached_at=reached,
-        way=float(way[-1]),
+        way=float(travelled[-1]),
         crowded=node.crowded + crowded,
         clearance=clearance,
     )
@@ -393,18 +393,18 @@ def join(pieces: list[Floats], samples: int) -> Floats:
     """
     if not pieces or any(len(piece) < 2 for piece in pieces) or samples < 1:
         raise ValueError("pieces of two or more samples, and a fade of one or more")
-    whole = np.concatenate([pieces[0]] + [piece[1:] for piece in pieces[1:]])
-    at = len(pieces[0]) - 1
+    joined = np.concatenate([pieces[0]] + [piece[1:] for piece in pieces[1:]])
+    index = len(pieces[0]) - 1
     for piece in pieces[1:]:
         # this sample holds the rest of the fade before, which this fade continues
-        step = whole[at] - piece[0]
-        slope = whole[at] - whole[at - 1] - (piece[1] - piece[0])
+        step = joined[index] - piece[0]
+        slope = joined[index] - joined[index - 1] - (piece[1] - piece[0])
         count = len(piece) - 1
-        whole[at + 1 : at + 1 + count] += fading(
+        joined[index + 1 : index + 1 + count] += fading(
             step, slope, float(samples), np.arange(1.0, count + 1.0)
         )
-        at += count
-    return whole
+        index += count
+    return joined
 
 
 def joint_pieces(pieces: PieceGraph, sequence: PieceSequence, retarget: Retarget) -> list[Floats]:

@@ -17,8 +17,8 @@ Point = tuple[float, float] | tuple[float, float, float]
 def _points(points: tuple[Point, ...]) -> tuple[Point, ...]:
     if len({len(point) for point in points}) > 1:
         raise ValueError("give the height of all control points, or of none")
-    for number, (one, other) in enumerate(pairwise(points), 1):
-        if one == other:
+    for number, (before, other) in enumerate(pairwise(points), 1):
+        if before == other:
             raise ValueError(f"control points {number} and {number + 1} are the same; remove one")
     return points
 

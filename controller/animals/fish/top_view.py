@@ -71,20 +71,20 @@ class TopViewFit:
         self._model = model
         self._weight = weight
 
-    def outline(self, at: Floats) -> Floats:
+    def outline(self, parameters: Floats) -> Floats:
         """(n, 2) outline of parameters."""
         model = self._model
-        return model.outline(model.midline(at[:2], float(at[2]), at[3:]))
+        return model.outline(model.midline(parameters[:2], float(parameters[2]), parameters[3:]))
 
-    def picture(self, at: Floats) -> NDArray[np.float32]:
+    def picture(self, parameters: Floats) -> NDArray[np.float32]:
         """Blurred area of parameters."""
-        return self._target.soft(self.outline(at))
+        return self._target.soft(self.outline(parameters))
 
-    def value(self, at: Floats) -> float:
+    def value(self, parameters: Floats) -> float:
         """V of Eq. 3; a folded spine is worth nothing."""
-        if np.abs(at[3:]).max() > _FOLDED_RAD:
+        if np.abs(parameters[3:]).max() > _FOLDED_RAD:
             return float("-inf")
-        return self._target.value(self.outline(at), self._weight)
+        return self._target.value(self.outline(parameters), self._weight)
 
 
 def search(
@@ -130,9 +130,9 @@ def search(
             )
             for start in tried
         ]
-        found = max(ends, key=view.value)
-        best = Match(found, view.value(found))
-        tried = [found]
+        best_end = max(ends, key=view.value)
+        best = Match(best_end, view.value(best_end))
+        tried = [best_end]
         if scale >= 1.0 and blur <= LEVELS[-1][1]:
             break
     return best
@@ -164,37 +164,37 @@ def refine(
     count = len(start)
     size = np.full(count, _NUDGE_RAD)
     size[:2] = _NUDGE_PX * nudge
-    here = np.array(start, dtype=float)
+    point = np.array(start, dtype=float)
     kinks = stiffness * _alternation(len(start))
-    apart = target - picture(here)
-    cost = float(np.vdot(apart, apart)) + float(here @ kinks @ here)
+    difference = target - picture(point)
+    cost = float(np.vdot(difference, difference)) + float(point @ kinks @ point)
     damping = 1e-2
     for _ in range(rounds):
-        slope = np.empty((count, apart.size), dtype=np.float32)
+        slope = np.empty((count, difference.size), dtype=np.float32)
         for k in range(count):
-            step = np.zeros_like(here)
+            step = np.zeros_like(point)
             step[k] = size[k]
-            slope[k] = ((picture(here + step) - picture(here - step)) * 0.5).ravel()
+            slope[k] = ((picture(point + step) - picture(point - step)) * 0.5).ravel()
         units = np.outer(size, size)
         square = np.asarray(slope @ slope.T, dtype=float) + kinks * units
-        pull = np.asarray(slope @ apart.ravel(), dtype=float) - (kinks @ here) * size
+        pull = np.asarray(slope @ difference.ravel(), dtype=float) - (kinks @ point) * size
         gained = 0.0
         for _ in range(4):
-            held = square + damping * np.diag(np.diag(square) + 1e-3 * np.trace(square))
-            step = np.clip(np.linalg.solve(held, pull), -12.0, 12.0) * size
-            away = target - picture(here + step)
-            found = float(np.vdot(away, away)) + float((here + step) @ kinks @ (here + step))
-            if found < cost:
-                gained = cost - found
-                here = here + step
-                apart = away
-                cost = found
+            damped = square + damping * np.diag(np.diag(square) + 1e-3 * np.trace(square))
+            step = np.clip(np.linalg.solve(damped, pull), -12.0, 12.0) * size
+            away = target - picture(point + step)
+            trial_cost = float(np.vdot(away, away)) + float((point + step) @ kinks @ (point + step))
+            if trial_cost < cost:
+                gained = cost - trial_cost
+                point = point + step
+                difference = away
+                cost = trial_cost
                 damping = max(damping / 5.0, 1e-4)
                 break
             damping *= 5.0
         if gained < 1e-3 * cost:
             break
-    return here
+    return point
 
 
 def _alternation(parameters: int) -> Floats:

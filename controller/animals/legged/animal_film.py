@@ -43,28 +43,28 @@ class AnimalBody:
         rig = animal_rig(animal, worn.skin.sized(animal.length_m), config.bands)
         return cls(rig, worn.texture)
 
-    def write(self, made: SynthesisedAnimal, file: Path) -> None:
+    def write(self, animal_motion: SynthesisedAnimal, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
-        bones = animal_bones(made.animal, made.motion)
+        bones = animal_bones(animal_motion.animal, animal_motion.motion)
         with atomic_write(file) as part:
-            write_skin(part, self.rig, bones, self.texture, made.animal.name)
+            write_skin(part, self.rig, bones, self.texture, animal_motion.animal.name)
 
-    def film(self, made: SynthesisedAnimal, prepared: WalkRun, file: Path) -> int:
+    def film(self, animal_motion: SynthesisedAnimal, prepared: WalkRun, file: Path) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
             InputError: the simulator or PyAV is not installed, or nothing draws here.
 
         """
-        way = made.path
-        dots = way.position(np.linspace(0.0, way.length_m, max(2, round(way.length_m / 0.05))))
+        path = animal_motion.path
+        dots = path.position(np.linspace(0.0, path.length_m, max(2, round(path.length_m / 0.05))))
         return film_over(
             prepared,
             file,
-            animal_bones(made.animal, made.motion),
+            animal_bones(animal_motion.animal, animal_motion.motion),
             rig_look(self.rig, self.texture, spine=SEGMENTS),
-            robot=as_long_robot(prepared.robot, _SHOWN * made.animal.length_m),
-            reached_s=made.reached_s(),
+            robot=as_long_robot(prepared.robot, _SHOWN * animal_motion.animal.length_m),
+            reached_s=animal_motion.reached_s(),
             paths=[(0.0, dots)],
-            title=f"{made.animal.name}, {prepared.run.name}",
+            title=f"{animal_motion.animal.name}, {prepared.run.name}",
         )

@@ -54,15 +54,17 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
             starts_m = length_m * np.concatenate([[0.0], np.cumsum(pair.segments)[:-1]])
             rest += [np.array([-start, 0.0, 0.0]) for start in starts_m]
             parent += [_carrier(pair.at), *range(first, first + len(starts_m) - 1)]
-    for one in animal.all_ornaments:
-        thick_m = length_m * one.thick
-        cone = _horn(one, length_m, thick_m)
-        uv = dark if one.dark else _PLAIN_UV
-        if one.swing_rad > 0.0:
-            hang(cone, _carrier(one.at), uv)
+    for ornament in animal.all_ornaments:
+        thick_m = length_m * ornament.thick
+        cone = _horn(ornament, length_m, thick_m)
+        uv = dark if ornament.dark else _PLAIN_UV
+        if ornament.swing_rad > 0.0:
+            hang(cone, _carrier(ornament.at), uv)
         else:
-            root = length_m * np.array(one.root) + [-one.at * length_m, 0.0, skin.axis_m]
-            parts.append(carried_part(cone @ _turned(one).T + root, _AROUND, _carrier(one.at), uv))
+            root = length_m * np.array(ornament.root) + [-ornament.at * length_m, 0.0, skin.axis_m]
+            parts.append(
+                carried_part(cone @ _turned(ornament).T + root, _AROUND, _carrier(ornament.at), uv)
+            )
     return Rig(*_joined(parts), np.array(rest), np.array(parent, dtype=np.int64))
 
 
@@ -85,29 +87,31 @@ def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
             right = -toe_left(pair, frame, 1.0 if k % 2 == 0 else -1.0)
             turns[-1] = _beside(steps_m[:, -1], right)
     steps = 2.0 * TURN * motion.time_s / animal.cycle_s
-    for one in animal.all_ornaments:
-        if one.swing_rad > 0.0:
-            k = _carrier(one.at)
-            x, y, z = one.root
-            off = length_m * np.array([x + k / SEGMENTS - one.at, y, z])
+    for ornament in animal.all_ornaments:
+        if ornament.swing_rad > 0.0:
+            k = _carrier(ornament.at)
+            x, y, z = ornament.root
+            off = length_m * np.array([x + k / SEGMENTS - ornament.at, y, z])
             front.append(front[k] + np.einsum("tij,j->ti", turns[k], off))
-            swing = Rotation.from_euler("y", one.swing_rad * np.sin(steps)[:, None]).as_matrix()
-            turns.append(turns[k] @ swing @ _turned(one))
-            long_m.append(_length_m(one, length_m))
+            swing = Rotation.from_euler(
+                "y", ornament.swing_rad * np.sin(steps)[:, None]
+            ).as_matrix()
+            turns.append(turns[k] @ swing @ _turned(ornament))
+            long_m.append(_length_m(ornament, length_m))
     return BoneMotion(
         motion.time_s, np.stack(front, axis=1), np.stack(turns, axis=1), np.array(long_m)
     )
 
 
-def _length_m(one: OrnamentConfig, body_m: float) -> float:
-    return body_m * float(np.linalg.norm(np.subtract(one.tip, one.root)))
+def _length_m(ornament: OrnamentConfig, body_m: float) -> float:
+    return body_m * float(np.linalg.norm(np.subtract(ornament.tip, ornament.root)))
 
 
-def _turned(one: OrnamentConfig) -> Floats:
+def _turned(ornament: OrnamentConfig) -> Floats:
     """(3, 3) turn of an ornament in the bone that carries it: its -x is from root to tip."""
-    back = np.subtract(one.root, one.tip)[None]
-    beside = np.array([[0.0, 0.0, 1.0] if abs(back[0, 0]) >= abs(back[0, 2]) else [1.0, 0.0, 0.0]])
-    return np.asarray(_facing(back, beside)[0])
+    back = np.subtract(ornament.root, ornament.tip)[None]
+    side = np.array([[0.0, 0.0, 1.0] if abs(back[0, 0]) >= abs(back[0, 2]) else [1.0, 0.0, 0.0]])
+    return np.asarray(_facing(back, side)[0])
 
 
 def _facing(forward: Floats, up: Floats) -> Floats:
@@ -124,16 +128,16 @@ def _beside(forward: Floats, y: Floats) -> Floats:
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
-def _carrier(at: float) -> int:
-    return min(int(at * SEGMENTS), SEGMENTS - 1)
+def _carrier(share: float) -> int:
+    return min(int(share * SEGMENTS), SEGMENTS - 1)
 
 
-def _horn(one: OrnamentConfig, length_m: float, thick_m: float) -> Floats:
+def _horn(ornament: OrnamentConfig, length_m: float, thick_m: float) -> Floats:
     """(V, 3) rings of a cone in its bone, bowed as a parabola, then its two tips."""
-    long_m = _length_m(one, length_m)
-    cone = _tube(long_m, thick_m, _POINT * thick_m, _ROWS if any(one.bow) else 1)
+    long_m = _length_m(ornament, length_m)
+    cone = _tube(long_m, thick_m, _POINT * thick_m, _ROWS if any(ornament.bow) else 1)
     on = np.clip(-cone[:, 0] / long_m, 0.0, 1.0)
-    bow = length_m * np.array(one.bow) @ _turned(one)
+    bow = length_m * np.array(ornament.bow) @ _turned(ornament)
     return np.asarray(cone + 4.0 * (on * (1.0 - on))[:, None] * bow)
 
 
@@ -152,8 +156,10 @@ def _tube(long_m: float, thick_m: float, end_m: float, rows: int) -> Floats:
 
 def _joined(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in parts)])
-    faces: list[Ints] = [mesh.faces + at for (mesh, _), at in zip(parts, starts[:-1], strict=True)]
-    meshes, held = zip(*parts, strict=True)
+    faces: list[Ints] = [
+        mesh.faces + start for (mesh, _), start in zip(parts, starts[:-1], strict=True)
+    ]
+    meshes, part_weights = zip(*parts, strict=True)
     return (
         Mesh(
             vertices=np.concatenate([mesh.vertices for mesh in meshes]),
@@ -162,7 +168,7 @@ def _joined(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:
             faces=np.concatenate(faces),
         ),
         Weights(
-            np.concatenate([one.bones for one in held]),
-            np.concatenate([one.shares for one in held]),
+            np.concatenate([weights.bones for weights in part_weights]),
+            np.concatenate([weights.shares for weights in part_weights]),
         ),
     )

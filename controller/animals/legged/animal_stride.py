@@ -40,7 +40,7 @@ class Names:
             InputError: too few names, or girdles that are not points of the spine.
 
         """
-        parts = [tuple(one.strip() for one in text.split(",")) for text in (spine, girdles, feet)]
+        parts = [tuple(part.strip() for part in text.split(",")) for text in (spine, girdles, feet)]
         names = cls(*parts)
         if len(names.spine) < _FEWEST_POINTS or len(set(names.spine)) < len(names.spine):
             raise InputError(
@@ -72,21 +72,21 @@ class MeasuredAnimal:
 
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
-        found = self.stride
+        measured_stride = self.stride
         animal = self.animal
         return {
             "rate_hz": self.rate_hz,
             "rate_assumed": self.rate_assumed,
-            "cycles": round(found.cycles, 2),
-            "cycle_s": round(found.cycle_s, 4),
-            "stride_body_lengths": round(found.stride, 4),
+            "cycles": round(measured_stride.cycles, 2),
+            "cycle_s": round(measured_stride.cycle_s, 4),
+            "stride_body_lengths": round(measured_stride.stride, 4),
             "speed_m_s": round(animal.speed_m_s, 4),
             "duty": {leg: round(foot.duty, 3) for leg, foot in self._feet()},
             "duty_sd": {leg: _rounded(foot.duty_sd) for leg, foot in self._feet()},
             "comes_down_cycles": {leg: round(foot.down, 3) for leg, foot in self._feet()},
             "fit_rms_body_lengths": {leg: round(foot.residual, 4) for leg, foot in self._feet()},
-            "girdle_turn_rad": [_rounded(turn) for turn in found.turn_rad],
-            "lift_body_lengths": [_rounded(lift) for lift in found.lift],
+            "girdle_turn_rad": [_rounded(turn) for turn in measured_stride.turn_rad],
+            "lift_body_lengths": [_rounded(lift) for lift in measured_stride.lift],
         }
 
     def _feet(self) -> "zip[tuple[str, Foot]]":
@@ -120,21 +120,21 @@ def measure_animal(
     other = read_animal(like)
     if length_m is not None and not (np.isfinite(length_m) and length_m > 0.0):
         raise InputError(f"--length-m {length_m:g}: must be a positive number of metres")
-    order = [_index(keypoints, one) for one in (*names.spine, *names.feet)]
+    order = [_index(keypoints, keypoint) for keypoint in (*names.spine, *names.feet)]
     places = _even(keypoints, keypoints.sure(order))
     rate_hz = KEYPOINT_RATE_HZ if keypoints.rate_hz is None else keypoints.rate_hz
     girdles = names.spine.index(names.girdles[0]), names.spine.index(names.girdles[1])
     count = len(names.spine)
     try:
-        found = measure_stride(places[:, :count], places[:, count:], girdles, rate_hz, view)
+        stride = measure_stride(places[:, :count], places[:, count:], girdles, rate_hz, view)
     except InputError as error:
         raise InputError(f"{keypoints.file}: {error}") from None
     if length_m is None:
         scale_m = keypoints.scale_m
-        length_m = other.length_m if scale_m is None else scale_m * found.length
-    source = f"stride: {keypoints.file.name}, {found.cycles:.1f} cycles; the rest: {other.source}"
-    animal = found.of(other, name, source, length_m)
-    return MeasuredAnimal(found, animal, like, rate_hz, keypoints.rate_hz is None)
+        length_m = other.length_m if scale_m is None else scale_m * stride.length
+    source = f"stride: {keypoints.file.name}, {stride.cycles:.1f} cycles; the rest: {other.source}"
+    animal = stride.of(other, name, source, length_m)
+    return MeasuredAnimal(stride, animal, like, rate_hz, keypoints.rate_hz is None)
 
 
 def _index(keypoints: Keypoints, name: str) -> int:
@@ -148,10 +148,10 @@ def _even(keypoints: Keypoints, places: Floats) -> Floats:
     """Places of every frame from the first to the last, NaN where the file has none."""
     if keypoints.frame is None:
         return places
-    at = keypoints.frame - keypoints.frame[0]
-    whole = np.full((int(at[-1]) + 1, *places.shape[1:]), np.nan)
-    whole[at] = places
-    return whole
+    index = keypoints.frame - keypoints.frame[0]
+    even_places = np.full((int(index[-1]) + 1, *places.shape[1:]), np.nan)
+    even_places[index] = places
+    return even_places
 
 
 def _rounded(value: float) -> float | None:

@@ -37,16 +37,16 @@ class SynthesisedAnimal:
 
     def reached_s(self) -> list[float]:
         """When the middle of the trunk came within the radius of each waypoint."""
-        at = 0
+        start = 0
         middle = self.middle_m
-        found = []
+        times_s = []
         for point in self.waypoints_m:
-            near = np.hypot(*(middle[at:] - point).T) <= self.waypoint_radius_m
+            near = np.hypot(*(middle[start:] - point).T) <= self.waypoint_radius_m
             if not near.any():
                 break
-            at += int(np.argmax(near))
-            found.append(float(self.motion.time_s[at]))
-        return found
+            start += int(np.argmax(near))
+            times_s.append(float(self.motion.time_s[start]))
+        return times_s
 
     @property
     def middle_m(self) -> Floats:
@@ -71,8 +71,8 @@ class SynthesisedAnimal:
         """Largest distance between the places where a foot came down and where it left."""
         foot = self.motion.foot_m
         on = self.motion.on_ground
-        way = np.linalg.norm(np.diff(foot, axis=0), axis=-1) * (on[1:] & on[:-1])
-        total = np.concatenate([np.zeros((1, way.shape[1])), np.cumsum(way, axis=0)])
+        moved_m = np.linalg.norm(np.diff(foot, axis=0), axis=-1) * (on[1:] & on[:-1])
+        total = np.concatenate([np.zeros((1, moved_m.shape[1])), np.cumsum(moved_m, axis=0)])
         begun = np.maximum.accumulate(np.where(on, 0.0, total), axis=0)
         return float((total - begun)[on].max(initial=0.0))
 
@@ -149,8 +149,8 @@ def read_animal(name: str) -> AnimalConfig:
     file = locate("animals", name)
     animal = load(file, AnimalConfig)
     if animal.skin.endswith(".toml"):
-        beside = str(locate("skins", animal.skin, file.parent))
-        return animal.model_copy(update={"skin": beside})
+        folder = str(locate("skins", animal.skin, file.parent))
+        return animal.model_copy(update={"skin": folder})
     return animal
 
 
@@ -173,12 +173,12 @@ def synthesise_animal(
         front, hind = (pair.at for pair in animal.leg_pairs)
         way_m = path.length_m + 0.5 * animal.length_m * (front + hind)
         frames = 1 + int(np.ceil(min(way_m / animal.speed_m_s, run.time_limit_s) * rate_hz))
-    made = prototype(animal, np.arange(frames) / rate_hz)
-    motion = transformed(made, animal, path, prepared.ground)
+    animal_prototype = prototype(animal, np.arange(frames) / rate_hz)
+    motion = transformed(animal_prototype, animal, path, prepared.ground)
     off = np.flatnonzero(~prepared.on_map(motion.spine_m[:, 0, :2]))
     if len(off) and not to_end:
-        made = prototype(animal, np.arange(max(2, int(off[0]) + 1)) / rate_hz)
-        motion = transformed(made, animal, path, prepared.ground)
+        animal_prototype = prototype(animal, np.arange(max(2, int(off[0]) + 1)) / rate_hz)
+        motion = transformed(animal_prototype, animal, path, prepared.ground)
     return SynthesisedAnimal(
         animal,
         motion,

@@ -40,18 +40,18 @@ class Contact:
     """RMS of the fit."""
 
 
-def step(at: Floats, stride: float, duty: Floats | float, shape: tuple[float, float]) -> Floats:
+def step(phase: Floats, stride: float, duty: Floats | float, shape: tuple[float, float]) -> Floats:
     """Way of a foot (...) over the trunk, 0 in the middle of its contact.
 
     Args:
-        at: (...) cycles since it came down, 0 to 1.
+        phase: (...) cycles since it came down, 0 to 1.
         stride: way of the trunk in a cycle.
         duty: (...) share of the cycle on the ground.
         shape: p and q of the way in the air.
 
     """
-    air = np.clip((at - duty) / (1.0 - duty), 0.0, 1.0)
-    return np.asarray(stride * (betainc(*shape, air) + 0.5 * duty - at))
+    air = np.clip((phase - duty) / (1.0 - duty), 0.0, 1.0)
+    return np.asarray(stride * (betainc(*shape, air) + 0.5 * duty - phase))
 
 
 def fit_contacts(
@@ -65,7 +65,9 @@ def fit_contacts(
         stride: way of the trunk in a cycle, same unit.
 
     """
-    starts = [_start(phase, way, stride) for phase, way in zip(phases, ahead, strict=True)]
+    starts = [
+        _start(phase, foot_ahead, stride) for phase, foot_ahead in zip(phases, ahead, strict=True)
+    ]
     noise = max(float(np.median([start[3] for start in starts])), 1e-9 * stride)
     count = len(starts)
 
@@ -81,7 +83,7 @@ def fit_contacts(
     low, high = np.log(_SHAPE_LIMITS)
     duties = [start[0] for start in starts]
     downs = [start[1] for start in starts]
-    found = least_squares(
+    fit = least_squares(
         left,
         np.array([*duties, *downs, shape0, shape0]),
         bounds=(
@@ -90,11 +92,11 @@ def fit_contacts(
         ),
         x_scale=[*[0.05] * (2 * count), 0.3, 0.3],
     ).x
-    shape = float(np.exp(found[-2])), float(np.exp(found[-1]))
+    shape = float(np.exp(fit[-2])), float(np.exp(fit[-1]))
     contacts = []
     for k in range(count):
-        duty = float(found[k])
-        down = float(found[count + k]) % 1.0
+        duty = float(fit[k])
+        down = float(fit[count + k]) % 1.0
         rest = ahead[k] - step((phases[k] - down) % 1.0, stride, duty, shape)
         contacts.append(Contact(duty, down, float(rest.mean()), float(rest.std())))
     return contacts, shape

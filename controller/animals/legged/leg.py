@@ -118,9 +118,9 @@ def triangle_m(
     A leg that is too short is stretched towards its end; one that cannot fold enough is folded.
 
     """
-    way = end_m - root_m
-    far = np.linalg.norm(way, axis=-1)
-    down = way / np.maximum(far, 1e-12)[:, None]
+    direction = end_m - root_m
+    far = np.linalg.norm(direction, axis=-1)
+    down = direction / np.maximum(far, 1e-12)[:, None]
     out = towards - (towards * down).sum(axis=-1, keepdims=True) * down
     out /= np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-12)
     rigid = np.sum([*first, *third], axis=0)
@@ -131,8 +131,8 @@ def triangle_m(
     segments = [turn * part for part in first]
     segments += [reach - turn * rigid, *(turn * part for part in third)]
     joints = [root_m]
-    at = np.zeros_like(rigid)
+    corner = np.zeros_like(rigid)
     for segment in segments:
-        at = at + segment
-        joints.append(root_m + at.real[:, None] * down + at.imag[:, None] * out)
+        corner = corner + segment
+        joints.append(root_m + corner.real[:, None] * down + corner.imag[:, None] * out)
     return joints

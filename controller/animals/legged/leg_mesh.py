@@ -68,8 +68,8 @@ def leg_parts(
 def carried_part(corners: Floats, around: int, bone: int, uv: Uv) -> Part:
     """Return rings of a tube (V, 3), then its two tips, as a part of one bone."""
     shares = np.tile([0.0, 1.0, 0.0], (len(corners), 1))
-    held = Weights(np.full((len(corners), 3), bone, dtype=np.int64), shares)
-    return _mesh(corners, around, uv), held
+    weights = Weights(np.full((len(corners), 3), bone, dtype=np.int64), shares)
+    return _mesh(corners, around, uv), weights
 
 
 def _mesh(corners: Floats, around: int, uv: Uv) -> Mesh:
@@ -129,10 +129,10 @@ def _tube(
     top = [_CAP * wide_m[0], 0.0, 0.0]
     end = [rings[-1] - 0.6 * wide[-1], 0.0, 0.0]
     corners = np.vstack([corners, top, end])
-    held = [np.repeat(np.concatenate(parts), AROUND, axis=0) for parts in (bones, shares)]
+    columns = [np.repeat(np.concatenate(parts), AROUND, axis=0) for parts in (bones, shares)]
     ends = np.array([[0, 0, min(1, last)], [max(last - 1, 0), last, last]])
     plain = np.tile([0.0, 1.0, 0.0], (2, 1))
-    carried = Weights(np.vstack([held[0], ends]) + first, np.vstack([held[1], plain]))
+    carried = Weights(np.vstack([columns[0], ends]) + first, np.vstack([columns[1], plain]))
     return _mesh(corners, AROUND, uv), carried
 
 
@@ -169,7 +169,7 @@ def _hoof(pair: LegPairConfig, length_m: float, _side: float) -> list[tuple[Floa
     half = 0.62 * length_m * thin
     turn = np.arange(AROUND) * TURN / AROUND
     along, across = 0.5 + 0.5 * np.cos(turn), np.sin(turn)
-    found = []
+    tubes = []
     for side in (-1.0, 1.0):
         rings = []
         # height, length and width over those of the sole, and how far behind the toe's tip
@@ -182,27 +182,27 @@ def _hoof(pair: LegPairConfig, length_m: float, _side: float) -> list[tuple[Floa
             left = half * (wide * across + 1.08 * side)
             rings.append(np.stack([ahead, left, np.full(AROUND, up * high)], axis=-1))
         middle = [ring.mean(axis=0) for ring in (rings[0], rings[-1])]
-        found.append((np.vstack([*rings, *middle]), AROUND))
-    return found
+        tubes.append((np.vstack([*rings, *middle]), AROUND))
+    return tubes
 
 
 def _toes(pair: LegPairConfig, length_m: float, side: float) -> list[tuple[Floats, int]]:
     """Five toes that spread from the end of the sole, and end on the ground."""
     thin = length_m * (0.5 * pair.thick if pair.thin is None else pair.thin)
     around = AROUND // 2
-    found = []
+    tubes = []
     turn = np.arange(around) * TURN / around
     for share, out_deg in _TOES:
         out = side * np.radians(out_deg)
         ahead = np.array([np.cos(out), np.sin(out), 0.0])
-        beside = np.array([-np.sin(out), np.cos(out), 0.0])
+        sideways = np.array([-np.sin(out), np.cos(out), 0.0])
         rings = []
         middles = []
         for on, radius in ((0.0, 0.5), (0.35, 0.42), (0.7, 0.34), (1.0, 0.14)):
-            at = share * length_m * pair.toe * on * ahead
-            at[2] += thin * (0.25 * np.sin(np.pi * on) - (1.0 - radius) * on**0.5)
-            round_ = np.outer(np.cos(turn), beside) + np.outer(np.sin(turn), [0.0, 0.0, 1.0])
-            rings.append(at + radius * thin * round_)
-            middles.append(at)
-        found.append((np.vstack([*rings, middles[0], middles[-1]]), around))
-    return found
+            point = share * length_m * pair.toe * on * ahead
+            point[2] += thin * (0.25 * np.sin(np.pi * on) - (1.0 - radius) * on**0.5)
+            round_ = np.outer(np.cos(turn), sideways) + np.outer(np.sin(turn), [0.0, 0.0, 1.0])
+            rings.append(point + radius * thin * round_)
+            middles.append(point)
+        tubes.append((np.vstack([*rings, middles[0], middles[-1]]), around))
+    return tubes

@@ -78,28 +78,28 @@ class PathNormals:
 
         """
         s = points[..., 0]
-        beside = points[..., 1]
+        offset_m = points[..., 1]
         on = np.clip(s, 0.0, self.length_m)
         slope = self._slope(on)
         bend = self._bend(on)
         speed = np.hypot(slope[..., 0], slope[..., 1])
         forward = slope / speed[..., None]
         curvature = (slope[..., 0] * bend[..., 1] - slope[..., 1] * bend[..., 0]) / speed**3
-        inside = (on == s) & (beside * curvature >= 1.0)
+        inside = (on == s) & (offset_m * curvature >= 1.0)
         if inside.any():
-            worst = int(np.argmax(np.where(inside, beside * curvature, 0.0)))
+            worst = int(np.argmax(np.where(inside, offset_m * curvature, 0.0)))
             raise InputError(
                 f"path: its radius is {1.0 / abs(curvature.ravel()[worst]):.3f} m after "
-                f"{on.ravel()[worst]:.2f} m, and a foot is {abs(beside.ravel()[worst]):.3f} m "
+                f"{on.ravel()[worst]:.2f} m, and a foot is {abs(offset_m.ravel()[worst]):.3f} m "
                 "to the side; choose a smaller animal (length_m), or move the waypoints"
             )
         left = np.stack([-forward[..., 1], forward[..., 0]], axis=-1)
-        plan = self._curve(on) + (s - on)[..., None] * forward + beside[..., None] * left
+        plan = self._curve(on) + (s - on)[..., None] * forward + offset_m[..., None] * left
         return np.concatenate([plan, points[..., 2:]], axis=-1)
 
 
 def transformed(
-    made: Prototype, animal: AnimalConfig, path: SplinePath, ground: HeightField | None
+    animal_prototype: Prototype, animal: AnimalConfig, path: SplinePath, ground: HeightField | None
 ) -> AnimalMotion:
     """Bend a prototype along a path and stand it on the ground; None is a level floor.
 
@@ -108,7 +108,10 @@ def transformed(
 
     """
     normals = PathNormals(path)
-    spine, hip, foot = (normals.bent(p) for p in (made.spine_m, made.hip_m, made.foot_m))
+    spine, hip, foot = (
+        normals.bent(p)
+        for p in (animal_prototype.spine_m, animal_prototype.hip_m, animal_prototype.foot_m)
+    )
     foot[..., 2] += _elevation_m(ground, foot)
     below = np.concatenate([spine[..., :2], foot[..., :2]], axis=1)
     middle, height_m, up = local_planes(below, _elevation_m(ground, below))
@@ -129,7 +132,7 @@ def transformed(
             animal.length_m,
             hip[:, k],
             foot[:, k] + animal.leg_pairs[k // 2].sole_height * animal.length_m * up,
-            made.air[:, k],
+            animal_prototype.air[:, k],
             frame,
             1.0 if k % 2 == 0 else -1.0,
         )
@@ -137,7 +140,9 @@ def transformed(
     )
     joints = front_left, front_right, hind_left, hind_right
     sole_m = animal.length_m * np.repeat([pair.sole_height for pair in animal.leg_pairs], 2)
-    return AnimalMotion(made.time_s, spine, joints, foot, sole_m, up, made.on_ground)
+    return AnimalMotion(
+        animal_prototype.time_s, spine, joints, foot, sole_m, up, animal_prototype.on_ground
+    )
 
 
 def local_planes(plan_m: Floats, height_m: Floats) -> tuple[Floats, Floats, Floats]:

@@ -53,14 +53,16 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     contact = []
     air = []
     high = []
-    for pair, at in zip(animal.leg_pairs, phase, strict=True):
-        ahead, rise, on = footfall(animal, pair, at)
-        high.append(_ride(animal, pair, ahead, at))
-        air.append(np.where(on, 0.0, np.clip((at - pair.duty) / (1.0 - pair.duty), 0.0, 1.0)))
+    for pair, pair_phase in zip(animal.leg_pairs, phase, strict=True):
+        ahead, rise, on = footfall(animal, pair, pair_phase)
+        high.append(_ride(animal, pair, ahead, pair_phase))
+        air.append(
+            np.where(on, 0.0, np.clip((pair_phase - pair.duty) / (1.0 - pair.duty), 0.0, 1.0))
+        )
         if animal.feet == "gc-printed":
             ahead, rise, on = printed_feet(animal, pair, cycles)
         place = length_m * (pair.foot_ahead - pair.at) + animal.speed_m_s * time_s
-        side = np.broadcast_to(_SIDES * pair.foot_side * length_m, at.shape)
+        side = np.broadcast_to(_SIDES * pair.foot_side * length_m, pair_phase.shape)
         foot.append(np.stack([place[:, None] + ahead, side, rise], axis=-1))
         contact.append(on)
     spine = _spine_m(animal, time_s, np.stack(high, axis=1))
@@ -79,13 +81,15 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     )
 
 
-def footfall(animal: AnimalConfig, pair: LegPairConfig, at: Floats) -> tuple[Floats, Floats, Bools]:
+def footfall(
+    animal: AnimalConfig, pair: LegPairConfig, phase: Floats
+) -> tuple[Floats, Floats, Bools]:
     """Feet ahead of the middle of their steps (...), above the ground (...), and on it (...).
 
-    ``at`` (...) are cycles since the foot came down, 0 to 1.
+    ``phase`` (...) are cycles since the foot came down, 0 to 1.
     """
-    ahead_m = 0.5 * animal.stride * animal.length_m * pair.duty * swing(at, pair.duty)
-    return ahead_m, animal.length_m * pair.lift * lift(at, pair.duty), at < pair.duty
+    ahead_m = 0.5 * animal.stride * animal.length_m * pair.duty * swing(phase, pair.duty)
+    return ahead_m, animal.length_m * pair.lift * lift(phase, pair.duty), phase < pair.duty
 
 
 def printed_feet(
@@ -131,21 +135,21 @@ def _since_down(pair: LegPairConfig, cycles: Floats) -> Floats:
     return (cycles[:, None] - [pair.left, pair.right]) % 1.0
 
 
-def spine_shares(at: tuple[float, float], along: Floats) -> Floats:
+def spine_shares(girdle_places: tuple[float, float], along: Floats) -> Floats:
     """(S, 2) of the front and the hind girdle's turn in the headings of segments between places.
 
     Args:
-        at: places of the girdles along the body.
+        girdle_places: places of the girdles along the body.
         along: (S + 1,) of the segments' ends.
 
     """
     fine = along[:-1, None] + np.diff(along)[:, None] * (np.arange(8) + 0.5) / 8.0
-    return np.asarray(_girdle_shares(at, fine).mean(axis=1))
+    return np.asarray(_girdle_shares(girdle_places, fine).mean(axis=1))
 
 
-def _girdle_shares(at: tuple[float, float], along: Floats) -> Floats:
+def _girdle_shares(girdle_places: tuple[float, float], along: Floats) -> Floats:
     """(..., 2) of the girdles' turns in the heading of the spine at places (...)."""
-    front, hind = at
+    front, hind = girdle_places
     share = 0.5 * (1.0 - np.cos(np.pi * np.clip((along - front) / (hind - front), 0.0, 1.0)))
     beyond = np.maximum(front - along, 0.0) + np.maximum(along - hind, 0.0)
     fades = np.exp(-beyond / _STRAIGHTENS)
@@ -170,22 +174,24 @@ def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
     return np.asarray(turned @ _girdle_shares((front.at, hind.at), along).T + swung)
 
 
-def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, at: Floats) -> Floats:
+def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, phase: Floats) -> Floats:
     """(T,) height of the body over a pair: that of the feet that bear it, by vault.
 
     A foot that comes down or leaves supports little. When one foot replaces the other, both are
     equally far from the hip, so the height has no step.
     """
     height_m = animal.height * animal.length_m
-    bears = np.where(at < pair.duty, np.sin(np.pi * np.clip(at / pair.duty, 0.0, 1.0)) + 1e-9, 0.0)
+    bears = np.where(
+        phase < pair.duty, np.sin(np.pi * np.clip(phase / pair.duty, 0.0, 1.0)) + 1e-9, 0.0
+    )
     fall = np.sqrt(np.maximum(height_m**2 - ahead_m**2, 0.0)) - height_m
     total = bears.sum(axis=1)
     share = np.divide(bears, total[:, None], where=total[:, None] > 0.0, out=np.zeros_like(bears))
     return np.asarray(height_m + animal.vault * (share * fall).sum(axis=1))
 
 
-def _between(points: Floats, along: Floats, at: float) -> Floats:
+def _between(points: Floats, along: Floats, place: float) -> Floats:
     """(T, D) of points (T, S + 1, D) at a place along the body."""
-    k = min(int(np.searchsorted(along, at, side="right")) - 1, len(along) - 2)
-    share = (at - along[k]) / (along[k + 1] - along[k])
+    k = min(int(np.searchsorted(along, place, side="right")) - 1, len(along) - 2)
+    share = (place - along[k]) / (along[k + 1] - along[k])
     return np.asarray(points[:, k] + share * (points[:, k + 1] - points[:, k]))

@@ -147,43 +147,45 @@ def measure_stride(
     trunk = 0.5 * (spine[:, front] + spine[:, hind])
     middle = _smoothed(trunk, window)
     inner = slice(window // 2, len(spine) - window // 2)  # the mean over a cycle is whole there
-    way = np.hypot(*np.diff(middle[inner], axis=0).T).sum()
+    travelled = np.hypot(*np.diff(middle[inner], axis=0).T).sum()
     seconds = (len(middle[inner]) - 1) / rate_hz
-    stride = float(way / seconds / frequency_hz)
+    stride = float(travelled / seconds / frequency_hz)
     if stride < 0.05:
         raise InputError(f"{stride:.3f} body lengths a cycle: the animal does not walk")
     travel = _unit(_smoothed(np.gradient(middle, axis=0), 3))
-    beside = feet - middle[:, None]
+    from_middle = feet - middle[:, None]
     # a foot on the ground is still: relative to the smoothed trunk it goes evenly
-    ahead = _over(beside, travel) - np.nanmean(_over(girdle - middle[:, None], travel), axis=0)
-    side = travel[:, None, 0] * beside[..., 1] - travel[:, None, 1] * beside[..., 0]
+    ahead = _over(from_middle, travel) - np.nanmean(_over(girdle - middle[:, None], travel), axis=0)
+    side = travel[:, None, 0] * from_middle[..., 1] - travel[:, None, 1] * from_middle[..., 0]
     side = np.full_like(side, np.nan) if from_side else side
     phase = time_s * frequency_hz
     fitted, shape = _fitted(phase, ahead, stride)
     first = fitted[0].down
-    found = []
-    for k, one in enumerate(fitted):
-        on = (phase - one.down) % 1.0 < one.duty
-        spread = _spread(phase, ahead[:, k], stride, one, shape)
+    measured_feet = []
+    for k, foot_fit in enumerate(fitted):
+        on = (phase - foot_fit.down) % 1.0 < foot_fit.duty
+        spread = _spread(phase, ahead[:, k], stride, foot_fit, shape)
         aside = float(np.abs(_median(side[on, k])))
-        down = (one.down - first) % 1.0
-        long = stride * one.duty
-        found.append(Foot(one.duty, spread, down, long, one.ahead, aside, one.residual))
-    at = float(places[front]), float(places[hind])
+        down = (foot_fit.down - first) % 1.0
+        long = stride * foot_fit.duty
+        measured_feet.append(
+            Foot(foot_fit.duty, spread, down, long, foot_fit.ahead, aside, foot_fit.residual)
+        )
+    girdle_places = float(places[front]), float(places[hind])
     turned = (float("nan"), float("nan"))
     lifts = (float("nan"), float("nan"))
     if from_side:
         lifts = _lifts(fitted, phase, height)
     else:
-        turned = _turns(spine, travel, phase, places, at)
+        turned = _turns(spine, travel, phase, places, girdle_places)
     return Stride(
         1.0 / frequency_hz,
         float(cycles),
         stride,
         length,
-        at,
+        girdle_places,
         turned,
-        (found[0], found[1], found[2], found[3]),
+        (measured_feet[0], measured_feet[1], measured_feet[2], measured_feet[3]),
         phase - first,
         ahead,
         shape,
@@ -195,55 +197,61 @@ def _fitted(
     phase: Floats, ahead: Floats, stride: float
 ) -> tuple[list[Contact], tuple[float, float]]:
     """Contacts of feet (T, 4), NaN where not seen, and the shape of their ways in the air."""
-    seen = np.isfinite(ahead)
-    fewest = int(seen.sum(axis=0).min())
+    is_visible = np.isfinite(ahead)
+    fewest = int(is_visible.sum(axis=0).min())
     if fewest < _FEWEST_FRAMES:
         raise InputError(f"a foot is seen in {fewest} frames; expected six or more")
-    each = range(ahead.shape[1])
+    feet_indices = range(ahead.shape[1])
     return fit_contacts(
-        [phase[seen[:, k]] for k in each], [ahead[seen[:, k], k] for k in each], stride
+        [phase[is_visible[:, k]] for k in feet_indices],
+        [ahead[is_visible[:, k], k] for k in feet_indices],
+        stride,
     )
 
 
 def _median(values: Floats) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.median(known)) if len(known) else float("nan")
+    finite_values = values[np.isfinite(values)]
+    return float(np.median(finite_values)) if len(finite_values) else float("nan")
 
 
 def _lifts(fitted: list[Contact], phase: Floats, height: Floats) -> tuple[float, float]:
     """Heights of a step of the front and the hind feet, from heights (T, 4)."""
-    found = []
-    for k, one in enumerate(fitted):
-        seen = np.isfinite(height[:, k])
-        rise = lift((phase[seen] - one.down) % 1.0, one.duty)
+    lifts_m = []
+    for k, foot_fit in enumerate(fitted):
+        is_visible = np.isfinite(height[:, k])
+        rise = lift((phase[is_visible] - foot_fit.down) % 1.0, foot_fit.duty)
         basis = np.stack([np.ones_like(rise), rise], axis=-1)
-        found.append(float(np.linalg.lstsq(basis, height[seen, k], rcond=None)[0][1]))
-    front = 0.5 * (found[0] + found[1])
-    hind = 0.5 * (found[2] + found[3])
+        lifts_m.append(float(np.linalg.lstsq(basis, height[is_visible, k], rcond=None)[0][1]))
+    front = 0.5 * (lifts_m[0] + lifts_m[1])
+    hind = 0.5 * (lifts_m[2] + lifts_m[3])
     return max(front, 0.0), max(hind, 0.0)
 
 
 def model_ahead(stride: Stride, foot: int, phase: Floats) -> Floats:
     """Fitted way of a foot ahead of its girdle, body lengths, at cycles after the first foot."""
-    one = stride.feet[foot]
-    return one.ahead + step((phase - one.down) % 1.0, stride.stride, one.duty, stride.shape)
+    foot_fit = stride.feet[foot]
+    return foot_fit.ahead + step(
+        (phase - foot_fit.down) % 1.0, stride.stride, foot_fit.duty, stride.shape
+    )
 
 
 def _bridged(points: Floats, time_s: Floats) -> Floats:
     """Points (T, P, 2); missing ones are interpolated in time."""
     filled = np.array(points, float)
     for k in range(filled.shape[1]):
-        seen = np.isfinite(filled[:, k]).all(axis=1)
-        if seen.sum() < 2:
-            raise InputError(f"point {k + 1} of the spine is seen in {int(seen.sum())} frames")
+        is_visible = np.isfinite(filled[:, k]).all(axis=1)
+        if is_visible.sum() < 2:
+            raise InputError(
+                f"point {k + 1} of the spine is seen in {int(is_visible.sum())} frames"
+            )
         for axis in range(2):
-            filled[:, k, axis] = np.interp(time_s, time_s[seen], filled[seen, k, axis])
+            filled[:, k, axis] = np.interp(time_s, time_s[is_visible], filled[is_visible, k, axis])
     return filled
 
 
 def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
     """Frequency of the feet: that of the wave that explains most of their ways."""
-    seen = np.isfinite(ahead)
+    is_visible = np.isfinite(ahead)
     time_s = np.arange(len(ahead)) / rate_hz
 
     def unexplained(frequency_hz: float) -> float:
@@ -251,7 +259,7 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
         basis = np.stack([np.ones_like(turn), time_s, np.cos(turn), np.sin(turn)], axis=-1)
         left = 0.0
         for k in range(4):
-            on = seen[:, k]
+            on = is_visible[:, k]
             rest = (
                 ahead[on, k] - basis[on] @ np.linalg.lstsq(basis[on], ahead[on, k], rcond=None)[0]
             )
@@ -272,31 +280,33 @@ def _spread(
     phase: Floats, ahead: Floats, stride: float, like: Contact, shape: tuple[float, float]
 ) -> float:
     """Standard deviation of the duty of single cycles, each from touch-down."""
-    each = []
+    duties = []
     for cycle in range(int(np.ceil(phase[0] - like.down)), int(np.floor(phase[-1] - like.down))):
-        one = (phase - like.down >= cycle) & (phase - like.down < cycle + 1) & np.isfinite(ahead)
-        if one.sum() >= _FEWEST_FRAMES:
-            each.append(duty_of_cycle(phase[one], ahead[one], stride, like, shape))
-    return float(np.std(each, ddof=1)) if len(each) > 2 else float("nan")
+        is_cycle = (
+            (phase - like.down >= cycle) & (phase - like.down < cycle + 1) & np.isfinite(ahead)
+        )
+        if is_cycle.sum() >= _FEWEST_FRAMES:
+            duties.append(duty_of_cycle(phase[is_cycle], ahead[is_cycle], stride, like, shape))
+    return float(np.std(duties, ddof=1)) if len(duties) > 2 else float("nan")
 
 
 def _turns(
-    spine: Floats, travel: Floats, phase: Floats, places: Floats, at: tuple[float, float]
+    spine: Floats, travel: Floats, phase: Floats, places: Floats, girdle_places: tuple[float, float]
 ) -> tuple[float, float]:
     """Turn of each girdle to either side, from the headings of the spine's segments."""
     step = spine[:, :-1] - spine[:, 1:]
     cross = travel[:, None, 0] * step[..., 1] - travel[:, None, 1] * step[..., 0]
     heading = np.arctan2(cross, _over(step, travel))
     wave = np.exp(-1j * TURN * phase)
-    whole = _whole(phase)
-    amplitude = 2.0 * (heading[whole] * wave[whole, None]).mean(axis=0)
+    complete_cycles = _whole(phase)
+    amplitude = 2.0 * (heading[complete_cycles] * wave[complete_cycles, None]).mean(axis=0)
     # the tail swings more than the hind girdle moves it: its segments do not show the girdle
-    ahead_of_tail = places[1:] <= at[1] + 1e-9
-    shares = spine_shares(at, places)[ahead_of_tail]
+    ahead_of_tail = places[1:] <= girdle_places[1] + 1e-9
+    shares = spine_shares(girdle_places, places)[ahead_of_tail]
     if len(shares) < 2:
         raise InputError("expected two segments of the spine or more ahead of the hind legs")
-    found = np.linalg.lstsq(shares.astype(complex), amplitude[ahead_of_tail], rcond=None)[0]
-    return float(abs(found[0])), float(abs(found[1]))
+    solution = np.linalg.lstsq(shares.astype(complex), amplitude[ahead_of_tail], rcond=None)[0]
+    return float(abs(solution[0])), float(abs(solution[1]))
 
 
 def _whole(phase: Floats) -> Bools:

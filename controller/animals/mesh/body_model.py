@@ -80,22 +80,22 @@ def read_silhouettes(file: Path) -> Silhouettes:
 
     """
     try:
-        held, _ = read_arrays(file)
+        arrays, _ = read_arrays(file)
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except (ValueError, OSError):
         raise InputError(f"{file}: a body is made of an .npz with skeletons and widths") from None
-    if "width" in held and held["width"].dtype.kind == "f":
-        held.setdefault("radius_px", 0.5 * held["width"])
+    if "width" in arrays and arrays["width"].dtype.kind == "f":
+        arrays.setdefault("radius_px", 0.5 * arrays["width"])
     for where, how in _PAIRS:
-        if where in held and how in held:
-            points = held[where].astype(float)
-            radius = held[how].astype(float)
+        if where in arrays and how in arrays:
+            points = arrays[where].astype(float)
+            radius = arrays[how].astype(float)
             break
     else:
         raise InputError(
             f"{file}: expected points_px and radius_px, points and radius_m, or skeletons and "
-            f"width; found {', '.join(sorted(held))}"
+            f"width; found {', '.join(sorted(arrays))}"
         )
     if points.ndim != 3 or points.shape[-1] != 2 or points.shape[1] < 4:
         raise InputError(f"{file}: {where} must be (frames, 4 or more, 2), not {points.shape}")
@@ -105,7 +105,7 @@ def read_silhouettes(file: Path) -> Silhouettes:
         radius = 0.5 * (ends[..., 1:] + ends[..., :-1])
     if radius.shape not in ((count,), points.shape[:2]):
         raise InputError(f"{file}: {how} {radius.shape} does not fit {where} {points.shape}")
-    length = held.get("length_m", np.array(np.nan))
+    length = arrays.get("length_m", np.array(np.nan))
     length_m = float(length) if length.size == 1 and np.isfinite(length) else None
     return Silhouettes(
         points, np.broadcast_to(radius, points.shape[:2]), length_m, where != "points"
@@ -135,15 +135,16 @@ def body_model(
 
 def _median_radius(body: Silhouettes) -> Floats:
     """(101,) radii over the body's length."""
-    whole = np.isfinite(body.points).all(axis=(1, 2)) & np.isfinite(body.radius).all(axis=1)
-    if not whole.any():
+    is_complete = np.isfinite(body.points).all(axis=(1, 2)) & np.isfinite(body.radius).all(axis=1)
+    if not is_complete.any():
         raise InputError("body: no frame holds a whole skeleton with its widths")
-    chord = np.hypot(*np.diff(body.points[whole], axis=1).transpose(2, 0, 1))
+    chord = np.hypot(*np.diff(body.points[is_complete], axis=1).transpose(2, 0, 1))
     length = chord.sum(axis=1)
     arc = np.concatenate([np.zeros((len(chord), 1)), np.cumsum(chord, axis=1)], axis=1)
-    at = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    station = np.linspace(0.0, 1.0, SEGMENTS + 1)
     even = [
-        np.interp(at, a / d, r) / d for a, d, r in zip(arc, length, body.radius[whole], strict=True)
+        np.interp(station, a / d, r) / d
+        for a, d, r in zip(arc, length, body.radius[is_complete], strict=True)
     ]
     radius = np.median(even, axis=0)
     if not (radius >= 0.0).all() or radius.max() <= 0.0:

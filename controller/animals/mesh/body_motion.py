@@ -79,9 +79,9 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
     if holds_postures(path):
         fish = load_postures(path)
         points = fish.points_in_space()
-        seen = np.isfinite(points).all(axis=(1, 2))
-        points = points[seen]
-        time_s = np.flatnonzero(seen) / fish.rate_hz
+        is_visible = np.isfinite(points).all(axis=(1, 2))
+        points = points[is_visible]
+        time_s = np.flatnonzero(is_visible) / fish.rate_hz
         points[..., 2] += _belly_m(skin, fish.length) - points[..., 2].min(initial=0.0)
         return time_s, points
     track = load_track(source)
@@ -90,9 +90,9 @@ def _in_space(skin: Skin, source: str) -> tuple[Floats, Floats]:
         flat = flat - flat.mean(axis=1, keepdims=True)  # the images were cropped: no travel
     belly_m = _belly_m(skin, 1.0 if track.length_m is None else track.length_m)
     height_m = np.full(flat.shape[:2], belly_m)
-    held = read_arrays(path, {"height_m"})[0] if path.suffix == ".npz" else {}
-    if "height_m" in held and held["height_m"].shape == height_m.shape:
-        height_m = np.asarray(held["height_m"], float)
+    arrays = read_arrays(path, {"height_m"})[0] if path.suffix == ".npz" else {}
+    if "height_m" in arrays and arrays["height_m"].shape == height_m.shape:
+        height_m = np.asarray(arrays["height_m"], float)
     return track.time_s, np.concatenate([flat, height_m[..., None]], axis=-1)
 
 

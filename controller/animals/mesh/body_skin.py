@@ -133,26 +133,26 @@ def fish_skin(file: Path) -> SkinConfig:
     plain = fish_model(fish.build)
     config = load(locate("skins", fish.build), SkinConfig)
     higher = float(np.median(fish.half_height / plain.half_height))
-    at = np.linspace(0.0, 1.0, len(fish.half_width))
+    station = np.linspace(0.0, 1.0, len(fish.half_width))
     sections = tuple(
-        one.model_copy(
+        section.model_copy(
             update={
-                "half_width": float(np.interp(one.at, at, fish.half_width)),
-                "half_height": higher * one.half_height,
+                "half_width": float(np.interp(section.at, station, fish.half_width)),
+                "half_height": higher * section.half_height,
             }
         )
-        for one in config.sections
+        for section in config.sections
     )
-    fins = tuple(_fin(one, higher, fish.fin) for one in config.fins)
-    found = {"name": file.stem, "source": f"{file.name} and {config.source}"}
-    return config.model_copy(update=found | {"sections": sections, "fins": fins})
+    fins = tuple(_fin(fin, higher, fish.fin) for fin in config.fins)
+    changed = {"name": file.stem, "source": f"{file.name} and {config.source}"}
+    return config.model_copy(update=changed | {"sections": sections, "fins": fins})
 
 
 def _fin(plain: FinConfig, higher: float, pectoral: float) -> FinConfig:
     if not (plain.paired and pectoral > 0.0 and PECTORAL[0] <= plain.at <= PECTORAL[1]):
         return plain.model_copy(update={"span": higher * plain.span})
-    beside = plain.span * float(np.cos(np.radians(plain.around_deg)))
-    longer = pectoral / float(np.hypot(beside, plain.sweep))
+    side = plain.span * float(np.cos(np.radians(plain.around_deg)))
+    longer = pectoral / float(np.hypot(side, plain.sweep))
     return plain.model_copy(update={"span": longer * plain.span, "sweep": longer * plain.sweep})
 
 
@@ -165,13 +165,13 @@ def _given(file: Path, how: Cut) -> BodySkin:
     mesh = replace(given.mesh, vertices=given.mesh.vertices - start)
     sections = cut(given.solid, how.curves, str(file))
     tube, surface = _covered(sections, how.order)
-    beside = tube.spine_m(sections.stations)[:, 1] / sections.length_m
+    side = tube.spine_m(sections.stations)[:, 1] / sections.length_m
     facts: dict[str, object] = {
         "forward": given.forward,
         "up": given.up,
         "curves": how.curves,
         "surface_off_mesh_mean": round(_distance(mesh.vertices, surface), 5),
-        "spine_off_axis_most": round(float(np.abs(beside).max()), 5),
+        "spine_off_axis_most": round(float(np.abs(side).max()), 5),
     }
     if how.surface:
         worn = None if given.texture is None else _copied(mesh, given.texture, tube)

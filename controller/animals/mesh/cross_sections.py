@@ -112,28 +112,29 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
     x = np.asarray(solid.vertices, dtype=float)[:, 0]
     length = float(np.ptp(x))
     trial = np.linspace(_FIRST, 1.0 - _FIRST, _TRIALS)
-    found = [_section_loops(solid, -s * length) for s in trial]
-    sizes = [max((_area(loop) for loop in loops), default=0.0) for loops in found]
+    loops_of_trial = [_section_loops(solid, -s * length) for s in trial]
+    sizes = [max((_area(loop) for loop in loops), default=0.0) for loops in loops_of_trial]
     thickest = int(np.argmax(sizes))
     if sizes[thickest] <= 0.0:
         raise InputError(
             f"{name}: no plane across it finds a closed loop: the skin's curves are cut from a "
             "closed body that lies along --forward"
         )
-    body = max(found[thickest], key=_area)
-    last = _reach(found[thickest:], body) + thickest
-    first = thickest - _reach(found[thickest::-1], body)
+    body = max(loops_of_trial[thickest], key=_area)
+    last = _reach(loops_of_trial[thickest:], body) + thickest
+    first = thickest - _reach(loops_of_trial[thickest::-1], body)
     # cosine spacing: the sections change fastest near the ends
     even = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, curves))
     s = trial[first] + (trial[last] - trial[first]) * even
     inner = np.clip(s[1:-1], s[0] + 0.02 * np.ptp(s) / curves, s[-1] - 0.02 * np.ptp(s) / curves)
     rings = [
-        _ring(_around(_section_loops(solid, -at * length), body), -at * length) for at in inner
+        _ring(_around(_section_loops(solid, -place * length), body), -place * length)
+        for place in inner
     ]
     ends = []
-    for at, ring in ((s[0], rings[0]), (s[-1], rings[-1])):
+    for place, ring in ((s[0], rings[0]), (s[-1], rings[-1])):
         middle = ring.mean(axis=0)
-        ends.append(np.repeat([[-at * length, middle[1], middle[2]]], AROUND, axis=0))
+        ends.append(np.repeat([[-place * length, middle[1], middle[2]]], AROUND, axis=0))
     axis = float(np.mean([ring[:, 2].mean() for ring in rings]))
     stations = np.concatenate([s[:1], inner, s[-1:]])
     return CrossSections(np.array([ends[0], *rings, ends[1]]), stations, length, axis)
@@ -147,20 +148,20 @@ def _section_loops(solid: Any, x: float) -> list[Floats]:
     return [loop if _signed(loop) > 0.0 else loop[::-1] for loop in closed]
 
 
-def _reach(found: list[list[Floats]], start: Floats) -> int:
+def _reach(loops_of_sections: list[list[Floats]], start: Floats) -> int:
     """How many of these planes in a row cut the body."""
     loop = start
-    for k, loops in enumerate(found):
-        inside = [one for one in loops if _inside(one, loop.mean(axis=0))]
+    for k, loops in enumerate(loops_of_sections):
+        inside = [enclosing for enclosing in loops if _inside(enclosing, loop.mean(axis=0))]
         if not inside:
             return k - 1
         loop = max(inside, key=_area)
-    return len(found) - 1
+    return len(loops_of_sections) - 1
 
 
-def _around(found: list[Floats], body: Floats) -> Floats:
-    inside = [loop for loop in found if _inside(loop, body.mean(axis=0))]
-    return max(inside or found, key=_area)
+def _around(loops: list[Floats], body: Floats) -> Floats:
+    inside = [loop for loop in loops if _inside(loop, body.mean(axis=0))]
+    return max(inside or loops, key=_area)
 
 
 def _inside(loop: Floats, point: Floats) -> bool:
@@ -191,5 +192,5 @@ def _arcs(loop: Floats, last: int) -> Floats:
     """(AROUND / 2, 2) equal arcs from the first corner towards corner ``last``, without the end."""
     part = loop[: last + 1]
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(part, axis=0).T))])
-    at = np.linspace(0.0, arc[-1], AROUND // 2 + 1)[:-1]
-    return np.stack([np.interp(at, arc, part[:, k]) for k in range(2)], axis=1)
+    station = np.linspace(0.0, arc[-1], AROUND // 2 + 1)[:-1]
+    return np.stack([np.interp(station, arc, part[:, k]) for k in range(2)], axis=1)

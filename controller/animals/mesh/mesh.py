@@ -109,8 +109,13 @@ def tube_faces(points: int, around: int) -> Ints:
     """Two triangles for each side between rings, and a fan at each tip."""
     k = np.arange(around)
     after = (k + 1) % around
-    here = np.arange(points - 1)[:, None] * around
-    a, b, c, d = here + k, here + after, here + around + k, here + around + after
+    first_corner = np.arange(points - 1)[:, None] * around
+    a, b, c, d = (
+        first_corner + k,
+        first_corner + after,
+        first_corner + around + k,
+        first_corner + around + after,
+    )
     sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)]).reshape(-1, 3)
     last = (points - 1) * around
     head = points * around

@@ -50,18 +50,22 @@ class Tube:
         span = np.linalg.norm(np.diff(curves_m, axis=0), axis=-1).mean(axis=1)
         if not span.all():
             raise InputError("curves: two of the skin coincide; leave one out")
-        way = np.concatenate([[0.0], np.cumsum(span)])
-        given = [CubicSpline(way, curves_m)(way, k) for k in range(order)]
+        run_m = np.concatenate([[0.0], np.cumsum(span)])
+        given = [CubicSpline(run_m, curves_m)(run_m, k) for k in range(order)]
         given[0] = np.asarray(curves_m, dtype=float)
-        at = np.repeat([0.0, 1.0], order)
+        ends = np.repeat([0.0, 1.0], order)
         slopes = [*range(order)] * 2
         patches = tuple(
             PdeSurface.through(
                 np.array(
-                    [known[k] * span[i] ** n for k in (i, i + 1) for n, known in enumerate(given)]
+                    [
+                        derivatives[k] * span[i] ** n
+                        for k in (i, i + 1)
+                        for n, derivatives in enumerate(given)
+                    ]
                 ),
                 spread=spread,
-                at=at.tolist(),
+                ring_places=ends.tolist(),
                 slopes=slopes,
             )
             for i in range(len(curves_m) - 1)
@@ -76,9 +80,9 @@ class Tube:
             out[patch == k] = self.patches[k].points_m(u[patch == k], v)
         return out
 
-    def rows(self, each: int) -> Floats:
-        """Places (S,) along the body: ``each`` to a patch, all curves among them."""
-        even = np.linspace(0.0, len(self.patches), each * len(self.patches) + 1)
+    def rows(self, rows_per_patch: int) -> Floats:
+        """Places (S,) along the body: ``rows_per_patch`` to a patch, all curves among them."""
+        even = np.linspace(0.0, len(self.patches), rows_per_patch * len(self.patches) + 1)
         return np.interp(even, np.arange(len(self.stations)), self.stations)
 
     def spine_m(self, s: Floats) -> Floats:

@@ -52,7 +52,7 @@ class PdeSurface:
         curves_m: ArrayLike,
         modes: int | None = None,
         spread: float = 1.0,
-        at: Sequence[float] | None = None,
+        ring_places: Sequence[float] | None = None,
         slopes: Sequence[int] | None = None,
     ) -> "PdeSurface":
         """Solve for 2N closed curves (2N, C, 3), sampled evenly in v without 2 pi.
@@ -61,7 +61,7 @@ class PdeSurface:
             curves_m: metres; of slopes, metres per unit of u.
             modes: M of the series; None uses all, without a remainder.
             spread: a.
-            at: (2N,) default: evenly from 0 to 1.
+            ring_places: (2N,) default: evenly from 0 to 1.
             slopes: (2N,) default: all places.
 
         Raises:
@@ -76,7 +76,11 @@ class PdeSurface:
                 f"{curves.shape}"
             )
         number, count = curves.shape[:2]
-        places = np.linspace(0.0, 1.0, number) if at is None else np.array(at, dtype=float)
+        places = (
+            np.linspace(0.0, 1.0, number)
+            if ring_places is None
+            else np.array(ring_places, dtype=float)
+        )
         kinds = [0] * number if slopes is None else [int(kind) for kind in slopes]
         if len(places) != number or len(kinds) != number:
             raise InputError(
@@ -111,9 +115,9 @@ class PdeSurface:
         if modes is not None:
             v = np.arange(count) * TURN / count
             terms = np.exp(1j * np.arange(kept + 1)[:, None] * v)
-            held = np.einsum("jnx,n,nv->jvx", series, np.r_[1.0, double[1:]], terms).real
+            coefficients = np.einsum("jnx,n,nv->jvx", series, np.r_[1.0, double[1:]], terms).real
             fading = _conditions(places, kinds, spread * (kept + 1))
-            left_out = np.linalg.solve(fading, (curves - held).reshape(number, -1))
+            left_out = np.linalg.solve(fading, (curves - coefficients).reshape(number, -1))
         return PdeSurface(
             spread=spread,
             at=tuple(places.tolist()),

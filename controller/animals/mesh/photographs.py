@@ -68,16 +68,18 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
     """
     turn = row_turn_rad()
     even = np.linspace(0.0, 1.0, len(model.half_width))
-    at = np.linspace(0.0, 1.0, ALONG)
+    station = np.linspace(0.0, 1.0, ALONG)
     wide, high = (
-        np.maximum(np.interp(at, even, half), 1e-6)
+        np.maximum(np.interp(station, even, half), 1e-6)
         for half in (model.half_width, model.half_height)
     )
     colours = []
     cosines = []
-    for one in photographs:
-        across, cosine = _seen_from(one.turn_rad, turn[:, None], wide, high)
-        colours.append(colours_across(one.image, one.points_px, one.radius_px, across))
+    for photograph in photographs:
+        across, cosine = _seen_from(photograph.turn_rad, turn[:, None], wide, high)
+        colours.append(
+            colours_across(photograph.image, photograph.points_px, photograph.radius_px, across)
+        )
         cosines.append(cosine)
     colour = np.array(colours)
     cosine = np.array(cosines)
@@ -87,9 +89,9 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
     total = weight.sum(axis=0)
     mean = np.einsum("krc,krcx->rcx", weight, colour * factor[:, None, None])
     area = np.hypot(wide * np.sin(turn)[:, None], high * np.cos(turn)[:, None])
-    seen = float((area * (total > 0.0)).sum() / area.sum())
+    seen_share = float((area * (total > 0.0)).sum() / area.sum())
     picture = np.clip(np.rint(_filled(mean, total)), 0, 255).astype(np.uint8)
-    return PictureAround(picture, seen, gains)
+    return PictureAround(picture, seen_share, gains)
 
 
 def row_turn_rad() -> Floats:
@@ -138,10 +140,10 @@ def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] |
         )[0]
     else:
         log = np.zeros((count, 3))
-    found = np.exp(log - log[0])
+    gains = np.exp(log - log[0])
     return tuple(
-        (float(r), float(g), float(b)) if known else None
-        for (r, g, b), known in zip(found, reached, strict=True)
+        (float(r), float(g), float(b)) if is_reached else None
+        for (r, g, b), is_reached in zip(gains, reached, strict=True)
     )
 
 
@@ -157,11 +159,11 @@ def _filled(mean: Floats, total: Floats) -> Floats:
         share *= _FEATHER
         sums += share * mean[mirrored]
         weights += share * total[mirrored]
-    known: Bools = weights > 0.0
-    colour = sums / np.where(known, weights, 1.0)[..., None]
-    if known.all():
+    is_known: Bools = weights > 0.0
+    colour = sums / np.where(is_known, weights, 1.0)[..., None]
+    if is_known.all():
         return np.asarray(colour)
-    three = np.tile(~known, (3, 1))
+    three = np.tile(~is_known, (3, 1))
     place = distance_transform_edt(
         three, sampling=(1.0, 4.0 * AROUND), return_distances=False, return_indices=True
     )

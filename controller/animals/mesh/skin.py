@@ -96,9 +96,9 @@ def carried(mesh: Mesh, surface: Skin) -> Skin:
     own place.
     """
     nearest = cKDTree(surface.mesh.vertices).query(mesh.vertices)[1]
-    own = np.clip(-mesh.vertices[:, 0] / surface.length_m, 0.0, 1.0)
-    beyond = (own < surface.along.min()) | (own > surface.along.max())
-    along = np.where(beyond, own, surface.along[nearest])
+    along_vertices = np.clip(-mesh.vertices[:, 0] / surface.length_m, 0.0, 1.0)
+    beyond = (along_vertices < surface.along.min()) | (along_vertices > surface.along.max())
+    along = np.where(beyond, along_vertices, surface.along[nearest])
     return Skin(mesh, along, surface.length_m, surface.axis_m)
 
 

@@ -102,12 +102,12 @@ def write_skin(
 def _surface(out: "_Builder", rig: Rig, *, textured: bool) -> pygltflib.Attributes:
     """Append places, normals, bones and weights of the corners."""
     mesh = rig.mesh
-    held = rig.held
+    weights = rig.held
     shares = np.zeros((len(mesh.vertices), 4), np.float32)
-    shares[:, [0, 2]] = held.shares[:, [0, 2]]
+    shares[:, [0, 2]] = weights.shares[:, [0, 2]]
     shares[:, 1] = np.float32(1.0) - shares[:, 0] - shares[:, 2]  # sum 1 in single precision
     joints = np.zeros((len(mesh.vertices), 4), np.uint8)
-    joints[:, :3] = np.where(shares[:, :3] > 0.0, held.bones, 0)  # no bone may idle
+    joints[:, :3] = np.where(shares[:, :3] > 0.0, weights.bones, 0)  # no bone may idle
     array = pygltflib.ARRAY_BUFFER
     normals = mesh.normals @ Y_UP.T
     attributes = pygltflib.Attributes(

@@ -108,7 +108,9 @@ def body_parts(skeleton: PersonSkeleton, girth: float) -> tuple[BodyPart, ...]:
     leg = _leg(girth, on_trunk)
     arm = _arm(girth, on_trunk)
     shoe = _shoe(girth)
-    sides = [part for one in (leg, arm, shoe) for part in (one, _mirrored(one))]
+    sides = [
+        part for side_parts in (leg, arm, shoe) for part in (side_parts, _mirrored(side_parts))
+    ]
     size = skeleton.stature_m
     return tuple(
         BodyPart(p.name, size * p.curves_m, p.stations, p.bones, p.shares) for p in (trunk, *sides)
@@ -132,8 +134,8 @@ def _spine_shares(height: float) -> dict[str, float]:
     names = ("pelvis", "waist", "chest", "neck", "head")
     place = float(np.interp(height, (0.555, 0.635, 0.735, 0.84, 0.872), np.arange(5.0)))
     below = min(int(place), 3)
-    found = {names[below]: below + 1.0 - place, names[below + 1]: place - below}
-    return {name: share for name, share in found.items() if share > 0.0}
+    shares = {names[below]: below + 1.0 - place, names[below + 1]: place - below}
+    return {name: share for name, share in shares.items() if share > 0.0}
 
 
 def _leg(girth: float, on_trunk: Floats) -> BodyPart:
@@ -223,13 +225,13 @@ def _stations(curves: Sequence[Floats]) -> Floats:
 def _attached(shares: Sequence[dict[str, float]]) -> tuple[Ints, Floats]:
     """(K, 3) bones and shares of the curves."""
     bones = np.zeros((len(shares), 3), dtype=np.int64)
-    held = np.zeros((len(shares), 3))
-    for k, one in enumerate(shares):
-        kept = [(INDEX[name], share) for name, share in one.items() if share > 0.0]
+    weights = np.zeros((len(shares), 3))
+    for k, vertex_shares in enumerate(shares):
+        kept = [(INDEX[name], share) for name, share in vertex_shares.items() if share > 0.0]
         bones[k] = kept[0][0]
         for j, (bone, share) in enumerate(kept):
-            bones[k, j], held[k, j] = bone, share
-    return bones, held
+            bones[k, j], weights[k, j] = bone, share
+    return bones, weights
 
 
 def _mirrored(part: BodyPart) -> BodyPart:

@@ -155,15 +155,15 @@ def scaled(
 
 def _foot_pitch(gait: PersonGait, ways: Feet) -> tuple[Floats, Floats]:
     """(T, 2) pitch of feet and of toes, radians, toes up above 0."""
-    at, angle = np.array(gait.pitch).T
+    place, angle = np.array(gait.pitch).T
     # the keys belong to the gait's duty; they stretch to that of the law
-    at = np.where(
-        at <= gait.duty,
-        at / gait.duty * ways.duty,
-        1.0 - (1.0 - at) / (1.0 - gait.duty) * (1.0 - ways.duty),
+    place = np.where(
+        place <= gait.duty,
+        place / gait.duty * ways.duty,
+        1.0 - (1.0 - place) / (1.0 - gait.duty) * (1.0 - ways.duty),
     )
     around = PchipInterpolator(
-        np.concatenate([at - 1.0, at, at + 1.0]), np.radians(np.tile(angle, 3))
+        np.concatenate([place - 1.0, place, place + 1.0]), np.radians(np.tile(angle, 3))
     )
     pitch = np.asarray(around(ways.at))
     air = np.clip((ways.at - ways.duty) / (1.0 - ways.duty), 0.0, 1.0)
@@ -242,8 +242,10 @@ def _turns(
     for k, side in enumerate(("left", "right")):
         turn[:, INDEX[f"{side} foot"]] = _pitched(pitch[:, k])
         turn[:, INDEX[f"{side} toes"]] = _pitched(toes[:, k])
-        for name, one in zip(("upper arm", "forearm", "hand"), _arm(gait, phase, k), strict=True):
-            turn[:, INDEX[f"{side} {name}"]] = chest @ one
+        for name, arm_turn in zip(
+            ("upper arm", "forearm", "hand"), _arm(gait, phase, k), strict=True
+        ):
+            turn[:, INDEX[f"{side} {name}"]] = chest @ arm_turn
     return turn
 
 

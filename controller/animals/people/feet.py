@@ -65,16 +65,16 @@ def feet(law: FeetLaw, given: FootParameters, phase: Floats) -> Feet:
     half = given.length_m + np.array([given.left_length_m, given.right_length_m])
     # a foot comes down where its way along z turns back: at w t = pi the right one, at 0 the left
     down = np.array([0.0, 0.5])
-    at = (np.asarray(phase)[:, None] - down) % 1.0
+    foot_phase = (np.asarray(phase)[:, None] - down) % 1.0
     if law is FeetLaw.PLANTED:
-        ahead = half * footfall.swing(at, given.duty)
-        air = np.clip((at - given.duty) / (1.0 - given.duty), 0.0, 1.0)
+        ahead = half * footfall.swing(foot_phase, given.duty)
+        air = np.clip((foot_phase - given.duty) / (1.0 - given.duty), 0.0, 1.0)
         # Eq. 9 runs from 0 to pi in the air
         height = np.maximum(high * np.sin(0.5 * TURN * air) + low, 0.0)
-        return Feet(ahead, height, at, (at < given.duty).astype(float), given.duty)
+        return Feet(ahead, height, foot_phase, (foot_phase < given.duty).astype(float), given.duty)
     ahead = half * np.stack([np.cos(wt), -np.cos(wt)], axis=-1)
     if law is FeetLaw.PRINTED:
         height = high * np.sin(wt)[:, None] + low
     else:
         height = np.maximum(high * np.stack([-np.sin(wt), np.sin(wt)], axis=-1) + low, 0.0)
-    return Feet(ahead, height, at, (height <= low).astype(float), 0.5)
+    return Feet(ahead, height, foot_phase, (height <= low).astype(float), 0.5)

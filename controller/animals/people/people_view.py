@@ -142,14 +142,21 @@ def _look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
         cloth = np.full((128, 8, 3), _CLOTH, np.uint8) if texture is None else texture
         picture = _stacked(picture, cloth)
         share = person.texture.shape[0] / picture.shape[0]
-        own = uv * [1.0, share] + [0.0, 1.0 - share]
+        outer_uv = uv * [1.0, share] + [0.0, 1.0 - share]
         other = np.clip(worn.mesh.uv, 0.02, 0.98) * [1.0, 1.0 - share]
         vertices = np.concatenate([vertices, worn.mesh.vertices])
         faces = np.concatenate([faces, worn.mesh.faces + len(uv)])
-        uv = np.concatenate([own, other])
-    one = np.zeros((len(vertices), 1), dtype=np.int64)
+        uv = np.concatenate([outer_uv, other])
+    bone_zeros = np.zeros((len(vertices), 1), dtype=np.int64)
     return SkinLook(
-        vertices, uv, faces, one, np.ones((len(vertices), 1)), np.zeros((1, 3)), picture, free=True
+        vertices,
+        uv,
+        faces,
+        bone_zeros,
+        np.ones((len(vertices), 1)),
+        np.zeros((1, 3)),
+        picture,
+        free=True,
     )
 
 

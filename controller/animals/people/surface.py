@@ -84,8 +84,8 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
         rows = len(points) // AROUND
         corners.append(points)
         low, high = _BANDS[part.name]
-        at = np.linspace(0.0, 1.0, rows)
-        u = low + (0.005 + 0.99 * at) * (high - low)
+        place = np.linspace(0.0, 1.0, rows)
+        u = low + (0.005 + 0.99 * place) * (high - low)
         across = 0.5 + 0.49 * np.cos(np.arange(AROUND) * TURN / AROUND)
         uv.append(np.stack([np.repeat(u, AROUND), np.tile(across, rows)], axis=-1))
         faces.append(_outwards(_band_faces(rows), points) + start)
@@ -96,8 +96,8 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
     vertices = np.concatenate(corners)
     triangles = np.concatenate(faces)
     mesh = Mesh(vertices, vertex_normals(vertices, triangles), np.concatenate(uv), triangles)
-    held = Weights(np.concatenate(bones), np.concatenate(shares))
-    return Rig(mesh, held, skeleton.joint_m, skeleton.parent)
+    weights = Weights(np.concatenate(bones), np.concatenate(shares))
+    return Rig(mesh, weights, skeleton.joint_m, skeleton.parent)
 
 
 def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:
@@ -120,8 +120,13 @@ def _band_faces(rows: int) -> Ints:
     """Two triangles for each side between two rows; a row at a tip gives one flat one."""
     k = np.arange(AROUND)
     after = (k + 1) % AROUND
-    here = np.arange(rows - 1)[:, None] * AROUND
-    a, b, c, d = here + k, here + after, here + AROUND + k, here + AROUND + after
+    row_starts = np.arange(rows - 1)[:, None] * AROUND
+    a, b, c, d = (
+        row_starts + k,
+        row_starts + after,
+        row_starts + AROUND + k,
+        row_starts + AROUND + after,
+    )
     sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
     return sides.reshape(-1, 3).astype(np.int64)
 
@@ -143,7 +148,7 @@ def texture() -> Image:
     picture[:, part["arm"]] = _SKIN
     picture[:, part["leg"]] = _TROUSERS
     picture[:, part["shoe"]] = _SHOE
-    heights = np.array([one[0] for one in TRUNK])
+    heights = np.array([section[0] for section in TRUNK])
     place = np.clip((u / 0.4 - 0.005) / 0.99, 0.0, 1.0) * (len(heights) - 1)
     up, front = np.meshgrid(np.interp(place, np.arange(len(heights)), heights), v)
     trunk = np.empty((high, wide, 3))

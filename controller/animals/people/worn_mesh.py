@@ -31,8 +31,8 @@ def worn_mesh(person: Person, mesh: Mesh) -> Rig:
     middle = 0.5 * (rest.min(axis=0) + rest.max(axis=0)) - 0.5 * scale * (low + high)
     place[:, :2] += middle[:2]
     nearest = _facing(place, mesh.normals, person.rig.mesh)
-    held = person.rig.held
-    weights = Weights(held.bones[nearest], held.shares[nearest])
+    rig_weights = person.rig.held
+    weights = Weights(rig_weights.bones[nearest], rig_weights.shares[nearest])
     normals = np.asarray(mesh.normals, dtype=float)
     return Rig(
         replace(mesh, vertices=place, normals=normals),
@@ -44,6 +44,6 @@ def worn_mesh(person: Person, mesh: Mesh) -> Rig:
 
 def _facing(place: Floats, normals: Floats, surface: Mesh) -> Ints:
     """(V,) the nearest corner of a surface whose normal is within 80 degrees of the given one."""
-    found = np.asarray(cKDTree(surface.vertices).query(place, k=_TRIED)[1], np.int64)
-    agree = np.einsum("vkx,vx->vk", surface.normals[found], normals) > _AGREE
-    return np.asarray(found[np.arange(len(place)), agree.argmax(axis=1)])
+    candidates = np.asarray(cKDTree(surface.vertices).query(place, k=_TRIED)[1], np.int64)
+    agree = np.einsum("vkx,vx->vk", surface.normals[candidates], normals) > _AGREE
+    return np.asarray(candidates[np.arange(len(place)), agree.argmax(axis=1)])

@@ -51,8 +51,8 @@ def draw_body(
             rows = left.subplots(
                 len(silhouettes) + 2, 1, height_ratios=[share] * len(silhouettes) + [0.7, 1.4]
             )
-            for axes, one in zip(rows, silhouettes, strict=False):
-                _place(axes, *one)
+            for axes, silhouette in zip(rows, silhouettes, strict=False):
+                _place(axes, *silhouette)
             rows[0].set_title("skeleton, widths, head")
             rows[-2].imshow(texture, aspect="auto")
             rows[-2].set_axis_off()

@@ -19,8 +19,8 @@ _SHOWN = 6
 
 def draw_match(
     file: Path,
-    found: Postures,
-    known: Postures | None,
+    postures: Postures,
+    true_postures: Postures | None,
     matched: FilmMatch | None,
     footage: Path,
 ) -> None:
@@ -32,7 +32,9 @@ def draw_match(
     """
     check_picture(file)
     with style():
-        tall = 1.2 + (1.15 if found.angles_rad.shape[1] < 6 else 0.8) * found.angles_rad.shape[1]
+        tall = (
+            1.2 + (1.15 if postures.angles_rad.shape[1] < 6 else 0.8) * postures.angles_rad.shape[1]
+        )
         figure = Figure(
             figsize=(WIDTH_IN, tall + (2.9 if matched else 0.0)), layout="constrained", dpi=110
         )
@@ -43,30 +45,32 @@ def draw_match(
             panels = top.subplots(2, _SHOWN // 2, squeeze=False).ravel()
             _frames(list(panels), matched, footage)
         rows = bottom.subplots(
-            found.angles_rad.shape[1], 1, sharex=True, sharey=True, squeeze=False
+            postures.angles_rad.shape[1], 1, sharex=True, sharey=True, squeeze=False
         )
-        _angles(list(rows[:, 0]), found, known)
+        _angles(list(rows[:, 0]), postures, true_postures)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 
 def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
     """Crop frames to the fish; outline, spine, base of the head."""
-    known = np.flatnonzero(np.isfinite(matched.parameters[:, 2]))
-    shown = known[np.linspace(0, len(known) - 1, min(len(panels), len(known))).astype(int)]
+    indices = np.flatnonzero(np.isfinite(matched.parameters[:, 2]))
+    shown = indices[np.linspace(0, len(indices) - 1, min(len(panels), len(indices))).astype(int)]
     model = matched.model
-    wanted = set(shown.tolist())
+    shown_frames = set(shown.tolist())
     reach = 0.7 * model.length_px
-    images = ((k, image) for k, image in enumerate(open_footage(footage).shown()) if k in wanted)
+    images = (
+        (k, image) for k, image in enumerate(open_footage(footage).shown()) if k in shown_frames
+    )
     for axes, (k, image) in zip(panels, images, strict=False):
-        at = matched.parameters[k]
-        spine = model.midline(at[:2], float(at[2]), at[3:])
+        parameters = matched.parameters[k]
+        spine = model.midline(parameters[:2], float(parameters[2]), parameters[3:])
         outline = model.outline(spine)
         middle = spine[:, :2].mean(axis=0)
         axes.imshow(grey(image), cmap="gray", vmin=0, vmax=255)
         axes.fill(outline[:, 0], -outline[:, 1], fill=False, edgecolor=AMBER, linewidth=1.1)
         axes.plot(spine[:, 0], -spine[:, 1], color=SKY, linewidth=1.0)
-        axes.plot(at[0], -at[1], "o", color=RED, markersize=3.5)
+        axes.plot(parameters[0], -parameters[1], "o", color=RED, markersize=3.5)
         axes.set_xlim(middle[0] - reach, middle[0] + reach)
         axes.set_ylim(-middle[1] + 0.5 * reach, -middle[1] - 0.5 * reach)
         axes.set_title(f"frame {k}")
@@ -75,17 +79,22 @@ def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
         axes.set_axis_off()
 
 
-def _angles(rows: list[Axes], found: Postures, known: Postures | None) -> None:
-    time = np.arange(found.frames) / found.rate_hz
+def _angles(rows: list[Axes], postures: Postures, true_postures: Postures | None) -> None:
+    time = np.arange(postures.frames) / postures.rate_hz
     for k, axes in enumerate(rows):
-        if known is not None:
+        if true_postures is not None:
             axes.plot(
-                time, np.degrees(known.angles_rad[:, k]), color=INK, linewidth=2.6, alpha=0.28
+                time,
+                np.degrees(true_postures.angles_rad[:, k]),
+                color=INK,
+                linewidth=2.6,
+                alpha=0.28,
             )
         colour = SERIES[k % len(SERIES)]
-        axes.plot(time, np.degrees(found.angles_rad[:, k]), color=colour, linewidth=1.2)
+        axes.plot(time, np.degrees(postures.angles_rad[:, k]), color=colour, linewidth=1.2)
         axes.set_ylabel(f"A{k} (deg)")
     rows[0].set_title(
-        "spine angles" + (": matched (line) over known (grey band)" if known is not None else "")
+        "spine angles"
+        + (": matched (line) over known (grey band)" if true_postures is not None else "")
     )
     rows[-1].set_xlabel("time (s)")

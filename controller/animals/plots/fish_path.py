@@ -20,7 +20,7 @@ KINDS = {"glide": GREY, "forward": GREEN, "left": BLUE, "right": RED}
 _BODIES = 40
 
 
-def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOptions) -> None:
+def draw_synthesis(file: Path, motion: SynthesisedMotion, options: SynthesisOptions) -> None:
     """Draw a synthesis to ``file``.
 
     Raises:
@@ -32,34 +32,34 @@ def draw_synthesis(file: Path, made: SynthesisedMotion, options: SynthesisOption
         figure = Figure(figsize=(WIDTH_IN, 7.6), layout="constrained", dpi=110)
         upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[1.0, 1.35])[:, 0]
         left, right = upper.subplots(1, 2, squeeze=False)[0]
-        _pieces(left, made)
-        _graph(right, made)
-        _path(lower.subplots(1, 1), made, options)
+        _pieces(left, motion)
+        _graph(right, motion)
+        _path(lower.subplots(1, 1), motion, options)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 
-def _pieces(axes: Axes, made: SynthesisedMotion) -> None:
+def _pieces(axes: Axes, motion: SynthesisedMotion) -> None:
     """Way of the base of the head in each segment, all from one posture."""
-    for piece in made.pieces.pieces:
+    for piece in motion.pieces.pieces:
         axes.plot(piece.base[:, 0], piece.base[:, 1], color=KINDS[piece.kind], linewidth=1.3)
         axes.plot(*piece.base[-1], "o", color=KINDS[piece.kind], markersize=3)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(f"{len(made.pieces.pieces)} segments from one posture")
-    axes.set_xlabel(f"x ({_unit(made)})")
-    axes.set_ylabel(f"y ({_unit(made)})")
+    axes.set_title(f"{len(motion.pieces.pieces)} segments from one posture")
+    axes.set_xlabel(f"x ({_unit(motion)})")
+    axes.set_ylabel(f"y ({_unit(motion)})")
     handles = [Line2D([], [], color=colour, label=kind) for kind, colour in KINDS.items()]
     axes.legend(handles=handles, loc="upper left")
 
 
-def _graph(axes: Axes, made: SynthesisedMotion) -> None:
+def _graph(axes: Axes, motion: SynthesisedMotion) -> None:
     """Segments on a ring, a line where one may follow another; used joins dark."""
-    pieces = made.pieces
+    pieces = motion.pieces
     count = len(pieces.pieces)
     angle = np.pi / 2 - 2.0 * np.pi * np.arange(count) / count
     place = np.column_stack([np.cos(angle), np.sin(angle)])
     allowed = [(a, b) for a in range(count) for b in pieces.permitted(a)]
-    used = list(zip(made.sequence.order, made.sequence.order[1:], strict=False))
+    used = list(zip(motion.sequence.order, motion.sequence.order[1:], strict=False))
     for joins, colour, width in ((allowed, PALE, 0.6), (used, INK, 1.1)):
         lines = [np.stack([place[a], 0.25 * (place[a] + place[b]), place[b]]) for a, b in joins]
         axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
@@ -75,30 +75,32 @@ def _graph(axes: Axes, made: SynthesisedMotion) -> None:
     axes.set_title("possible successors (dark: used)")
 
 
-def _path(axes: Axes, made: SynthesisedMotion, options: SynthesisOptions) -> None:
+def _path(axes: Axes, synthesised: SynthesisedMotion, options: SynthesisOptions) -> None:
     """Bodies along the new path, joins as dots, control points as circles."""
-    motion = made.motion
+    motion = synthesised.motion
     points = motion.points()
     some = np.unique(np.linspace(0, motion.frames - 1, _BODIES).astype(int))
     bodies = LineCollection(list(points[some]), cmap=TIMES, linewidths=2.0, capstyle="round")
     bodies.set_array(some / motion.rate_hz)
     axes.plot(motion.base[:, 0], motion.base[:, 1], color=GREY, linewidth=0.8)
     axes.add_collection(bodies)
-    joins = motion.base[junctions(made.pieces, made.sequence)]
+    joins = motion.base[junctions(synthesised.pieces, synthesised.sequence)]
     axes.plot(joins[:, 0], joins[:, 1], "o", color=INK, markersize=2.5)
     for k, (x, y, *_) in enumerate(options.through):
-        radius = options.radius * made.source.length
+        radius = options.radius * synthesised.source.length
         axes.add_patch(Circle((x, y), radius, fill=False, edgecolor=RED, linewidth=1.4))
         axes.text(x, y, str(k + 1), color=RED, ha="center", va="center", weight="bold")
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"x ({_unit(made)})")
-    axes.set_ylabel(f"y ({_unit(made)})")
+    axes.set_xlabel(f"x ({_unit(synthesised)})")
+    axes.set_ylabel(f"y ({_unit(synthesised)})")
     if isinstance(axes.figure, Figure | SubFigure):
         axes.figure.colorbar(bodies, ax=axes, pad=0.02, label="time (s)")
     kind = "through control points" if options.through else "at random"
-    axes.set_title(f"{made.facts.seconds} s {kind}: {made.facts.pieces_used} segments")
+    axes.set_title(
+        f"{synthesised.facts.seconds} s {kind}: {synthesised.facts.pieces_used} segments"
+    )
 
 
-def _unit(made: SynthesisedMotion) -> str:
-    return "body lengths" if made.source.length_m is None else "m"
+def _unit(motion: SynthesisedMotion) -> str:
+    return "body lengths" if motion.source.length_m is None else "m"

@@ -55,7 +55,7 @@ def _picture(axes: Axes, image: Image, title: str) -> None:
 
 def _curves(axes: Axes, person: Person) -> None:
     """Draw the boundary curves at rest."""
-    for curve in (one for part in person.parts for one in part.curves_m):
+    for curve in (curve_m for part in person.parts for curve_m in part.curves_m):
         axes.plot(*_seen(np.vstack([curve, curve[:1]])).T, color=BLUE, linewidth=0.7)
     _frame(axes, person, "boundary curves")
 

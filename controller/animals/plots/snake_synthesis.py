@@ -45,7 +45,7 @@ _LONGEST_SOURCE = 36
 """Characters of the source of the tongue's chain that fit below its axes."""
 
 
-def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, title: str) -> None:
+def draw_walk(walk: SynthesisedWalk, ground: HeightField | None, file: Path, title: str) -> None:
     """Draw a synthesis ([PT] Fig. 10 and 11) to ``file``.
 
     Raises:
@@ -53,7 +53,7 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
 
     """
     check_picture(file)
-    low, high = _extent(made)
+    low, high = _extent(walk)
     wide, tall = high - low
     map_in = float(np.clip(0.85 * WIDTH_IN * tall / wide + 0.8, 2.8, 6.0))
     with style():
@@ -62,26 +62,26 @@ def draw_walk(made: SynthesisedWalk, ground: HeightField | None, file: Path, tit
         axes = upper.subplots(1, 1)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        _map(axes, made, ground, title)
-        _over_time(lower.subplots(4, 2, sharex=True).T.ravel(), made)
+        _map(axes, walk, ground, title)
+        _over_time(lower.subplots(4, 2, sharex=True).T.ravel(), walk)
         file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 
-def _extent(made: SynthesisedWalk) -> tuple[Floats, Floats]:
+def _extent(walk: SynthesisedWalk) -> tuple[Floats, Floats]:
     """Corners (2,) of the drawing in plan."""
-    ends = made.path.position(np.linspace(0.0, made.path.length_m, 400))
-    points = np.concatenate([made.skeleton.points_m[..., :2].reshape(-1, 2), ends])
+    ends = walk.path.position(np.linspace(0.0, walk.path.length_m, 400))
+    points = np.concatenate([walk.skeleton.points_m[..., :2].reshape(-1, 2), ends])
     return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
 
 
-def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: str) -> None:
+def _map(axes: Axes, walk: SynthesisedWalk, ground: HeightField | None, title: str) -> None:
     """Path, targets, sampled skeletons and the track of the mass centre."""
-    points = made.skeleton.points_m[..., :2]
+    points = walk.skeleton.points_m[..., :2]
     centre = points.mean(axis=1)
-    targets = made.targets
-    way = made.path.position(np.linspace(0.0, made.path.length_m, 400))
-    axes.plot(*way.T, color=PATH, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
+    targets = walk.targets
+    path_m = walk.path.position(np.linspace(0.0, walk.path.length_m, 400))
+    axes.plot(*path_m.T, color=PATH, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
     axes.plot(*centre.T, color=CENTRE, linewidth=1.6, label="mass centre")
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre, axis=0).T))])
     length_m = float(np.hypot(*np.diff(points[0], axis=0).T).sum())
@@ -90,7 +90,7 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
     bodies = LineCollection(
         list(points[some]), cmap=TIMES, linewidths=2.6, capstyle="round", zorder=3
     )
-    bodies.set_array(some / made.rate_hz)
+    bodies.set_array(some / walk.rate_hz)
     axes.add_collection(bodies)
     axes.plot(*points[some, 0].T, "o", color=INK, markersize=3.5, zorder=4)
     between = targets.points_m[~targets.required]
@@ -114,11 +114,11 @@ def _map(axes: Axes, made: SynthesisedWalk, ground: HeightField | None, title: s
     legend_above(axes, 3)
 
 
-def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
+def _over_time(panels: Sequence[Axes], walk: SynthesisedWalk) -> None:
     """Distance, states, angles, behaviour; speed and bends, heading, head movement, tongue."""
     distance, states, angles, behaviour, speed, heading, head, tongue = panels
-    time = made.time_s
-    targets = made.targets
+    time = walk.time_s
+    targets = walk.targets
     end = len(targets.distance_m)
     current = np.minimum(targets.current, targets.count - 1)
     passed = np.flatnonzero(np.diff(current, prepend=current[0]))
@@ -131,18 +131,18 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     distance.set_ylim(bottom=0.0)
     distance.set_ylabel("m")
     distance.set_title("mass centre to target; dashed: radius")
-    speed.plot(time, made.plan.speed_m_s, color=BLUE)
+    speed.plot(time, walk.plan.speed_m_s, color=BLUE)
     speed.set_ylim(bottom=0.0)
     speed.set_ylabel("m/s", color=BLUE)
     speed.set_title("speed (line), bend K (dotted)")
     bends = speed.twinx()
-    bends.plot(time, made.plan.angles_rad.std(axis=1), color=AMBER, linestyle=":")
+    bends.plot(time, walk.plan.angles_rad.std(axis=1), color=AMBER, linestyle=":")
     bends.set_ylim(bottom=0.0)
     bends.set_ylabel("rad", color=AMBER)
     bends.grid(visible=False)
-    _states(states, made)
-    _behaviour(behaviour, made)
-    swing = made.plan.angles_rad - made.plan.angles_rad.mean(axis=1, keepdims=True)
+    _states(states, walk)
+    _behaviour(behaviour, walk)
+    swing = walk.plan.angles_rad - walk.plan.angles_rad.mean(axis=1, keepdims=True)
     most = float(np.abs(swing).max())
     angles.imshow(
         swing[:: max(1, len(time) // 600)].T,
@@ -156,45 +156,47 @@ def _over_time(panels: Sequence[Axes], made: SynthesisedWalk) -> None:
     angles.set_yticks([0.0, 1.0], ["head", "tail"])
     angles.set_title(f"angle about the heading; to ±{most:.1f} rad")
     angles.set_ylabel("body")
-    mean = np.unwrap(made.plan.angles_rad.mean(axis=1))
+    mean = np.unwrap(walk.plan.angles_rad.mean(axis=1))
     heading.plot(time, np.degrees(mean), color=BLUE)
     heading.set_title("heading: mean angle of the body")
     heading.set_ylabel("degrees")
-    aside = made.plan.angles_rad[:, 0] - made.plan.angles_rad.mean(axis=1)
+    aside = walk.plan.angles_rad[:, 0] - walk.plan.angles_rad.mean(axis=1)
     head.plot(time, np.degrees(aside), color=PURPLE)
     head.set_title("head movement: angle to the heading")
     head.set_ylabel("degrees")
     behaviour.set_xlabel("time (s)")
-    tongue.plot(time, made.tongue, color=RED, linewidth=0.8)
+    tongue.plot(time, walk.tongue, color=RED, linewidth=0.8)
     tongue.set_title("tongue: 0 in, 1 out")
     tongue.set_ylabel("share")
-    learned_from = textwrap.shorten(made.tongue_evidence, _LONGEST_SOURCE, placeholder=" ...")
+    learned_from = textwrap.shorten(walk.tongue_evidence, _LONGEST_SOURCE, placeholder=" ...")
     tongue.set_xlabel(f"time (s)\nlearned from: {learned_from}")
     tongue.set_xlim(0.0, time[-1])
 
 
-def _states(axes: Axes, made: SynthesisedWalk) -> None:
-    time = made.time_s
-    at, state = np.array(made.states).T
+def _states(axes: Axes, walk: SynthesisedWalk) -> None:
+    time = walk.time_s
+    frame_indices, state = np.array(walk.states).T
     shown = np.append(state, state[-1])
-    axes.step(np.append(time[at], time[-1]), shown, color=PURPLE, where="post", linewidth=1.0)
-    axes.plot(time[at], state, "o", color=PURPLE, markersize=3)
-    axes.set_title(f"state, {len(set(state))} of {len(made.library.shapes_rad)} used")
+    axes.step(
+        np.append(time[frame_indices], time[-1]), shown, color=PURPLE, where="post", linewidth=1.0
+    )
+    axes.plot(time[frame_indices], state, "o", color=PURPLE, markersize=3)
+    axes.set_title(f"state, {len(set(state))} of {len(walk.library.shapes_rad)} used")
     axes.set_ylabel("number")
 
 
-def _behaviour(axes: Axes, made: SynthesisedWalk) -> None:
+def _behaviour(axes: Axes, walk: SynthesisedWalk) -> None:
     """Draw sliding, head and tail as shares, and the pulse on an axis of its own."""
-    time = made.time_s
-    axes.plot(time, made.sliding.mean(axis=1), color=RED, label="sliding")
-    axes.plot(time, made.head_held, color=GREEN, linestyle="--", label="head held")
-    axes.plot(time, made.calm_tail, color=SKY, linestyle="-.", label="calm tail")
+    time = walk.time_s
+    axes.plot(time, walk.sliding.mean(axis=1), color=RED, label="sliding")
+    axes.plot(time, walk.head_held, color=GREEN, linestyle="--", label="head held")
+    axes.plot(time, walk.calm_tail, color=SKY, linestyle="-.", label="calm tail")
     axes.set_yticks([0.0, 0.5, 1.0])
     axes.set_ylim(-0.05, 1.6)
     axes.set_ylabel("share")
     axes.set_title("behaviour; dotted: pulse g")
     axes.legend(fontsize=8.5, ncols=3, loc="upper right", columnspacing=0.7, handlelength=1.2)
     pulse = axes.twinx()
-    pulse.plot(time, made.pulse_m_s.mean(axis=1), color=INK, linestyle=":")
+    pulse.plot(time, walk.pulse_m_s.mean(axis=1), color=INK, linestyle=":")
     pulse.grid(visible=False)
     pulse.set_ylabel("m/s")

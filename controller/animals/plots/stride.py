@@ -13,7 +13,7 @@ from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 
 
-def draw_stride(found: Stride, file: Path, title: str) -> None:
+def draw_stride(stride: Stride, file: Path, title: str) -> None:
     """Draw the fit of each foot to ``file``.
 
     Raises:
@@ -25,7 +25,7 @@ def draw_stride(found: Stride, file: Path, title: str) -> None:
         figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained", dpi=110)
         panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
         for k, axes in enumerate(panels):
-            _foot(axes, found, k)
+            _foot(axes, stride, k)
         for axes in panels[2:]:
             axes.set_xlabel("cycles since front left touched down")
         for axes in panels[::2]:
@@ -37,18 +37,18 @@ def draw_stride(found: Stride, file: Path, title: str) -> None:
         save_picture(figure, file)
 
 
-def _foot(axes: Axes, found: Stride, k: int) -> None:
+def _foot(axes: Axes, stride: Stride, k: int) -> None:
     """Every cycle as dots, the model as a line, grey where the foot is on the ground."""
-    foot = found.feet[k]
+    foot = stride.feet[k]
     cycle = np.linspace(0.0, 1.0, 401)
     on = (cycle - foot.down) % 1.0 < foot.duty
-    low, high = np.nanmin(found.ahead), np.nanmax(found.ahead)
+    low, high = np.nanmin(stride.ahead), np.nanmax(stride.ahead)
     axes.fill_between(
         cycle, low, high, where=on, color=GREY, alpha=0.25, linewidth=0, label="on the ground"
     )
     axes.plot(
-        found.phase % 1.0, found.ahead[:, k], ".", color=BLUE, markersize=3.0, label="tracked"
+        stride.phase % 1.0, stride.ahead[:, k], ".", color=BLUE, markersize=3.0, label="tracked"
     )
-    axes.plot(cycle, model_ahead(found, k, cycle), color=INK, linewidth=1.2, label="model")
+    axes.plot(cycle, model_ahead(stride, k, cycle), color=INK, linewidth=1.2, label="model")
     down = round(foot.down, 2) % 1.0  # 0.998 is 0.00, not 1.00
     axes.set_title(f"{LEGS[k]}: {100.0 * foot.duty:.0f} % on the ground, down at {down:.2f}")

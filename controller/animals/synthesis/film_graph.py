@@ -52,15 +52,15 @@ def film_successors(film: FilmStates, points: int) -> list[list[int]]:
     without a successor uses that of the most similar one at least half a body length of the film
     away.
     """
-    apart = np.abs(film.frame[:, None] - film.frame)
+    frame_gap = np.abs(film.frame[:, None] - film.frame)
     parts = np.concatenate([film.states.real, film.states.imag], axis=1)
     squares = (parts**2).sum(axis=1)
     distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * parts @ parts.T, 0.0))
     goes_on = np.append(np.diff(film.frame) == 1, [False])
     limit = float(np.median(np.diagonal(distance, 1)[goes_on[:-1]]))
-    similar = (distance <= limit) & (apart > 1) & goes_on
-    far = goes_on & (apart >= 0.5 * points / film.typical_pulse_points)
-    found = []
+    similar = (distance <= limit) & (frame_gap > 1) & goes_on
+    far = goes_on & (frame_gap >= 0.5 * points / film.typical_pulse_points)
+    successors = []
     for state in range(len(film.frame)):
         after = {int(other) + 1 for other in np.flatnonzero(similar[state])} - {state}
         if goes_on[state]:
@@ -68,8 +68,8 @@ def film_successors(film: FilmStates, points: int) -> list[list[int]]:
         if not after:
             others = np.flatnonzero(far[state] if far[state].any() else goes_on)
             after.add(int(others[np.argmin(distance[state, others])]) + 1)
-        found.append(sorted(after))
-    return found
+        successors.append(sorted(after))
+    return successors
 
 
 def film_angles(

@@ -96,8 +96,8 @@ def graph_motion(
     speed = []
     for t in range(frames):
         if t > 0:
-            now, wanted = next(shapes)
-            body = handed_down(wanted, body, m)
+            now, next_shape = next(shapes)
+            body = handed_down(next_shape, body, m)
             if now != state:
                 state = now
                 on_state(t, state)

@@ -102,8 +102,8 @@ class SynthesisedWalk:
         """Time at which each waypoint was reached."""
         current = np.array(self.targets.current)
         ends = np.flatnonzero(self.targets.required) + 1
-        at = [np.flatnonzero(current >= end) for end in ends]
-        return [float(self.time_s[frames[0]]) for frames in at if len(frames)]
+        reached_frames = [np.flatnonzero(current >= end) for end in ends]
+        return [float(self.time_s[frames[0]]) for frames in reached_frames if len(frames)]
 
     def facts(self) -> dict[str, object]:
         """Plain numbers, for the table and JSON."""
@@ -143,7 +143,7 @@ class SynthesisedWalk:
         """
         points = self.skeleton.points_m
         frames = np.arange(len(points))
-        at, state = np.array(self.states).T
+        state_frames, state = np.array(self.states).T
         np.savez_compressed(
             file,
             points=points[..., :2],
@@ -156,7 +156,7 @@ class SynthesisedWalk:
             radius_m=self.half_height_m,
             speed_m_s=self.plan.speed_m_s,
             tongue=self.tongue,
-            state=state[np.searchsorted(at, frames, side="right") - 1],
+            state=state[np.searchsorted(state_frames, frames, side="right") - 1],
         )
 
 
@@ -255,7 +255,7 @@ class SnakeSynthesis:
             plan, states = self._on_graph(most, until)
         else:
             plan, states = self._on_star(most, targets, curves, until)
-        made = len(plan.speed_m_s)
+        frame_count = len(plan.speed_m_s)
         half_m = half_heights_m(robot, POINTS)
         return SynthesisedWalk(
             plan,
@@ -266,11 +266,11 @@ class SnakeSynthesis:
             targets,
             states,
             self.library,
-            curves.sliding[:made],
-            curves.pulse_m_s[:made],
-            curves.head_held[:made],
-            curves.calm_tail[:made],
-            self._tongue(made),
+            curves.sliding[:frame_count],
+            curves.pulse_m_s[:frame_count],
+            curves.head_held[:frame_count],
+            curves.calm_tail[:frame_count],
+            self._tongue(frame_count),
             f"{self.tongue.source} ({self.tongue.evidence})",
         )
 
@@ -289,10 +289,10 @@ class SnakeSynthesis:
         walker = self._with_share.walker(self.library, self.shape_filters)
         heading_rad = self.prepared.start_heading_rad
         states = [(0, 0)]
-        at = [0]
+        next_frame = [0]
 
         def observe(frame: int, points_m: Floats) -> bool:
-            at[0] = frame + 1
+            next_frame[0] = frame + 1
             return until(points_m)
 
         def grow(_: AngleTrack, points_m: Floats) -> None:
@@ -302,7 +302,7 @@ class SnakeSynthesis:
                 if printed
                 else targets.aim_rad(points_m, mean_rad)
             )
-            states.append((at[0], walker.decide(heading_rad, aim_rad).state))
+            states.append((next_frame[0], walker.decide(heading_rad, aim_rad).state))
 
         plan = synthesise(
             walker.track,
@@ -364,9 +364,9 @@ class SnakeSynthesis:
         if not (np.diff(number) == 1).any():
             return None
         pulse = analyse(track).pulse
-        known = np.isfinite(pulse.body_points_per_frame)
-        rows = pulse.frame[known]
-        speeds = pulse.body_points_per_frame[known]
+        is_known = np.isfinite(pulse.body_points_per_frame)
+        rows = pulse.frame[is_known]
+        speeds = pulse.body_points_per_frame[is_known]
         if len(speeds) == 0 or np.median(speeds) <= 0.0:
             return None
         return FilmStates(states, number, np.interp(self.library.frame, rows, speeds))

@@ -185,8 +185,10 @@ def synthesise(
         step = speed[t] * dt_s
         along = step * np.array([cos(angles[t, leader]), sin(angles[t, leader])])
         points[t] = shape + (points[t - 1, leader] + along - shape[leader])
-    made = slice(0, last + 1)
-    return Locomotion(angles[made], points[made], speed[made], place[made])
+    used_frames = slice(0, last + 1)
+    return Locomotion(
+        angles[used_frames], points[used_frames], speed[used_frames], place[used_frames]
+    )
 
 
 def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, int]:
@@ -194,16 +196,16 @@ def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, in
 
     [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads.
     """
-    held = float(at_frame(how.head_held, frame))
+    held_share = float(at_frame(how.head_held, frame))
     calm = float(at_frame(how.calm_tail, frame))
-    if held == 0.0 and calm == 0.0:
+    if held_share == 0.0 and calm == 0.0:
         return angles_rad, 0
     s = np.linspace(0.0, 1.0, len(angles_rad))
     head = 1.0 - smoothstep.cubic(np.clip(s / NECK, 0.0, 1.0))
     tail = smoothstep.cubic(np.clip((s - HIPS) / (1.0 - HIPS), 0.0, 1.0))
     mean = angles_rad.mean()
-    kept = (1.0 - held * head) * (1.0 - calm * tail)
-    leader = int(np.argmax(head == 0.0)) if held > 0.0 else 0
+    kept = (1.0 - held_share * head) * (1.0 - calm * tail)
+    leader = int(np.argmax(head == 0.0)) if held_share > 0.0 else 0
     return mean + kept * (angles_rad - mean), leader
 
 
@@ -227,9 +229,9 @@ def _shifted(ahead: Floats, shift: Floats) -> Floats:
     """
     moved = np.empty(len(ahead))
     for n in range(len(ahead)):
-        at = min(max(n - shift[n], 0.0), len(ahead) - 1.0)
-        k = min(int(at), len(ahead) - 2)
-        moved[n] = ahead[k] + (at - k) * (ahead[k + 1] - ahead[k]) + shift[n]
+        source_frame = min(max(n - shift[n], 0.0), len(ahead) - 1.0)
+        k = min(int(source_frame), len(ahead) - 2)
+        moved[n] = ahead[k] + (source_frame - k) * (ahead[k + 1] - ahead[k]) + shift[n]
     return moved
 
 

@@ -52,38 +52,38 @@ class SynthesisSkin:
         dressed = body_skin(animal(track) if look == ANIMAL else look)
         return cls(dressed, robot_skin(dressed.skin, robot), look in (ANIMAL, "snake"))
 
-    def write(self, made: SynthesisedWalk, file: Path) -> None:
+    def write(self, walk: SynthesisedWalk, file: Path) -> None:
         """Write the animated glTF, ``file`` ends in .glb."""
         worn = self.dressed
-        rig, bones, texture = self._rig(made, 1)
+        rig, bones, texture = self._rig(walk, 1)
         with atomic_write(file) as part:
             write_skin(part, rig, bones, texture, worn.name, both_sides=worn.both_sides)
 
-    def _rig(self, made: SynthesisedWalk, segments: int) -> tuple[Rig, BoneMotion, Image | None]:
-        bones = made.bones(segments)
+    def _rig(self, walk: SynthesisedWalk, segments: int) -> tuple[Rig, BoneMotion, Image | None]:
+        bones = walk.bones(segments)
         texture = self.dressed.texture
         rig = spine_rig(self.skin, bones.bone_m)
         if not self.tongue:
             return rig, bones, texture
         rig, texture = rig_with_tongue(rig, bones.length_m, texture)
-        return rig, bones_with_tongue(bones, made.tongue), texture
+        return rig, bones_with_tongue(bones, walk.tongue), texture
 
-    def film(self, made: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
+    def film(self, walk: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
             InputError: the simulator or PyAV is not installed, or nothing draws here.
 
         """
-        rig, bones, texture = self._rig(made, FILM_SEGMENTS)
+        rig, bones, texture = self._rig(walk, FILM_SEGMENTS)
         return film_over(
             prepared,
             file,
             bones,
-            rig_look(rig, texture, spine=made.bones(FILM_SEGMENTS).front_m.shape[1]),
+            rig_look(rig, texture, spine=walk.bones(FILM_SEGMENTS).front_m.shape[1]),
             robot=prepared.robot,
-            reached_s=made.reached_s(),
-            paths=made.targets.paths(made.rate_hz),
+            reached_s=walk.reached_s(),
+            paths=walk.targets.paths(walk.rate_hz),
             title=prepared.run.name,
         )
 

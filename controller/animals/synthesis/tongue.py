@@ -54,8 +54,8 @@ class TongueRecord:
 
         """
         try:
-            with file.open(encoding="utf-8", newline="") as held:
-                rows = list(csv.DictReader(held))
+            with file.open(encoding="utf-8", newline="") as stream:
+                rows = list(csv.DictReader(stream))
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{file}: {error}; name a CSV table of the tongue") from None
         columns = set(rows[0]) if rows else set()
@@ -88,42 +88,44 @@ class HeightChain:
         if len(heights) < 3 or levels < 3 or heights.min() < 0.0 or heights.max() > 1.0:
             raise ValueError("the tongue learns from three or more heights within 0..1")
         self.levels = levels
-        seen = np.rint(heights * (levels - 1)).astype(np.intp)
-        self._start = (int(seen[0]), int(seen[1]))
+        level_indices = np.rint(heights * (levels - 1)).astype(np.intp)
+        self._start = (int(level_indices[0]), int(level_indices[1]))
         counts = np.zeros((levels, levels, levels))
-        np.add.at(counts, (seen[:-2], seen[1:-1], seen[2:]), 1.0)
+        np.add.at(counts, (level_indices[:-2], level_indices[1:-1], level_indices[2:]), 1.0)
         # the sequence repeats, so that its last pair has a successor
-        np.add.at(counts, (seen[[-2, -1]], seen[[-1, 0]], seen[[0, 1]]), 1.0)
+        np.add.at(
+            counts, (level_indices[[-2, -1]], level_indices[[-1, 0]], level_indices[[0, 1]]), 1.0
+        )
         total = counts.sum(axis=2, keepdims=True)
         self.counts = counts
         """(z, y, x): how often height x followed y after z."""
         self.probability = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0.0)
         """(z, y, x): of height x after y after z; rows of pairs never seen are 0."""
 
-    def interval(self, two: int, one: int, next_: int, z: float = 1.96) -> tuple[float, float]:
-        """Wilson interval of the probability of level ``next_`` after ``one`` after ``two``.
+    def interval(self, two: int, latest: int, next_: int, z: float = 1.96) -> tuple[float, float]:
+        """Wilson interval of the probability of level ``next_`` after ``latest`` after ``two``.
 
         ``z`` is the normal quantile: 1.96 is 95 %. A pair that was never seen gives 0 to 1.
         """
-        seen = float(self.counts[two, one].sum())
-        if seen == 0.0:
+        total = float(self.counts[two, latest].sum())
+        if total == 0.0:
             return 0.0, 1.0
-        share = float(self.counts[two, one, next_]) / seen
-        middle = (share + z * z / (2.0 * seen)) / (1.0 + z * z / seen)
-        half = z * np.sqrt(share * (1.0 - share) / seen + z * z / (4.0 * seen * seen))
-        half /= 1.0 + z * z / seen
+        share = float(self.counts[two, latest, next_]) / total
+        middle = (share + z * z / (2.0 * total)) / (1.0 + z * z / total)
+        half = z * np.sqrt(share * (1.0 - share) / total + z * z / (4.0 * total * total))
+        half /= 1.0 + z * z / total
         return max(middle - float(half), 0.0), min(middle + float(half), 1.0)
 
     def sequence(self, steps: int, rng: np.random.Generator) -> Floats:
         """Draw heights (steps,) in 0..1, from the learned sequence's own beginning."""
-        two, one = self._start
+        two, latest = self._start
         drawn = np.empty(steps, dtype=np.intp)
         cumulative = np.cumsum(self.probability, axis=2)
         for k in range(steps):
-            x = int(np.searchsorted(cumulative[two, one], rng.random(), side="right"))
+            x = int(np.searchsorted(cumulative[two, latest], rng.random(), side="right"))
             drawn[k] = min(x, self.levels - 1)
-            two = one
-            one = int(drawn[k])
+            two = latest
+            latest = int(drawn[k])
         return drawn / (self.levels - 1)
 
 
@@ -148,8 +150,8 @@ class Tongue:
 
     def height(self, time_s: float) -> float:
         """Height at a time since the start, between samples linearly."""
-        at = max(time_s, 0.0) * self._pace
-        while at > len(self._heights) - 1:  # the same seed again gives the same beginning
+        place = max(time_s, 0.0) * self._pace
+        while place > len(self._heights) - 1:  # the same seed again gives the same beginning
             more = 2 * len(self._heights)
             self._heights = self._chain.sequence(more, np.random.default_rng(self._seed))
-        return float(np.interp(at, np.arange(len(self._heights)), self._heights))
+        return float(np.interp(place, np.arange(len(self._heights)), self._heights))

@@ -48,12 +48,12 @@ def rig_with_tongue(rig: Rig, length_m: float, texture: Image | None) -> tuple[R
         uv=np.vstack([uv, np.tile(colour, (len(corners), 1))]),
         faces=np.vstack([mesh.faces, faces + len(mesh.vertices)]),
     )
-    held = Weights(
+    weights = Weights(
         np.vstack([rig.held.bones, np.full((len(corners), 3), bone, dtype=np.int64)]),
         np.vstack([rig.held.shares, np.tile([0.0, 1.0, 0.0], (len(corners), 1))]),
     )
     parent = np.append(rig.parent, 0)
-    return Rig(joined, held, np.vstack([rig.rest_m, rig.rest_m[0]]), parent), texture
+    return Rig(joined, weights, np.vstack([rig.rest_m, rig.rest_m[0]]), parent), texture
 
 
 def bones_with_tongue(bones: BoneMotion, heights: Floats) -> BoneMotion:

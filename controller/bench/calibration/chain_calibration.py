@@ -54,11 +54,11 @@ class Observer(Protocol):
     """A person or a program that sees the robot."""
 
     def which(
-        self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
+        self, servo_id: int, wiggle: Callable[[], None], joint_of_id: Mapping[int, int]
     ) -> SeenBend:
         """Name the joint that a servo moves; ``wiggle`` moves it, as often as needed.
 
-        ``known`` has the IDs of the joints found before.
+        ``joint_of_id`` has the IDs of the joints found before.
         """
         ...
 
@@ -100,30 +100,30 @@ def find_servos(
     if feetech:
         bus = FeetechBus(port, latency_s=latency_s, tries=BUS_TRIES)
         scan = partial(_feetech_models, port, latency_s)
-    found = scan()
+    servos = scan()
     for _ in range(_SCANS - 1):
-        if count is None or len(found) == count:
+        if count is None or len(servos) == count:
             break
-        found |= scan()
-    if not found:
+        servos |= scan()
+    if not servos:
         _reject_another_make(port, latency_s, feetech=feetech)
-    shared = [str(servo_id) for servo_id in sorted(found) if not _is_alone(bus, servo_id)]
+    shared = [str(servo_id) for servo_id in sorted(servos) if not _is_alone(bus, servo_id)]
     if shared:
         raise InputError(
             f"{port.name}: replies of ID {', '.join(shared)} come doubled or damaged: two servos "
             "share it, or the line is bad; connect one alone and give it another ID: snakewalk "
             "bus set --new-id"
         )
-    return dict(sorted(found.items()))
+    return dict(sorted(servos.items()))
 
 
 def _models(bus: DynamixelBus) -> dict[int, str]:
-    return {each: model_of(reply.model_number) for each, reply in bus.scan().items()}
+    return {servo_id: model_of(reply.model_number) for servo_id, reply in bus.scan().items()}
 
 
 def _feetech_models(port: BytePort, latency_s: float) -> dict[int, str]:
-    found = find_feetech(port, (port.getBaudRate(),), latency_s=latency_s)
-    return {each.servo_id: each.model for each in found}
+    feetech_servos = find_feetech(port, (port.getBaudRate(),), latency_s=latency_s)
+    return {servo.servo_id: servo.model for servo in feetech_servos}
 
 
 def _reject_another_make(port: BytePort, latency_s: float, *, feetech: bool) -> None:
@@ -266,9 +266,9 @@ class _Steps:
 
         """
         self.on_progress(f"ID {servo_id}: which joint")
-        seen = {bend.joint: other for other, bend in self.known.bends.items()}
-        bend = observer.which(servo_id, wiggle, seen)
-        if not 0 <= bend.joint < self.like.joint_count or bend.joint in seen:
+        parent_by_joint = {bend.joint: other for other, bend in self.known.bends.items()}
+        bend = observer.which(servo_id, wiggle, parent_by_joint)
+        if not 0 <= bend.joint < self.like.joint_count or bend.joint in parent_by_joint:
             raise InputError(
                 f"ID {servo_id}: the joint that moved, number {bend.joint + 1} from the head, is "
                 f"known already or not of {self.like.name}"
@@ -285,15 +285,17 @@ class _Steps:
 
         def push_each() -> None:
             with self.bench.straight(straight_rad) as push:
-                for servo_id in [each for each in in_order if each not in self.known.ranges]:
+                for servo_id in [
+                    next_id for next_id in in_order if next_id not in self.known.ranges
+                ]:
                     bend = self.known.bends[servo_id]
                     row = rows[servo_id]
                     reach_rad = self.like.limit_rad[bend.joint] + BEYOND_RAD
                     for side in 1, -1:
-                        at = servo_id, side
-                        if at not in stops:
+                        servo_and_side = servo_id, side
+                        if servo_and_side not in stops:
                             self.on_progress(f"range of {self.label(servo_id)}")
-                            keep = partial(stops.__setitem__, at)
+                            keep = partial(stops.__setitem__, servo_and_side)
                             push(row, side * bend.direction, reach_rad, keep)
                     low, high = stops[servo_id, -1], stops[servo_id, 1]
                     ends = JointRange(low_rad=None if low is None else -low, high_rad=high)
@@ -307,7 +309,7 @@ def _found(
     like: RobotConfig,
     name: str,
     unknown: RobotConfig,
-    known: CalibrationProgress,
+    progress: CalibrationProgress,
     *,
     sweep: bool,
 ) -> ChainCalibration:
@@ -320,9 +322,9 @@ def _found(
     joints = []
     faults = []
     notes = []
-    rows = {known.bends[servo_id].joint: row for row, servo_id in enumerate(unknown.servo_ids)}
+    rows = {progress.bends[servo_id].joint: row for row, servo_id in enumerate(unknown.servo_ids)}
     ids = [unknown.servo_ids[rows[joint]] for joint in range(like.joint_count)]
-    ranges = [known.ranges[servo_id] for servo_id in ids] if sweep else []
+    ranges = [progress.ranges[servo_id] for servo_id in ids] if sweep else []
     stopless = [k for k, r in enumerate(ranges) if r.low_rad is None or r.high_rad is None]
     for joint, servo_id in enumerate(ids):
         limit = like.limit_rad[joint]
@@ -343,17 +345,17 @@ def _found(
         if limit < LEAST_LIMIT_RAD:
             faults.append(f"{said}: only {limit + MARGIN_RAD:.2f} rad to its stop: free it")
             continue
-        model = known.servos[servo_id]
-        found = {
+        model = progress.servos[servo_id]
+        joint_changes = {
             "id": servo_id,
             "model": None if model == like.servo.model else model,
-            "sign": known.bends[servo_id].direction,
-            "zero_rad": round(known.zeros_rad[servo_id], 5),
+            "sign": progress.bends[servo_id].direction,
+            "zero_rad": round(progress.zeros_rad[servo_id], 5),
         }
         if limit != like.limit_rad[joint]:
-            found["limit_rad"] = limit
-        own = like.joints[joint] if like.joints else JointConfig()
-        joints.append(own.model_copy(update=found))
+            joint_changes["limit_rad"] = limit
+        joint_config = like.joints[joint] if like.joints else JointConfig()
+        joints.append(joint_config.model_copy(update=joint_changes))
     if faults:
         raise InputError(faults)
     keys = {"name": name, "joints": tuple(joints)}
@@ -362,6 +364,6 @@ def _found(
     return ChainCalibration(robot, tuple(ranges), tuple(notes))
 
 
-def _both(found: JointRange) -> str:
-    ends = (found.low_rad, found.high_rad)
+def _both(joint_range: JointRange) -> str:
+    ends = (joint_range.low_rad, joint_range.high_rad)
     return " and ".join("none" if end is None else f"{end:+.2f} rad" for end in ends)

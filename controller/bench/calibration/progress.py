@@ -57,7 +57,9 @@ class CalibrationProgress(Strict):
 
         """
         if self.servos and self.servos != servos:
-            before, now = (", ".join(map(str, each)) or "none" for each in (self.servos, servos))
+            before, now = (
+                ", ".join(map(str, servo_ids)) or "none" for servo_ids in (self.servos, servos)
+            )
             raise InputError(
                 f"{source}: has servos with ID {before}, the bus has {now}, or their models "
                 "differ; connect the same servos, or start again with --force"
@@ -78,9 +80,9 @@ class Journal:
     known: CalibrationProgress
     on_change: Callable[[CalibrationProgress], None] = lambda progress: None
 
-    def note(self, **found: object) -> None:
+    def note(self, **changes: object) -> None:
         """Add to the progress, and save it."""
-        self.known = self.known.model_copy(update=found)
+        self.known = self.known.model_copy(update=changes)
         self.on_change(self.known)
 
 

@@ -139,13 +139,13 @@ class CalibrationBench:
             BusError: a servo does not reply.
 
         """
-        here = np.full(len(self._robot.servo_ids), np.nan)
+        position_rad = np.full(len(self._robot.servo_ids), np.nan)
         for _ in range(_POSE_READS):
             state = SafeLink(self._chain, self._limits, self._clock).read()
-            here = np.where(state.valid, state.position_rad, here)
-            if np.isfinite(here).all():
-                return here
-        silent = np.array(self._robot.servo_ids)[np.isnan(here)].tolist()
+            position_rad = np.where(state.valid, state.position_rad, position_rad)
+            if np.isfinite(position_rad).all():
+                return position_rad
+        silent = np.array(self._robot.servo_ids)[np.isnan(position_rad)].tolist()
         raise BusError(f"no reply from ID {', '.join(map(str, silent))}; check power and cable")
 
     def wiggle(self, row: int) -> None:
@@ -160,17 +160,17 @@ class CalibrationBench:
         self.retried(lambda: self._wiggle(row))
 
     def _wiggle(self, row: int) -> None:
-        with self._link() as (link, here):
+        with self._link() as (link, held_rad):
             most = 0.0
-            seen = 0
+            valid_reads = 0
             for time_s, state in self._cycles(link, 2.0 * WIGGLE_S):
-                seen += bool(state.valid[row])
-                most = max(most, float(state.position_rad[row] - here[row]))
+                valid_reads += bool(state.valid[row])
+                most = max(most, float(state.position_rad[row] - held_rad[row]))
                 share = cubic(max(0.0, min(time_s, 2.0 * WIGGLE_S - time_s)) / WIGGLE_S)
-                self._write(link, here, row, here[row] + WIGGLE_RAD * share)
+                self._write(link, held_rad, row, held_rad[row] + WIGGLE_RAD * share)
         if most < MOVED_SHARE * WIGGLE_RAD:
             servo = f"ID {self._robot.servo_ids[row]}"
-            lost = round(2.0 * WIGGLE_S / _CYCLE_S) - seen
+            lost = round(2.0 * WIGGLE_S / _CYCLE_S) - valid_reads
             if lost >= _LOST_CYCLES:  # the servo may not have received its goals, either
                 raise LineLostError(f"{servo}: {lost} cycles of its motion are missing")
             raise InputError(
@@ -181,15 +181,15 @@ class CalibrationBench:
     @contextmanager
     def straight(self, straight_rad: Floats) -> Iterator[Push]:
         """Hold the body straight; gives a function that pushes one joint: see ``_push``."""
-        with self._link() as (link, here):
+        with self._link() as (link, held_rad):
             for row, zero_rad in enumerate(straight_rad):
-                self._go(link, here, row, float(here[row]), float(zero_rad))
-            yield partial(self._push, link, here)
+                self._go(link, held_rad, row, float(held_rad[row]), float(zero_rad))
+            yield partial(self._push, link, held_rad)
 
     def _push(
         self,
         link: SafeLink,
-        here: Floats,
+        held_rad: Floats,
         row: int,
         side: int,
         reach_rad: float,
@@ -201,14 +201,14 @@ class CalibrationBench:
 
         Args:
             link: holds the others.
-            here: (J,) where they are, rad.
+            held_rad: (J,) where they are, rad.
             row: of the servo.
             side: 1 or -1.
             reach_rad: how far to look for a stop.
             keep: gets the distance to the stop, rad, or None, before the joint goes back.
 
         """
-        zero_rad = float(here[row])
+        zero_rad = float(held_rad[row])
         reach_rad = min(reach_rad, RANGE_RAD - abs(zero_rad))
         stop = None
         pushing_s = 0.0
@@ -226,27 +226,27 @@ class CalibrationBench:
             if not pushes:
                 ahead = side * (goal - zero_rad) + self._speed_rad_s[row] * _CYCLE_S
                 goal = zero_rad + side * min(ahead, reach_rad)
-            self._write(link, here, row, goal)
+            self._write(link, held_rad, row, goal)
         keep(stop)
-        self._go(link, here, row, goal, zero_rad)
+        self._go(link, held_rad, row, goal, zero_rad)
 
-    def _go(self, link: SafeLink, here: Floats, row: int, start: float, end: float) -> None:
+    def _go(self, link: SafeLink, held_rad: Floats, row: int, start: float, end: float) -> None:
         """Move one servo evenly, and let it come to rest."""
         last_s = abs(end - start) / self._speed_rad_s[row]
         for time_s, _ in self._cycles(link, last_s + REST_S):
             share = min(time_s / last_s, 1.0) if last_s > 0.0 else 1.0
-            self._write(link, here, row, start + share * (end - start))
-        here[row] = end
+            self._write(link, held_rad, row, start + share * (end - start))
+        held_rad[row] = end
 
     @contextmanager
     def _link(self) -> Iterator[tuple[SafeLink, Floats]]:
         stop = self._stop_requested
         with SafeLink(self._chain, self._limits, self._clock, stop_requested=stop) as link:
             try:
-                here = np.array(link.enable().position_rad)
+                held_rad = np.array(link.enable().position_rad)
             except ChainError as error:
                 raise self._explained(error) from error
-            yield link, here
+            yield link, held_rad
 
     def _explained(self, error: ChainError) -> Exception:
         """Error of a start: silence may be repeated, an alarm has advice."""
@@ -298,8 +298,8 @@ class CalibrationBench:
             return LineLostError(reason)
         return SafetyTrippedError(reason)
 
-    def _write(self, link: SafeLink, here: Floats, row: int, goal_rad: float) -> None:
-        goals = here.copy()
+    def _write(self, link: SafeLink, held_rad: Floats, row: int, goal_rad: float) -> None:
+        goals = held_rad.copy()
         goals[row] = goal_rad
         stale = None
         if self._state is not None:

@@ -28,7 +28,7 @@ def backup(
 ) -> None:
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
     with open_lines(port, baud) as lines:
-        found = back_up_all(lines, lambda step: typer.echo(step, err=True))
+        backup_data = back_up_all(lines, lambda step: typer.echo(step, err=True))
     with atomic_write(out) as part:
-        part.write_text(backup_text(found), encoding="utf-8")
-    show({"servos": [each.id for each in found.servos], "backup": str(out)}, as_json)
+        part.write_text(backup_text(backup_data), encoding="utf-8")
+    show({"servos": [servo.id for servo in backup_data.servos], "backup": str(out)}, as_json)

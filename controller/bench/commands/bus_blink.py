@@ -26,15 +26,15 @@ def blink(
 ) -> None:
     """Blink the LED of servos to find them; nothing moves."""
     with open_lines(port, baud) as lines:
-        buses = {each: lines.open_servo(each) for each in servo_id}
+        buses = {blink_id: lines.open_servo(blink_id) for blink_id in servo_id}
         clock = lines.lines[0][0].clock
         try:
             for _ in range(times):
                 for on in (1, 0):
-                    for each, bus in buses.items():
-                        bus.write(each, "LED", on)
+                    for blink_id, bus in buses.items():
+                        bus.write(blink_id, "LED", on)
                     clock.sleep_until_s(clock.now_s() + _BLINK_S)
         finally:
-            for each, bus in buses.items():
-                bus.write(each, "LED", 0)
+            for blinked_id, bus in buses.items():
+                bus.write(blinked_id, "LED", 0)
     show({"blinked": list(buses), "times": times}, as_json)

@@ -65,13 +65,13 @@ def bus_identify(
     heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
     table = Table(*heads, *(["port"] if lines.several else []), box=None)
     for name, entry in entries:
-        found = entry.found
+        servo = entry.found
         state = entry.report
         state_told = ("-",) * 3
         if state is not None:
             torque = "on" if state.torque_on else "off"
             state_told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
-        about = (found.servo_id, found.model, found.firmware, found.baud)
+        about = (servo.servo_id, servo.model, servo.firmware, servo.baud)
         table.add_row(
             *map(str, about), *state_told, entry.fault, *([name] if lines.several else [])
         )

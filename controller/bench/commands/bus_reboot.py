@@ -19,12 +19,12 @@ def reboot(
     """Restart servos and clear their alarms; torque goes off, so a held load falls."""
     facts: dict[str, object] = {}
     with open_lines(port, baud) as lines:
-        buses = {each: lines.open_servo(each) for each in servo_id}
+        buses = {reboot_id: lines.open_servo(reboot_id) for reboot_id in servo_id}
         question = "torque goes off, and a load that these servos hold falls; reboot them?"
         if yes or confirmed("bus reboot", question, as_json=as_json):
-            for each, bus in buses.items():
-                before, after = restart(bus, each)
-                facts[f"ID {each}"] = (
+            for reboot_id, bus in buses.items():
+                before, after = restart(bus, reboot_id)
+                facts[f"ID {reboot_id}"] = (
                     f"rebooted; alarm before: {before or 'none'}; now: {after or 'none'}"
                 )
     show(facts or {"rebooted": "none"}, as_json)

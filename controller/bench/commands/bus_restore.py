@@ -33,22 +33,27 @@ def restore(
     as_json: Json = False,
 ) -> None:
     """Write the values of a backup that differ; shows them and asks first."""
-    servos = {each.id: each for each in load_backup(file).servos}
-    wanted = servo_id or list(servos)
-    missing = [str(each) for each in wanted if each not in servos]
+    servos = {servo.id: servo for servo in load_backup(file).servos}
+    chosen_ids = servo_id or list(servos)
+    missing = [str(restored_id) for restored_id in chosen_ids if restored_id not in servos]
     if missing:
         raise InputError(
             f"{file}: has no ID {', '.join(missing)}; it has {', '.join(map(str, servos))}"
         )
     with open_lines(port, baud) as lines:
-        buses = {each: lines.open_servo(each) for each in wanted}
-        plans = {each: plan_restore(buses[each], servos[each]) for each in wanted}
-        changed = {each: changes for each, changes in plans.items() if changes}
+        buses = {restored_id: lines.open_servo(restored_id) for restored_id in chosen_ids}
+        plans = {
+            restored_id: plan_restore(buses[restored_id], servos[restored_id])
+            for restored_id in chosen_ids
+        }
+        changed = {restored_id: changes for restored_id, changes in plans.items() if changes}
         if not as_json:
             table = Table("ID", "register", "now", "then", box=None)
-            for each, changes in changed.items():
+            for restored_id, changes in changed.items():
                 for change in changes:
-                    table.add_row(str(each), change.register, str(change.before), str(change.after))
+                    table.add_row(
+                        str(restored_id), change.register, str(change.before), str(change.after)
+                    )
             console.print(table if changed else "nothing to restore")
         written = (
             bool(changed)
@@ -56,12 +61,12 @@ def restore(
             and (yes or confirmed("bus restore", "write this?", as_json=as_json))
         )
         if written:
-            for each, changes in changed.items():
-                apply(buses[each], each, changes)
+            for changed_id, changes in changed.items():
+                apply(buses[changed_id], changed_id, changes)
     if as_json:
         shown = {
-            str(each): {c.register: [c.before, c.after] for c in changes}
-            for each, changes in changed.items()
+            str(restored_id): {c.register: [c.before, c.after] for c in changes}
+            for restored_id, changes in changed.items()
         }
         print(json.dumps({"changes": shown, "written": written}))
     elif changed:

@@ -135,7 +135,7 @@ def serve(
         seed=seed,
     )
     body.check()
-    if sum(each is not None for each in (servos, robot or run, play)) > 1:
+    if sum(given_source is not None for given_source in (servos, robot or run, play)) > 1:
         raise InputError("give one of --servos, --robot, --run and --play")
     if play is not None and (imu is not None or faults is not None):
         raise InputError("--play: has what was recorded; leave --imu and --faults out")

@@ -58,8 +58,8 @@ def power(
                 f"at ID {', '.join(map(str, best.servo_ids))}: {best.lowest_v:.2f} V at the lowest"
             )
     rows = [
-        {"id": each, "voltage_v": round(float(v), 2), "cable_behind_a": a}
-        for each, v, a in zip(
+        {"id": servo_id, "voltage_v": round(float(v), 2), "cable_behind_a": a}
+        for servo_id, v, a in zip(
             ids, drop.servo_v, [*(round(float(a), 2) for a in drop.cable_a), None], strict=True
         )
     ]

@@ -99,7 +99,7 @@ def calibrate(
         ):  # before anything is written: a start writes EEPROM, too
             chain_calibration.find_servos(line, line.latency_s, feetech=like.is_feetech)
             _write(backup, backup_text(back_up(line, line.latency_s)))
-        found = chain_calibration.calibrate(
+        outcome = chain_calibration.calibrate(
             line,
             like,
             _Person(like),
@@ -109,7 +109,7 @@ def calibrate(
             on_progress=lambda step: typer.echo(step, err=True),
             journal=journal,
         )
-        described = found.robot if baud is None else _at_baud(found.robot, baud)
+        described = outcome.robot if baud is None else _at_baud(outcome.robot, baud)
         _write(out, robot_toml(described, heading))
         if backup is not None:
             bus = servo_bus(line, described.models_by_id, latency_s=line.latency_s)
@@ -119,7 +119,7 @@ def calibrate(
         fingerprints = write_fingerprints(out, read_fingerprints(bus, described.servo_ids))
         facts["fingerprints"] = str(fingerprints)
     answers.remove()
-    _show(described, found.notes, facts, as_json)
+    _show(described, outcome.notes, facts, as_json)
 
 
 def _check_robot(like: RobotConfig) -> None:
@@ -160,7 +160,7 @@ def _with_homing(
         there = "The zeros are in the servos, in Homing Offset."
         with homing_written(bus, offsets):
             _write(out, robot_toml(described, f"{heading}\n{there}"))
-    after = {str(each.servo_id): each.after for each in offsets}
+    after = {str(offset.servo_id): offset.after for offset in offsets}
     return described, {
         "backup": str(backup),
         "homing_offsets": after,
@@ -190,8 +190,10 @@ def _write(out: Path, text: str) -> None:
 
 def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
     """Show the servos' registers as they would be, and ask."""
-    for each in offsets:
-        typer.echo(f"ID {each.servo_id}: Homing Offset {each.before} -> {each.after}", err=True)
+    for offset in offsets:
+        typer.echo(
+            f"ID {offset.servo_id}: Homing Offset {offset.before} -> {offset.after}", err=True
+        )
     question = f"write this into the servos? what they hold now is in {backup}"
     return typer.confirm(question, default=False, err=True)
 
@@ -204,12 +206,12 @@ class _Person:
         self._names = robot.joint_names
 
     def which(
-        self, servo_id: int, wiggle: Callable[[], None], known: Mapping[int, int]
+        self, servo_id: int, wiggle: Callable[[], None], id_by_joint: Mapping[int, int]
     ) -> SeenBend:
         """Wiggle until the answers make sense; each repeated question has its reason."""
         while True:
             wiggle()
-            joint = self._joint(servo_id, known)
+            joint = self._joint(servo_id, id_by_joint)
             direction = None if joint is None else self._direction(joint, servo_id)
             if joint is not None and direction is not None:
                 return SeenBend(joint=joint, direction=direction)
@@ -217,7 +219,7 @@ class _Person:
     def straighten(self) -> None:
         _ask("torque is off: lay the body straight and level, then press Enter: ")
 
-    def _joint(self, servo_id: int, known: Mapping[int, int]) -> int | None:
+    def _joint(self, servo_id: int, id_by_joint: Mapping[int, int]) -> int | None:
         """Ask for the joint; None: the servo has to move again."""
         count = len(self._axes)
         while True:
@@ -232,10 +234,10 @@ class _Person:
                 )
                 continue
             joint = int(answer) - 1
-            if joint not in known:
+            if joint not in id_by_joint:
                 return joint
-            label = joint_label(self._names[joint], known[joint])
-            free = ", ".join(str(each + 1) for each in range(count) if each not in known)
+            label = joint_label(self._names[joint], id_by_joint[joint])
+            free = ", ".join(str(index + 1) for index in range(count) if index not in id_by_joint)
             typer.echo(
                 f"{answer} is {label}, assigned by an earlier answer; ID {servo_id} moves again, "
                 f"one of the joints {free}. If the earlier answer was wrong, press Ctrl-C and "

@@ -85,8 +85,8 @@ def doctor(
         return
     if port is not None and (port == FILE_PORTS or is_port_map(port)):
         described = on_ports(described, port)
-        device = port_map_text((each.port, each.ids) for each in described.ports)
-        findings = [permission(each) for each in real_ports(described)]
+        device = port_map_text((segment.port, segment.ids) for segment in described.ports)
+        findings = [permission(real_port) for real_port in real_ports(described)]
     else:
         device = pick_port(port)
         findings = [permission(device)]
@@ -97,7 +97,7 @@ def doctor(
         ):
             (line, ids), *others = lines.lines
             if others:
-                segments = [(each, some or ()) for each, some in lines.lines]
+                segments = [(port_name, some or ()) for port_name, some in lines.lines]
                 findings += examine_segments(
                     segments,
                     described,
@@ -138,21 +138,21 @@ def _accept(
     file = fingerprint_file(robot_file, "--accept")
     if port is not None and (port == FILE_PORTS or is_port_map(port)):
         robot = on_ports(robot, port)
-        port = port_map_text((each.port, each.ids) for each in robot.ports)
-    known = file.read() or {}
+        port = port_map_text((segment.port, segment.ids) for segment in robot.ports)
+    stored_fingerprints = file.read() or {}
     with open_lines(port, robot.servo.baud) as lines:
-        found = read_all(lines, robot)
-    silent = [robot.joint_label(j) for j, i in enumerate(robot.servo_ids) if i not in found]
+        fingerprints = read_all(lines, robot)
+    silent = [robot.joint_label(j) for j, i in enumerate(robot.servo_ids) if i not in fingerprints]
     if silent:
         raise BusError(f"{', '.join(silent)}: no reply; nothing is written")
-    changed = differences(robot, known, found)
+    changed = differences(robot, stored_fingerprints, fingerprints)
     for line in () if as_json else changed:
         typer.echo(line)
     is_written = bool(changed) and (
         yes or confirmed("doctor --accept", f"write this into {file.path}?", as_json=as_json)
     )
     if is_written:
-        file.write(found)
+        file.write(fingerprints)
     if as_json:
         facts = {"file": str(file.path), "changes": changed, "written": is_written}
         print(json.dumps(facts))

@@ -21,7 +21,7 @@ def scan(
 ) -> None:
     """List the servos on a bus, at every baud rate; changes nothing."""
     scanning.check_bauds(baud or ())
-    found = []
+    results = []
     noise: dict[str, dict[int, int]] = {}
     with (
         open_lines(port, baud[0] if baud else DEFAULT_BAUD) as lines,
@@ -33,34 +33,34 @@ def scan(
                 status.update(f"{name}: {step}")
 
             report = scanning.scan(line, baud or (), show_step)
-            found += [(line.name, each) for each in report.servos]
+            results += [(line.name, result) for result in report.servos]
             if report.bad_line is not None:
                 LOGGER.warning("%s: %s", line.name, report.bad_line)
             if report.noise_bytes:
                 noise[line.name] = dict(report.noise_bytes)
-    for note in lines.misplaced((name, servo.servo_id) for name, servo in found):
+    for note in lines.misplaced((name, servo.servo_id) for name, servo in results):
         LOGGER.warning("%s", note)
     if as_json:
-        servos = [servo.to_dict() | {"port": name} for name, servo in found]
+        servos = [servo.to_dict() | {"port": name} for name, servo in results]
         print(json.dumps({"port": lines.port, "servos": servos, "noise_bytes": noise}))
-    elif found:
-        _print_servos(found, lines.several)
+    elif results:
+        _print_servos(results, lines.several)
     elif noise:
         console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
     else:
         console.print(f"{lines.port}: {_silence(baud)}")
-    if not found:
+    if not results:
         raise SystemExit(1)
 
 
-def _print_servos(found: list[tuple[str, scanning.ScanResult]], several: bool) -> None:
+def _print_servos(results: list[tuple[str, scanning.ScanResult]], several: bool) -> None:
     """Print a table, with the port if there are ``several``."""
     table = Table("ID", "model", "firmware", "baud", *(["port"] if several else []), box=None)
-    for name, servo in found:
+    for name, servo in results:
         shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
         table.add_row(*map(str, shown), *([name] if several else []))
     console.print(table)
-    for _, servo in found:
+    for _, servo in results:
         if servo.secondary_id is not None:
             console.print(
                 f"servo {servo.servo_id} obeys ID {servo.secondary_id} as well: its "
@@ -72,5 +72,5 @@ def _silence(bauds: list[int] | None) -> str:
     """Return what a silent bus means, and what to do."""
     if not bauds:
         return "nobody answers at any baud rate: power? cable? adapter's switch?"
-    rates = " or ".join(str(each) for each in bauds)
+    rates = " or ".join(str(rate) for rate in bauds)
     return f"nobody answers at {rates} baud; leave --baud out to search all rates"

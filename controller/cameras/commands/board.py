@@ -54,10 +54,12 @@ def board(
     as_json: Json = False,
 ) -> None:
     """Draw the board for `pose calibrate`; print it without scaling, and glue it to a plate."""
-    made = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
+    calibration_board = CalibrationBoard(
+        read_pattern(pattern), read_squares(squares), 0.001 * square
+    )
     check_print(out)
-    write_print(out, [made.picture(DOTS)])
-    width, height = (round(1000.0 * side, 1) for side in made.size_m)
+    write_print(out, [calibration_board.picture(DOTS)])
+    width, height = (round(1000.0 * side, 1) for side in calibration_board.size_m)
     show({"board": str(out), "width_mm": width, "height_mm": height, "square_mm": square}, as_json)
 
 

@@ -63,8 +63,8 @@ def check(
 
             page = stack.enter_context(open_camera_page(view_at, prepared.run.camera, watch))
             on_frame = page.on_frame
-        seen = watch.check(seconds, on_frame)
-    report = seen.report()
+        camera_check = watch.check(seconds, on_frame)
+    report = camera_check.report()
     findings = camera_findings(report, prepared.run.camera, watch.locks)
     fit = report.latency
     measured = fit is not None and not fit.fault

@@ -68,34 +68,37 @@ def calibrate_camera(
         raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
     board = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
     if source.isdigit():
-        seen, size_px = _from_device(source, size, board, views)
+        board_views, size_px = _from_device(source, size, board, views)
     else:
-        seen, size_px = _from_files(Path(source), board, views)
-    found = calibrate_lens(seen, size_px)
-    used = sum(math.isfinite(one) for one in found.view_rms_px)
+        board_views, size_px = _from_files(Path(source), board, views)
+    calibration = calibrate_lens(board_views, size_px)
+    used = sum(math.isfinite(rms_px) for rms_px in calibration.view_rms_px)
     with atomic_write(out) as part:
-        found.lens.write(part, found.rms_px, used)
-    focal = found.lens.matrix[[0, 1], [0, 1]]
-    matrix = found.lens.matrix
+        calibration.lens.write(part, calibration.rms_px, used)
+    focal = calibration.lens.matrix[[0, 1], [0, 1]]
+    matrix = calibration.lens.matrix
     show(
         {
             "lens": str(out),
             "size_px": list(size_px),
-            "pictures": len(seen),
-            "with_the_board": sum(one is not None for one in seen),
+            "pictures": len(board_views),
+            "with_the_board": sum(view is not None for view in board_views),
             "used": used,
-            "residual_rms_px": round(found.rms_px, 3),
+            "residual_rms_px": round(calibration.rms_px, 3),
             "residual_of_views_px": [
-                None if math.isnan(one) else round(one, 3) for one in found.view_rms_px.tolist()
+                None if math.isnan(rms_px) else round(rms_px, 3)
+                for rms_px in calibration.view_rms_px.tolist()
             ],
-            "focal_px": [round(one, 2) for one in focal.tolist()],
-            "focal_standard_error_px": round(found.focal_error_px, 2),
-            "centre_px": [round(one, 2) for one in matrix[:2, 2].tolist()],
-            "centre_standard_error_px": round(found.centre_error_px, 2),
-            "distortion": [round(one, 5) for one in found.lens.distortion.tolist()],
-            "coverage": round(found.coverage, 2),
-            "largest_tilt_deg": round(found.tilt_deg, 1),
-            "remarks": list(found.remarks),
+            "focal_px": [round(focal_value, 2) for focal_value in focal.tolist()],
+            "focal_standard_error_px": round(calibration.focal_error_px, 2),
+            "centre_px": [round(centre_value, 2) for centre_value in matrix[:2, 2].tolist()],
+            "centre_standard_error_px": round(calibration.centre_error_px, 2),
+            "distortion": [
+                round(coefficient, 5) for coefficient in calibration.lens.distortion.tolist()
+            ],
+            "coverage": round(calibration.coverage, 2),
+            "largest_tilt_deg": round(calibration.tilt_deg, 1),
+            "remarks": list(calibration.remarks),
         },
         as_json,
     )
@@ -105,12 +108,14 @@ def _from_files(
     path: Path, board: CalibrationBoard, most: int
 ) -> tuple[list[BoardView | None], tuple[int, int]]:
     # OpenCV finds boards in 8 bit pictures
-    pictures = [np.clip(one, 0, 255).astype(np.uint8) for one in open_footage(path).spread(most)]
+    pictures = [
+        np.clip(image, 0, 255).astype(np.uint8) for image in open_footage(path).spread(most)
+    ]
     sizes = sorted({picture.shape[1::-1] for picture in pictures})
     if len(sizes) > 1:
         shown = " and ".join(f"{width} x {height}" for width, height in sizes)
         raise InputError(f"{path}: pictures of one size are needed, these are {shown} pixels")
-    return [board.find(one) for one in pictures], (sizes[0][0], sizes[0][1])
+    return [board.find(picture) for picture in pictures], (sizes[0][0], sizes[0][1])
 
 
 def _from_device(
@@ -120,24 +125,28 @@ def _from_device(
     width, _, height = size.partition("x")
     if not (width.isdigit() and height.isdigit() and 64 <= int(width) <= 4096):
         raise InputError(f"--size {size}: expected width x height in pixels, e.g. 640x480")
-    wanted = CameraConfig(device=name, width_px=int(width), height_px=int(height))
-    device = open_device(wanted)
+    camera = CameraConfig(device=name, width_px=int(width), height_px=int(height))
+    device = open_device(camera)
     clock = WallClock()
-    seen: list[BoardView | None] = []
+    board_views: list[BoardView | None] = []
     picture: Image | None = None
     try:
-        while len(seen) < count:
+        while len(board_views) < count:
             until_s = clock.now_s() + _PAUSE_S
             while picture is None or clock.now_s() < until_s:
-                whole, frame = device.read()
-                if not whole:
+                is_read, frame = device.read()
+                if not is_read:
                     raise InputError(f"camera {name}: hands over no more frames")
                 picture = np.asarray(frame, dtype=np.uint8)
-            seen.append(board.find(picture))
-            corners = "no board" if seen[-1] is None else f"{len(seen[-1].corners_px)} corners"
-            typer.echo(f"picture {len(seen)} of {count}: {corners}", err=True)
+            board_views.append(board.find(picture))
+            corners = (
+                "no board"
+                if board_views[-1] is None
+                else f"{len(board_views[-1].corners_px)} corners"
+            )
+            typer.echo(f"picture {len(board_views)} of {count}: {corners}", err=True)
     finally:
         device.release()
     if picture is None:
         raise InputError(f"camera {name}: no picture was taken")
-    return seen, (picture.shape[1], picture.shape[0])
+    return board_views, (picture.shape[1], picture.shape[0])

@@ -43,7 +43,7 @@ def markers(
         raise InputError(f"--side {side:g}: must be 10 to 1000 mm")
     pages = [marker_sheet(number, 1e-3 * side, DOTS) for number in range(first, first + count)]
     write_print(out, pages)
-    high, wide = (round(one / DOTS * 25.4 + 20.0, 1) for one in pages[0].shape)
+    high, wide = (round(length_px / DOTS * 25.4 + 20.0, 1) for length_px in pages[0].shape)
     show(
         {
             "markers": str(out),

@@ -89,11 +89,11 @@ class Bump:
                 + ", which is undone"
             )
         if self.left_out:
-            one = len(self.left_out) == 1
+            is_single = len(self.left_out) == 1
             names = " and ".join(str(number) for number in self.left_out)
             said.append(
                 f"marker {names} was moved on the floor and is left out"
-                if one
+                if is_single
                 else f"markers {names} were moved on the floor and are left out"
             )
         return "; ".join(said) or "the camera is again where it was set up"
@@ -124,8 +124,8 @@ def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
     text = f"marker {number}   {1e3 * side_m:g} mm"
     thick = max(1, len(drawn) // 400)
     size = 0.6 * len(drawn) / cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 1.0, thick)[0][0]
-    at = margin, len(page) - margin // 2
-    cv2.putText(page, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, 0, thick, cv2.LINE_AA)
+    place_px = margin, len(page) - margin // 2
+    cv2.putText(page, text, place_px, cv2.FONT_HERSHEY_SIMPLEX, size, 0, thick, cv2.LINE_AA)
     return page
 
 
@@ -135,7 +135,9 @@ def find_markers(picture: Image) -> dict[int, Floats]:
     large = cv2.resize(grey, None, fx=_LARGER, fy=_LARGER, interpolation=cv2.INTER_CUBIC)
     corners, numbers, _ = cv2.aruco.ArucoDetector(_dictionary()).detectMarkers(large)
     names = [] if numbers is None else np.asarray(numbers, dtype=int).ravel().tolist()
-    places = [(np.asarray(one, dtype=float).reshape(4, 2) + 0.5) / _LARGER - 0.5 for one in corners]
+    places = [
+        (np.asarray(corner, dtype=float).reshape(4, 2) + 0.5) / _LARGER - 0.5 for corner in corners
+    ]
     return {
         name: _aligned(grey, name, place)
         for name, place in zip(names, places, strict=True)
@@ -154,13 +156,13 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
     ends = np.array([[low, low], [high, low], [high, high], [low, high]])
     there = cv2.getPerspectiveTransform(ends.astype(np.float32), corners.astype(np.float32))
     flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
-    seen = cv2.warpPerspective(grey, there, sheet.shape[::-1], flags=flags).astype(np.float32)
+    warped = cv2.warpPerspective(grey, there, sheet.shape[::-1], flags=flags).astype(np.float32)
     sheet = np.asarray(cv2.GaussianBlur(sheet, (0, 0), max(0.3, 0.5 * cell / cells_px)))
     start = np.eye(2, 3, dtype=np.float32)
-    whole = np.full(seen.shape, 255, np.uint8)
+    mask = np.full(warped.shape, 255, np.uint8)
     try:
         _, move = cv2.findTransformECC(
-            sheet, seen, start, cv2.MOTION_AFFINE, _STEPS, whole, _SMOOTH
+            sheet, warped, start, cv2.MOTION_AFFINE, _STEPS, mask, _SMOOTH
         )
     except cv2.error:  # no convergence: half covered, or blurred
         return corners
@@ -170,12 +172,12 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
 
 
 def fit_floor(
-    seen: Markers, places_m: Mapping[int, Sequence[float]], lens: Lens | None
+    markers: Markers, places_m: Mapping[int, Sequence[float]], lens: Lens | None
 ) -> FloorFit:
     """Fit the floor to the centres of its markers.
 
     Args:
-        seen: in a picture.
+        markers: in a picture.
         places_m: (2,) of each marker's centre on the floor.
         lens: None: pixels and floor are one homography; otherwise the camera's place is fitted too.
 
@@ -183,14 +185,14 @@ def fit_floor(
         InputError: fewer than four markers are seen, or they are on a line.
 
     """
-    used = sorted(set(seen) & set(places_m))
+    used = sorted(set(markers) & set(places_m))
     if len(used) < FEWEST:
-        missing = ", ".join(str(one) for one in sorted(set(places_m) - set(used)))
+        missing = ", ".join(str(marker_id) for marker_id in sorted(set(places_m) - set(used)))
         raise InputError(
             f"{len(used)} of {len(places_m)} markers are seen, {FEWEST} are needed; not seen: "
             f"{missing}: in the picture, lit, at least 14 px wide?"
         )
-    px = {name: _plain(seen[name], lens) for name in used}
+    px = {name: _plain(markers[name], lens) for name in used}
     middles = np.array([middle_of(px[name]) for name in used])
     floor = np.array([places_m[name] for name in used], dtype=float)
     for what, places in (("the picture", middles), ("markers_m", floor)):
@@ -238,34 +240,36 @@ def picture_move(
         None if fewer than three markers are seen at both times.
 
     """
-    one, two = ({name: _plain(px, lens) for name, px in seen.items()} for seen in (then, now))
-    names = sorted(set(one) & set(two))
+    before_px, two = (
+        {name: _plain(px, lens) for name, px in markers.items()} for markers in (then, now)
+    )
+    names = sorted(set(before_px) & set(two))
     if len(names) < _FEWEST_MOVED:
         return None
     rest = list(names)
     left_out = list[int]()
     while len(rest) >= _FEWEST_MOVED:
-        move = _turned(matrix, one, two, rest)
-        off_px = _residual_px(move, one, two, rest)
+        move = _turned(matrix, before_px, two, rest)
+        off_px = _residual_px(move, before_px, two, rest)
         if off_px <= _AGREE_PX:
             if off_px > _TURNED_PX:
-                move = _carried(matrix, floor_from_px, one, two, rest)
+                move = _carried(matrix, floor_from_px, before_px, two, rest)
             return PictureMove(move, _bump(move, matrix, tuple(sorted(left_out))))
         if 2 * (len(left_out) + 1) >= len(names):
             break
-        worst = min(rest, key=lambda name: _without(name, matrix, one, two, rest))
+        worst = min(rest, key=lambda name: _without(name, matrix, before_px, two, rest))
         rest.remove(worst)
         left_out.append(worst)
-    move = _carried(matrix, floor_from_px, one, two, names)
-    undone = len(names) >= FEWEST and _residual_px(move, one, two, names) <= _TURNED_PX
+    move = _carried(matrix, floor_from_px, before_px, two, names)
+    undone = len(names) >= FEWEST and _residual_px(move, before_px, two, names) <= _TURNED_PX
     return PictureMove(move, replace(_bump(move, matrix, ()), undone=undone))
 
 
-def _turned(matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> Floats:
+def _turned(matrix: Floats, before_px: Markers, two: Markers, names: Sequence[int]) -> Floats:
     """(3, 3) for a rotated camera: Wahba's problem by SVD."""
     rays = []
-    for seen in (one, two):
-        px = np.concatenate([seen[name] for name in names])
+    for markers in (before_px, two):
+        px = np.concatenate([markers[name] for name in names])
         ray = np.linalg.solve(matrix, np.column_stack([px, np.ones(len(px))]).T)
         rays.append(ray / np.linalg.norm(ray, axis=0))
     left, _, right = np.linalg.svd(rays[1] @ rays[0].T)
@@ -274,24 +278,29 @@ def _turned(matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) ->
 
 
 def _carried(
-    matrix: Floats, floor_from_px: Floats, one: Markers, two: Markers, names: Sequence[int]
+    matrix: Floats, floor_from_px: Floats, before_px: Markers, two: Markers, names: Sequence[int]
 ) -> Floats:
     """(3, 3) for a rotated and shifted camera: its poses over the floor, then and now."""
-    before, after = (np.concatenate([seen[name] for name in names]) for seen in (one, two))
+    before, after = (
+        np.concatenate([markers[name] for name in names]) for markers in (before_px, two)
+    )
     floor = projected(floor_from_px, before)
     then, now = (_pose(floor, px, matrix) for px in (before, after))
     move = _over_floor(now, matrix) @ np.linalg.inv(_over_floor(then, matrix))
     return np.asarray(move / move[2, 2])
 
 
-def _without(name: int, matrix: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
+def _without(
+    name: int, matrix: Floats, before_px: Markers, two: Markers, names: Sequence[int]
+) -> float:
     rest = [other for other in names if other != name]
-    return _residual_px(_turned(matrix, one, two, rest), one, two, rest)
+    return _residual_px(_turned(matrix, before_px, two, rest), before_px, two, rest)
 
 
-def _residual_px(move: Floats, one: Markers, two: Markers, names: Sequence[int]) -> float:
+def _residual_px(move: Floats, before_px: Markers, two: Markers, names: Sequence[int]) -> float:
     return max(
-        float(np.hypot(*(projected(move, one[name]) - two[name]).mean(axis=0))) for name in names
+        float(np.hypot(*(projected(move, before_px[name]) - two[name]).mean(axis=0)))
+        for name in names
     )
 
 

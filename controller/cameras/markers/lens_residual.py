@@ -60,7 +60,7 @@ class Distortion:
 
 
 def marker_distortion(
-    seen: Markers,
+    markers: Markers,
     places_m: Mapping[int, Sequence[float]],
     size_px: tuple[int, int],
     side_m: float,
@@ -68,7 +68,7 @@ def marker_distortion(
     """Estimate the distortion of a lens from markers in a picture.
 
     Args:
-        seen: corners of the markers.
+        markers: corners of the markers.
         places_m: (2,) of each marker's centre on the floor.
         size_px: width and height of the picture.
         side_m: of a printed marker.
@@ -77,14 +77,14 @@ def marker_distortion(
         None for fewer than four markers, or markers on a line.
 
     """
-    names = sorted(set(seen) & set(places_m))
+    names = sorted(set(markers) & set(places_m))
     if len(names) < FEWEST:
         return None
     middle = 0.5 * (np.array(size_px) - 1.0)
     unit = 0.5 * size_px[0]
-    px = (np.array([seen[name] for name in names]) - middle) / unit
+    px = (np.array([markers[name] for name in names]) - middle) / unit
     floor = np.array([places_m[name] for name in names], dtype=float)
-    start, _ = cv2.findHomography(np.array([middle_of(one) for one in px]), floor)
+    start, _ = cv2.findHomography(np.array([middle_of(corners_px) for corners_px in px]), floor)
     if start is None or not np.isfinite(start).all() or abs(start[2, 2]) < 1e-9:
         return None
     start = np.asarray(start, dtype=float) / start[2, 2]
@@ -101,10 +101,14 @@ def marker_distortion(
         c, s = np.cos(turn), np.sin(turn)
         spin = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
         squares = side_m * (1.0 + _SIDE * values[9]) * (_SQUARE @ spin)
-        wanted = (floor + _PLACE_M * away)[:, None] + squares
-        found = projected(homography, _undone(px, float(values[8])))
+        expected_m = (floor + _PLACE_M * away)[:, None] + squares
+        projected_m = projected(homography, _undone(px, float(values[8])))
         return np.concatenate(
-            [((found - wanted) * metre_px / _CORNER_PX).ravel(), away.ravel(), values[9:10]]
+            [
+                ((projected_m - expected_m) * metre_px / _CORNER_PX).ravel(),
+                away.ravel(),
+                values[9:10],
+            ]
         )
 
     first = np.concatenate([start.ravel()[:8], [0.0, 0.0], turns, np.zeros(2 * count)])
@@ -112,7 +116,7 @@ def marker_distortion(
     for coefficient in _STARTS:
         first[8] = coefficient
         fits.append(least_squares(off, first, method="lm", x_scale="jac", max_nfev=4000))
-    fit = min(fits, key=lambda one: float(one.cost))
+    fit = min(fits, key=lambda lens_fit: float(lens_fit.cost))
     slopes: Floats = np.array(fit.jac, dtype=float)
     inverse = np.linalg.pinv(slopes.T @ slopes)
     spare = max(len(fit.fun) - len(first), 1)

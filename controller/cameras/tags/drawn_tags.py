@@ -93,7 +93,10 @@ class DrawnTags:
         large = (2 * size[0], 2 * size[1])
         face = cv2.warpPerspective(drawn.astype(np.float32), twice @ to_picture, large)
         cover = cv2.warpPerspective(np.ones(drawn.shape, np.float32), twice @ to_picture, large)
-        face, cover = (cv2.resize(one, size, interpolation=cv2.INTER_AREA) for one in (face, cover))
+        face, cover = (
+            cv2.resize(drawn_picture, size, interpolation=cv2.INTER_AREA)
+            for drawn_picture in (face, cover)
+        )
         part = shown[top:low, left:right]
         part *= 1.0 - cover
         part += face

@@ -69,12 +69,12 @@ class DeviceTags:
             InputError: the device stopped, or changed its picture size.
 
         """
-        found = []
+        arrivals = []
         while not self._found.empty():
-            found.append(self._found.get_nowait())
-        if self._fault is not None and not found:
+            arrivals.append(self._found.get_nowait())
+        if self._fault is not None and not arrivals:
             raise InputError(f"camera {self._camera.device}: {self._fault}")
-        return found
+        return arrivals
 
     def close(self) -> None:
         """Stop the thread and release the device."""
@@ -131,10 +131,10 @@ class SimulatedTags:
             self._coming.append(TagPicture(now_s, self._detector.find(picture)))
             missed = int((now_s - self._next_s) / self._period_s + 1e-9)
             self._next_s += (missed + 1) * self._period_s
-        found = []
+        arrivals = []
         while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
-            found.append(self._coming.popleft())
-        return found
+            arrivals.append(self._coming.popleft())
+        return arrivals
 
     def close(self) -> None:
         """Do nothing: no device is open."""
@@ -148,16 +148,16 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
 
     """
     until_s = clock.now_s() + PATIENCE_S
-    seen = 0
+    pictures_with_tags = 0
     while clock.now_s() < until_s:
         for picture in pictures.arrived(clock.now_s()):
-            seen += 1
+            pictures_with_tags += 1
             if picture.corners_px:
                 return picture
         clock.sleep_until_s(clock.now_s() + _LOOK_S)
-    if not seen:
+    if not pictures_with_tags:
         raise InputError(f"pose tags: no picture within {PATIENCE_S:g} s; check the camera")
     raise InputError(
-        f"pose tags: {seen} pictures show no tag of tags.on; check light, focus, dictionary and "
-        "the numbers of the tags"
+        f"pose tags: {pictures_with_tags} pictures show no tag of tags.on; check light, focus, "
+        "dictionary and the numbers of the tags"
     )

@@ -44,15 +44,15 @@ def tag_dictionary(name: str) -> Any:
 class TagDetector:
     """Finds tags in pictures."""
 
-    def __init__(self, dictionary: str, known: Collection[int]) -> None:
-        """Search for the tags with the numbers ``known``.
+    def __init__(self, dictionary: str, ids: Collection[int]) -> None:
+        """Search for the tags with the numbers ``ids``.
 
         Raises:
             InputError: the dictionary, or a tag in it, does not exist.
 
         """
         tags = tag_dictionary(dictionary)
-        beyond = [number for number in known if number >= len(tags.bytesList)]
+        beyond = [number for number in ids if number >= len(tags.bytesList)]
         if beyond:
             raise InputError(
                 f"tags: tag {beyond[0]}: {dictionary} has the numbers 0 to "
@@ -60,20 +60,27 @@ class TagDetector:
             )
         parameters = cv2.aruco.DetectorParameters()
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
-        self._known = frozenset(known)
+        self._known = frozenset(ids)
         self._detector = cv2.aruco.ArucoDetector(tags, parameters)
 
     def find(self, picture: Image) -> dict[int, Floats]:
         """Return the corners of each tag that a picture (H, W[, 3]) shows once."""
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         corners, numbers, _ = self._detector.detectMarkers(grey)
-        found: dict[int, Floats] = {}
+        corners_by_id: dict[int, Floats] = {}
         twice = set()
         for square, number in zip(corners, () if numbers is None else numbers.ravel(), strict=True):
-            at = np.asarray(square, dtype=float).reshape(4, 2)
-            if number not in self._known or np.hypot(*(at - np.roll(at, 1, 0)).T).min() < _LEAST_PX:
+            corners_px = np.asarray(square, dtype=float).reshape(4, 2)
+            if (
+                number not in self._known
+                or np.hypot(*(corners_px - np.roll(corners_px, 1, 0)).T).min() < _LEAST_PX
+            ):
                 continue
-            if int(number) in found:
+            if int(number) in corners_by_id:
                 twice.add(int(number))
-            found[int(number)] = at
-        return {number: at for number, at in found.items() if number not in twice}
+            corners_by_id[int(number)] = corners_px
+        return {
+            number: corners_px
+            for number, corners_px in corners_by_id.items()
+            if number not in twice
+        }

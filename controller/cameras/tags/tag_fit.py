@@ -88,18 +88,18 @@ class TagFit:
         ``joint_rad`` (J,) are those at the picture's time; ``before`` (3, 3) is an earlier attitude
         of the head, if known.
         """
-        seen = self._seen(corners_px, joint_rad)
-        while seen.tags:
-            start = self._start(seen, before)
+        sighting = self._seen(corners_px, joint_rad)
+        while sighting.tags:
+            start = self._start(sighting, before)
             if start is None:
                 return None
-            robust = self._refined(seen, *start, weighted=True)
-            good = self._per_tag_px(seen, *robust) <= _MISFIT * self._tags.noise_px
+            robust = self._refined(sighting, *start, weighted=True)
+            good = self._per_tag_px(sighting, *robust) <= _MISFIT * self._tags.noise_px
             if good.all():
-                pose = self._refined(seen, *robust)
-                error_px = float(np.sqrt((self._off_px(seen, *pose) ** 2).mean()))
-                return self._result(seen, *pose, error_px)
-            seen = seen.only(good)
+                pose = self._refined(sighting, *robust)
+                error_px = float(np.sqrt((self._off_px(sighting, *pose) ** 2).mean()))
+                return self._result(sighting, *pose, error_px)
+            sighting = sighting.only(good)
         return None
 
     def of_link(self, corners_px: Corners) -> tuple[int, HeadFit] | None:
@@ -111,10 +111,10 @@ class TagFit:
             mount = self._mounts[number]
             points = tag_corners(mount, self._tags.side_m)
             pixels = self.view.lens.undistorted(corners_px[number])
-            seen = _Seen((number,), points, pixels)
-            start = self._start(seen, None)
+            sighting = _Seen((number,), points, pixels)
+            start = self._start(sighting, None)
             if start is not None:
-                return mount.link, self._result(seen, *start, 0.0)
+                return mount.link, self._result(sighting, *start, 0.0)
         return None
 
     def _seen(self, corners_px: Corners, joint_rad: Floats) -> _Seen:
@@ -134,17 +134,17 @@ class TagFit:
         pixels = self.view.lens.undistorted(np.concatenate([corners_px[n] for n in numbers]))
         return _Seen(tuple(numbers), np.concatenate(points), pixels)
 
-    def _start(self, seen: _Seen, before: Floats | None) -> tuple[Floats, Floats] | None:
+    def _start(self, sighting: _Seen, before: Floats | None) -> tuple[Floats, Floats] | None:
         """Return the best pose from single tags, in the camera's axes."""
-        found = []
-        for turn, at in self._candidates(seen):
-            off = self._off_px(seen, turn, at)
-            found.append((float(np.sqrt((off**2).mean())), turn, at))
-        if not found:
+        starts = []
+        for turn, place_m in self._candidates(sighting):
+            off = self._off_px(sighting, turn, place_m)
+            starts.append((float(np.sqrt((off**2).mean())), turn, place_m))
+        if not starts:
             return None
-        best = min(error for error, _, _ in found)
+        best = min(error for error, _, _ in starts)
         close = [
-            one for one in found if one[0] <= _AMBIGUOUS * max(best, self._tags.noise_px)
+            start for start in starts if start[0] <= _AMBIGUOUS * max(best, self._tags.noise_px)
         ]  # each explains the picture
         if len(close) == 1:
             return close[0][1:]
@@ -155,55 +155,55 @@ class TagFit:
         ]
         return close[int(np.argmax(likely))][1:]
 
-    def _candidates(self, seen: _Seen) -> Iterator[tuple[Floats, Floats]]:
+    def _candidates(self, sighting: _Seen) -> Iterator[tuple[Floats, Floats]]:
         flat = square(self._tags.side_m)
-        for k in range(min(_TRIED, len(seen.tags))):
+        for k in range(min(_TRIED, len(sighting.tags))):
             rows = slice(4 * k, 4 * k + 4)
             count, turns, shifts, _ = cv2.solvePnPGeneric(
                 flat,
-                seen.pixels[rows],
+                sighting.pixels[rows],
                 self.view.lens.matrix,
                 None,
                 flags=cv2.SOLVEPNP_IPPE_SQUARE,
             )
-            axes, middle = _axes_of(seen.points_m[rows])
+            axes, middle = _axes_of(sighting.points_m[rows])
             for turn, shift in zip(turns[:count], shifts[:count], strict=True):
                 rotation = cv2.Rodrigues(turn)[0] @ axes.T
                 yield rotation, shift.ravel() - rotation @ middle
 
     def _refined(
-        self, seen: _Seen, turn: Floats, at: Floats, *, weighted: bool = False
+        self, sighting: _Seen, turn: Floats, place_m: Floats, *, weighted: bool = False
     ) -> tuple[Floats, Floats]:
         """Fit all corners; ``weighted``: outlying tags count less (Cauchy's weights)."""
         scale_px = _MISFIT * self._tags.noise_px
         for _ in range(_ROBUST_ROUNDS if weighted else _ROUNDS):
-            off = self._off_px(seen, turn, at).ravel()
-            slope = self._slope(seen, turn, at)
+            off = self._off_px(sighting, turn, place_m).ravel()
+            slope = self._slope(sighting, turn, place_m)
             if weighted:
-                share = 1.0 / (1.0 + (self._per_tag_px(seen, turn, at) / scale_px) ** 2)
+                share = 1.0 / (1.0 + (self._per_tag_px(sighting, turn, place_m) / scale_px) ** 2)
                 root = np.sqrt(np.repeat(share, 8))
                 off = root * off
                 slope = root[:, None] * slope
             step = np.asarray(np.linalg.lstsq(slope, -off, rcond=None)[0], dtype=float)
-            at = at + step[:3]
+            place_m = place_m + step[:3]
             turn = rotation_by(step[3:]) @ turn
-        return turn, at
+        return turn, place_m
 
-    def _per_tag_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
-        off = self._off_px(seen, turn, at).reshape(len(seen.tags), 8)
+    def _per_tag_px(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
+        off = self._off_px(sighting, turn, place_m).reshape(len(sighting.tags), 8)
         return np.asarray(np.sqrt((off**2).mean(axis=1)))
 
-    def _off_px(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
+    def _off_px(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
         """Errors (4 k, 2) of the corners."""
-        places = seen.points_m @ turn.T + at
+        places = sighting.points_m @ turn.T + place_m
         ahead = np.maximum(places[:, 2:], _NEAR_M)
         shown = places[:, :2] / ahead @ self.view.lens.matrix[:2, :2].T
-        return np.asarray(shown + self.view.lens.matrix[:2, 2] - seen.pixels)
+        return np.asarray(shown + self.view.lens.matrix[:2, 2] - sighting.pixels)
 
-    def _slope(self, seen: _Seen, turn: Floats, at: Floats) -> Floats:
+    def _slope(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
         """Derivatives (8 k, 6) by position and rotation, in the camera's axes."""
-        arm = seen.points_m @ turn.T
-        x, y, z = (arm + at).T
+        arm = sighting.points_m @ turn.T
+        x, y, z = (arm + place_m).T
         z = np.maximum(z, _NEAR_M)
         zero = np.zeros_like(x)
         shown = np.stack(
@@ -216,8 +216,8 @@ class TagFit:
         )
         return np.concatenate([by_place, by_place @ by_turn], axis=2).reshape(-1, 6)
 
-    def _result(self, seen: _Seen, turn: Floats, at: Floats, error_px: float) -> HeadFit:
-        slope = self._slope(seen, turn, at)
+    def _result(self, sighting: _Seen, turn: Floats, place_m: Floats, error_px: float) -> HeadFit:
+        slope = self._slope(sighting, turn, place_m)
         noise_px = max(self._tags.noise_px, error_px)
         inner = noise_px**2 * np.linalg.inv(slope.T @ slope)
         axes = self.view.rotation
@@ -226,11 +226,11 @@ class TagFit:
         shared = np.diag([_JOINT_SD_M**2] * 3 + [_JOINT_SD_RAD**2] * 3)
         covariance = both @ inner @ both.T + shared
         return HeadFit(
-            self.view.place_m + axes @ at,
+            self.view.place_m + axes @ place_m,
             axes @ turn,
             0.5 * (covariance + covariance.T),
             error_px,
-            seen.tags,
+            sighting.tags,
         )
 
 

@@ -143,22 +143,22 @@ class TagFeed:
     def _pose_of(self, picture: TagPicture) -> ArrivedPose:
         self._sequence += 1
         joint_rad = self._joints.at(picture.time_s).joint_rad
-        found = self._fit.fit(picture.corners_px, joint_rad, self._before)
-        if found is None:
+        head_fit = self._fit.fit(picture.corners_px, joint_rad, self._before)
+        if head_fit is None:
             why = "no tag is in the picture; uncover the tags, or move the camera"
             if picture.corners_px:
                 why = "the tags do not fit the joints; check tags.on and the camera's place"
             return ArrivedPose(picture.time_s, "tags", UnusablePoseError(why))
-        self._before = found.rotation
-        self._tags += len(found.tags)
+        self._before = head_fit.rotation
+        self._tags += len(head_fit.tags)
         self._used += 1
         sample = PoseSample(
             self._sequence,
             picture.time_s,
-            found.position_m,
-            found.rotation,
+            head_fit.position_m,
+            head_fit.rotation,
             WORLD,
-            found.covariance,
+            head_fit.covariance,
         )
         return ArrivedPose(picture.time_s, "tags", sample)
 
@@ -215,8 +215,8 @@ def _check_start(context: PoseContext, fit: TagFit, first: TagPicture, config: P
     alone = fit.of_link(first.corners_px)
     if alone is None:
         raise InputError("pose tags: no tag of the robot is in the picture; turn it, or the camera")
-    link, found = alone
-    sample = PoseSample(0, first.time_s, found.position_m, found.rotation, WORLD)
+    link, head_fit = alone
+    sample = PoseSample(0, first.time_s, head_fit.position_m, head_fit.rotation, WORLD)
     fault = start_fault(
         sample,
         robot,

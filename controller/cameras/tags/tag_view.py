@@ -68,20 +68,20 @@ class TagView:
 
     def pixels(self, points_m: Floats) -> Floats:
         """Pixels, with distortion, of world points (..., 3)."""
-        seen = (points_m - self.place_m) @ self.rotation
-        flat = np.ascontiguousarray(seen.reshape(-1, 3))
+        in_camera_m = (points_m - self.place_m) @ self.rotation
+        flat = np.ascontiguousarray(in_camera_m.reshape(-1, 3))
         none = np.zeros(3)
-        found, _ = cv2.projectPoints(flat, none, none, self.lens.matrix, self.lens.distortion)
-        return np.asarray(found, dtype=float).reshape(*points_m.shape[:-1], 2)
+        projected, _ = cv2.projectPoints(flat, none, none, self.lens.matrix, self.lens.distortion)
+        return np.asarray(projected, dtype=float).reshape(*points_m.shape[:-1], 2)
 
-    def placed_by(self, seen: Corners, fixed: Sequence[FixedTag], side_m: float) -> Self:
+    def placed_by(self, corners_by_tag: Corners, fixed: Sequence[FixedTag], side_m: float) -> Self:
         """Return the camera placed by fixed tags.
 
         Raises:
             InputError: no fixed tag is seen, or their places contradict the picture.
 
         """
-        tags = [tag for tag in fixed if tag.id in seen]
+        tags = [tag for tag in fixed if tag.id in corners_by_tag]
         if not tags:
             numbers = ", ".join(str(tag.id) for tag in fixed)
             raise InputError(f"camera.fixed_tags: none is in the picture; show tag {numbers}")
@@ -91,7 +91,7 @@ class TagView:
                 for tag in tags
             ]
         )
-        pixels = self.lens.undistorted(np.concatenate([seen[tag.id] for tag in tags]))
+        pixels = self.lens.undistorted(np.concatenate([corners_by_tag[tag.id] for tag in tags]))
         flags = cv2.SOLVEPNP_IPPE if len(tags) == 1 else cv2.SOLVEPNP_SQPNP
         count, turns, shifts, errors = cv2.solvePnPGeneric(
             corners, pixels, self.lens.matrix, None, flags=flags

@@ -59,22 +59,22 @@ def analyse(
     check_rate(rate, recordings)
     choice = choice_of(individual, keypoints, plane)
     files = _pictures(recordings, picture, force)
-    found = []
+    analyses = []
     pairs = list(zip(recordings, files, strict=True))
     for name, file in show_progress(pairs, "recordings", len(pairs)):
         shipped = name in EMBEDDED
-        one = measure(
+        analysis = measure(
             load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
         )
         if file is not None:
             from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415  --picture: an extra
 
-            draw_analysis(one, file)
-        found.append(one.facts() | {"picture": None if file is None else str(file)})
+            draw_analysis(analysis, file)
+        analyses.append(analysis.facts() | {"picture": None if file is None else str(file)})
     if as_json:
-        print(json.dumps(found))
+        print(json.dumps(analyses))
         return
-    for facts in found:
+    for facts in analyses:
         _show(facts)
 
 

@@ -183,7 +183,7 @@ def show_several(facts: AnimalsFacts, *, as_json: bool) -> None:
         show(asdict(facts), as_json)
     else:
         _print_animals(facts)
-    if any(one.capture is None for one in facts.animals):
+    if any(animal.capture is None for animal in facts.animals):
         raise SystemExit(1)
 
 
@@ -193,15 +193,15 @@ def _print_animals(facts: AnimalsFacts) -> None:
     heads = ("animal", "track", "frames used", "in contact", "length, px", "identity uncertain")
     for head in heads:
         table.add_column(head)
-    for one in facts.animals:
-        after = ", ".join(map(str, one.identity_uncertain_after))
+    for animal in facts.animals:
+        after = ", ".join(map(str, animal.identity_uncertain_after))
         unsure = f"after frame {after}" if after else "no"
-        if one.capture is None:
-            table.add_row(str(one.animal), "-", "0", "-", "-", unsure)
+        if animal.capture is None:
+            table.add_row(str(animal.animal), "-", "0", "-", "-", unsure)
             continue
-        used = one.capture.frames_used
-        length = f"{one.capture.length_px:g}"
-        merged = str(one.frames_merged)
-        table.add_row(str(one.animal), one.capture.track, str(used), merged, length, unsure)
+        used = animal.capture.frames_used
+        length = f"{animal.capture.length_px:g}"
+        merged = str(animal.frames_merged)
+        table.add_row(str(animal.animal), animal.capture.track, str(used), merged, length, unsure)
     console.print(table)
     console.print(f"other objects, not captured: {facts.left_out}; background: {facts.background}")

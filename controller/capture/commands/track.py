@@ -82,7 +82,7 @@ def track(
         raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
     check_rate(rate, names)
     choice = choice_of(individual, keypoints, plane)
-    found = [
+    tracked = [
         examine(
             name,
             robot,
@@ -94,15 +94,21 @@ def track(
     if picture is not None:
         from snakewalk.controller.capture.plots.recording import draw  # noqa: PLC0415  --picture: an extra
 
-        draw([(one.track, Path(one.facts.recording).name) for one in found], picture)
+        draw(
+            [
+                (tracked_film.track, Path(tracked_film.facts.recording).name)
+                for tracked_film in tracked
+            ],
+            picture,
+        )
     if output is not None:
         with atomic_write(output) as part:
-            write_track(part, found[0].track, output.suffix)
+            write_track(part, tracked[0].track, output.suffix)
     if as_json:
-        print(json.dumps([one.facts.to_dict() for one in found]))
+        print(json.dumps([tracked_film.facts.to_dict() for tracked_film in tracked]))
         return
-    for one in found:
-        _show(one.facts)
+    for tracked_film in tracked:
+        _show(tracked_film.facts)
 
 
 def _show(facts: "RecordingFacts") -> None:

@@ -23,7 +23,7 @@ _BODIES = 60  # drawn under the paths
 _BINS = 20
 
 
-def draw_analysis(found: Analysis, file: Path) -> None:
+def draw_analysis(analysis: Analysis, file: Path) -> None:
     """Write one picture in the format of its ending.
 
     Raises:
@@ -31,25 +31,25 @@ def draw_analysis(found: Analysis, file: Path) -> None:
 
     """
     check_picture(file)
-    track = found.track
-    pulse = found.pulse
-    unknown = found.pulse_unknown_reason
+    track = analysis.track
+    pulse = analysis.pulse
+    unknown = analysis.pulse_unknown_reason
     scale = track.rate_hz / track.angles_rad.shape[1]
     with style():
         figure = Figure(figsize=(WIDTH_IN, 8.4), layout="constrained", dpi=110)
         (tracks, angles), (swings, speeds), (against, errors) = figure.subplots(
             3, 2, gridspec_kw={"width_ratios": [1.0, 1.5]}
         )
-        _tracks(tracks, found)
+        _tracks(tracks, analysis)
         swing = track.angles_rad - track.angles_rad.mean(axis=1, keepdims=True)
         body_map(figure, angles, track, swing, "angle (rad)")
         angles.set_title("angle about the mean heading")
-        _swings(swings, found)
+        _swings(swings, analysis)
         if unknown is None:
-            _speeds(figure, speeds, found, scale)
+            _speeds(figure, speeds, analysis, scale)
             body_map(figure, errors, track, pulse.body_error_rad, "error (rad)", kept=pulse.frame)
             errors.set_title("error of one speed for the whole body")
-            _error_by_slope(against, found)
+            _error_by_slope(against, analysis)
         else:
             for axes in (speeds, errors, against):
                 axes.set_axis_off()
@@ -58,9 +58,9 @@ def draw_analysis(found: Analysis, file: Path) -> None:
         save_picture(figure, file)
 
 
-def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
+def _speeds(figure: Figure, axes: Axes, analysis: Analysis, scale: float) -> None:
     """Draw the pulse speed by body and time, body lengths a second."""
-    pulse = found.pulse
+    pulse = analysis.pulse
     speed = pulse.points_per_frame * scale
     low, high = np.nanpercentile(speed, [2.5, 97.5]).tolist()
     if low < 0.0 < high:
@@ -69,7 +69,7 @@ def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
     body_map(
         figure,
         axes,
-        found.track,
+        analysis.track,
         speed,
         "body lengths per s",
         kept=pulse.frame,
@@ -78,11 +78,11 @@ def _speeds(figure: Figure, axes: Axes, found: Analysis, scale: float) -> None:
     axes.set_title("pulse speed to the tail; grey: unknown")
 
 
-def _tracks(axes: Axes, found: Analysis) -> None:
+def _tracks(axes: Axes, analysis: Analysis) -> None:
     """Draw the paths of head, middle and tail, over the bodies."""
-    body = even_points(found.track)
+    body = even_points(analysis.track)
     if body is None:
-        midlines(axes, found.track)
+        midlines(axes, analysis.track)
         axes.set_title("shapes (no places)")
         return
     some = np.unique(np.linspace(0, len(body) - 1, _BODIES).astype(int))
@@ -100,20 +100,20 @@ def _tracks(axes: Axes, found: Analysis) -> None:
     axes.set_title("tracks")
 
 
-def _error_by_slope(axes: Axes, found: Analysis) -> None:
+def _error_by_slope(axes: Axes, analysis: Analysis) -> None:
     """Draw the absolute error against the slope along the body, in bins of equal counts."""
-    error = np.abs(found.pulse.body_error_rad)
-    slope = found.slope_rad
-    seen = np.isfinite(error)
-    order = np.argsort(slope[seen])
-    parts = [np.array_split(values[seen][order], _BINS) for values in (slope, error)]
+    error = np.abs(analysis.pulse.body_error_rad)
+    slope = analysis.slope_rad
+    is_finite = np.isfinite(error)
+    order = np.argsort(slope[is_finite])
+    parts = [np.array_split(values[is_finite][order], _BINS) for values in (slope, error)]
     x, (low, middle, high) = (
         np.array([part.mean() for part in parts[0]]),
         np.array([np.percentile(part, [25.0, 50.0, 75.0]) for part in parts[1]]).T,
     )
     axes.fill_between(x, low, high, color=PALE)
     axes.plot(x, middle, color=BLUE, label="median, 25 to 75 %")
-    fit = found.error_slope
+    fit = analysis.error_slope
     if fit is not None:
         axes.plot(x, fit[0] * x, color=INK, linestyle="--", label=f"fit: {fit[0]:.2f} points")
     axes.set_xlim(0.0, float(x[-1]))
@@ -124,9 +124,9 @@ def _error_by_slope(axes: Axes, found: Analysis) -> None:
     axes.set_title("error by the slope")
 
 
-def _swings(axes: Axes, found: Analysis) -> None:
+def _swings(axes: Axes, analysis: Analysis) -> None:
     """Draw both amplitudes along the body."""
-    how = found.undulation
+    how = analysis.undulation
     along = np.linspace(0.0, 1.0, len(how.lateral))
     axes.plot(along, how.lateral, color=BLUE)
     axes.set_ylim(0.0, 1.15 * float(how.lateral.max()))

@@ -94,8 +94,8 @@ def contact_sheet(
                 _words(tile, text, status is FrameStatus.GOOD, line)
             tiles[k].append(tile)
     empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
-    wide = min(columns, max(len(one) for one in tiles))
-    placed = [tile for one in tiles for tile in [*one, *[empty] * (-len(one) % wide)]]
+    wide = min(columns, max(len(row) for row in tiles))
+    placed = [tile for row in tiles for tile in [*row, *[empty] * (-len(row) % wide)]]
     sheet = np.vstack([np.hstack(placed[k : k + wide]) for k in range(0, len(placed), wide)])
     with atomic_write(path) as part:
         if not _written(part, sheet):
@@ -188,13 +188,13 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     for number, (u, v) in enumerate(line.tolist()):
         size = 4 if number % 10 == 0 else 2
         cv2.circle(chords, (u, v), size * 16, _BAD, -1, cv2.LINE_AA, 4)
-    whole = drawn(image, points_px, FrameStatus.GOOD, *tile_px)
+    skeleton_picture = drawn(image, points_px, FrameStatus.GOOD, *tile_px)
     named = {
         "image": bare,
         "silhouette": shape,
         "medial axis": axis,
         "100 equal chords": chords,
-        "skeleton, head": whole,
+        "skeleton, head": skeleton_picture,
     }
     for name, tile in named.items():
         _words(tile, name, good=True)
@@ -212,8 +212,8 @@ def _chosen(captured: Capture, places: int) -> list[int]:
 
 
 def _spread(numbers: NDArray[np.intp], most: int) -> list[int]:
-    at = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
-    return [int(numbers[round(k)]) for k in at]
+    place = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
+    return [int(numbers[round(k)]) for k in place]
 
 
 def overlay_film(

@@ -62,7 +62,7 @@ def find_animals(
     some: Sequence[DeepImage],
     detector: BodyDetector,
     *,
-    wanted: int | None,
+    requested_count: int | None,
     name: str,
     on_progress: Callable[[], None] | None = None,
 ) -> AnimalsFound:
@@ -72,7 +72,7 @@ def find_animals(
         frames: all, in order.
         some: a few, spread over the film.
         detector: from ``detector_of_several``.
-        wanted: number of animals; None: those that are followed through half of the film.
+        requested_count: number of animals; None: those that are followed through half of the film.
         name: of the film, for faults.
         on_progress: called after each frame.
 
@@ -80,9 +80,11 @@ def find_animals(
         InputError: fewer animals than wanted, or none.
 
     """
-    seen = [blobs_of(one, detector.ground_of(one), detector) for one in some]
-    usual = usual_area(seen)
-    sample = [one.area_px for one in seen]
+    blob_frames = [
+        blobs_of(sample_frame, detector.ground_of(sample_frame), detector) for sample_frame in some
+    ]
+    usual = usual_area(blob_frames)
+    sample = [blobs.area_px for blobs in blob_frames]
     if usual <= 0.0:
         raise InputError(
             f"{name}: no contrast or no motion: nothing stands out from the background; give "
@@ -96,17 +98,20 @@ def find_animals(
         if on_progress is not None:
             on_progress()
     every = identities_of(builder.done())
-    kept = [one for one in every if one.is_animal(count)]
-    if wanted is not None:
-        kept = every[:wanted]
-    if not kept or (wanted is not None and len(kept) < wanted):
-        asked = "auto" if wanted is None else str(wanted)
+    kept = [identity for identity in every if identity.is_animal(count)]
+    if requested_count is not None:
+        kept = every[:requested_count]
+    if not kept or (requested_count is not None and len(kept) < requested_count):
+        asked = "auto" if requested_count is None else str(requested_count)
         raise InputError(
             f"{name}: --animals {asked}: {len(kept)} animals can be followed; give --background, "
             "or another number"
         )
-    kept.sort(key=lambda one: float(one.tracklets[0].middles[0][0]))
-    small = [int(((one > _DIRT * usual) & (one < SMALLEST * usual)).sum()) for one in sample]
+    kept.sort(key=lambda kept_identity: float(kept_identity.tracklets[0].middles[0][0]))
+    small = [
+        int(((areas_px > _DIRT * usual) & (areas_px < SMALLEST * usual)).sum())
+        for areas_px in sample
+    ]
     return AnimalsFound(
         tuple(kept), len(every) - len(kept), usual, count, smaller=int(np.median(small))
     )
@@ -120,23 +125,25 @@ def share_of_several(
 ) -> float:
     """Share of whole animals among all in some frames; 0 if they show fewer than two."""
     detector = detector_of_several(frames, background, inside=inside, threshold=threshold)
-    grounds = [detector.ground_of(one) for one in frames]
-    seen = [blobs_of(one, ground, detector) for one, ground in zip(frames, grounds, strict=True)]
-    count, _ = count_of(seen)
+    grounds = [detector.ground_of(frame) for frame in frames]
+    blob_frames = [
+        blobs_of(frame, ground, detector) for frame, ground in zip(frames, grounds, strict=True)
+    ]
+    count, _ = count_of(blob_frames)
     if count < 2:
         return 0.0
-    least = SMALLEST * usual_area(seen)
-    whole = sum(
+    least = SMALLEST * usual_area(blob_frames)
+    total = sum(
         _detected(frame, ground, detector, blobs, int(number))[1].skeleton.status
         is FrameStatus.GOOD
-        for frame, ground, blobs in zip(frames, grounds, seen, strict=True)
+        for frame, ground, blobs in zip(frames, grounds, blob_frames, strict=True)
         for number in np.flatnonzero(blobs.area_px >= least)[:count]
     )
-    return whole / (count * len(frames))
+    return total / (count * len(frames))
 
 
 def films_of(
-    found: AnimalsFound,
+    animals_found: AnimalsFound,
     rate_hz: float,
     name: str,
     folder: PartFolder | None = None,
@@ -151,15 +158,15 @@ def films_of(
 
     """
     out = []
-    for number in range(1, len(found.identities) + 1):
-        own = None if folder is None else folder.of_animal(number)
-        finished = [] if own is None or not resume else own.parts()
+    for number in range(1, len(animals_found.identities) + 1):
+        animal_folder = None if folder is None else folder.of_animal(number)
+        finished = [] if animal_folder is None or not resume else animal_folder.parts()
         out.append(
             FilmParts(
                 rate_hz,
-                found.frames,
+                animals_found.frames,
                 f"{name}: animal {number}",
-                folder=own,
+                folder=animal_folder,
                 finished=finished,
                 part_frames=part_frames,
             )
@@ -170,7 +177,7 @@ def films_of(
 def capture_animals(
     frames: Callable[[int], Iterable[DeepImage]],
     detector: BodyDetector,
-    found: AnimalsFound,
+    animals_found: AnimalsFound,
     films: Sequence[FilmParts],
     *,
     on_progress: Callable[[], None] | None = None,
@@ -180,32 +187,35 @@ def capture_animals(
     Args:
         frames: the frames from a number on.
         detector: from ``detector_of_several``.
-        found: the animals.
+        animals_found: the animals.
         films: from ``films_of``; frames of their finished parts are not captured again.
         on_progress: called after each frame.
 
     """
-    plans = [_plan(one, found.frames) for one in found.identities]
-    before = [one.done_frames for one in films]
+    plans = [_plan(identity, animals_found.frames) for identity in animals_found.identities]
+    before = [animal_film.done_frames for animal_film in films]
     first = min(before)
     if on_progress is not None:
         for _ in range(first):
             on_progress()
     for number, frame in enumerate(frames(first), start=first):
         ground = detector.ground_of(frame)
-        blobs = blobs_of(frame, ground, detector, found.usual_px)
+        blobs = blobs_of(frame, ground, detector, animals_found.usual_px)
         for plan, film, finished in zip(plans, films, before, strict=True):
             if number < finished:
                 continue
-            here = int(plan[number])
-            if here in _MISSING:
-                film.skip(_MISSING[here])
+            index = int(plan[number])
+            if index in _MISSING:
+                film.skip(_MISSING[index])
                 continue
-            shown, detection = _detected(frame, ground, detector, blobs, here)
+            shown, detection = _detected(frame, ground, detector, blobs, index)
             film.add(shown, detection)
         if on_progress is not None:
             on_progress()
-    return [_captured(*each) for each in zip(found.identities, films, strict=True)]
+    return [
+        _captured(*identity_and_film)
+        for identity_and_film in zip(animals_found.identities, films, strict=True)
+    ]
 
 
 def _captured(identity: Identity, film: FilmParts) -> CapturedAnimal:
@@ -224,14 +234,14 @@ def _plan(identity: Identity, count: int) -> SignedInts:
     if last.ends_in is not None:
         out[last.frames[-1] + 1 :] = _MERGED
     touched = False
-    at = first.frames[0]
-    for one in identity.tracklets:
-        touched = touched or (one is not first and one.begins_in is not None)
+    next_frame = first.frames[0]
+    for tracklet in identity.tracklets:
+        touched = touched or (tracklet is not first and tracklet.begins_in is not None)
         if touched:
-            out[at : one.frames[0]] = _MERGED
-        at = one.frames[-1] + 1
-        touched = one.ends_in is not None
-        out[one.frames[0] : at] = one.blobs
+            out[next_frame : tracklet.frames[0]] = _MERGED
+        next_frame = tracklet.frames[-1] + 1
+        touched = tracklet.ends_in is not None
+        out[tracklet.frames[0] : next_frame] = tracklet.blobs
     return out
 
 
@@ -246,15 +256,15 @@ def _detected(
     part[covered] = ground[window][covered]
     inside = None if detector.inside is None else detector.inside[window]
     local = replace(detector, inside=inside)
-    found = local.detect(part, np.ascontiguousarray(ground[window]))
+    detection = local.detect(part, np.ascontiguousarray(ground[window]))
     corner = np.array([window[1].start, window[0].start], dtype=float)
     shown = ground.copy()
     shown[window] = part
-    silhouette = found.silhouette
+    silhouette = detection.silhouette
     x, y = np.add(silhouette.origin_px, corner)
     return shown, replace(
-        found,
+        detection,
         silhouette=replace(silhouette, origin_px=(float(x), float(y))),
-        skeleton=replace(found.skeleton, points_px=found.skeleton.points_px + corner),
+        skeleton=replace(detection.skeleton, points_px=detection.skeleton.points_px + corner),
         background=ground,
     )

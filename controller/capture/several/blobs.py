@@ -50,31 +50,39 @@ def blobs_of(
         usual_px: usual area of an animal; 0: any size.
 
     """
-    apart = soft_contrast(frame, ground, detector.polarity)
+    contrast_image = soft_contrast(frame, ground, detector.polarity)
     if detector.inside is not None:
-        apart = np.where(detector.inside, apart, np.zeros_like(apart))
-    threshold = body_threshold(apart) if detector.threshold is None else detector.threshold
-    found = None if threshold is None else connected_parts((apart > threshold).astype(np.uint8))
-    if found is None:
+        contrast_image = np.where(detector.inside, contrast_image, np.zeros_like(contrast_image))
+    threshold = body_threshold(contrast_image) if detector.threshold is None else detector.threshold
+    parts = (
+        None
+        if threshold is None
+        else connected_parts((contrast_image > threshold).astype(np.uint8))
+    )
+    if parts is None:
         none = np.zeros((0, 4), dtype=int)
         return Blobs(
-            np.zeros(apart.shape, np.int32), none, np.zeros(0), np.zeros((0, 2)), np.zeros((0, 3))
+            np.zeros(contrast_image.shape, np.int32),
+            none,
+            np.zeros(0),
+            np.zeros((0, 2)),
+            np.zeros((0, 3)),
         )
-    label, stats = found
+    label, stats = parts
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     kept = 1 + np.flatnonzero(area[1:] >= max(1.0, SMALLEST * usual_px))
     number = np.zeros(len(stats), dtype=np.int32)
     number[kept] = np.arange(1, len(kept) + 1)
     boxes = stats[kept, :4].astype(int)
     label = number[label]
-    measured = [_measured(label, apart, k, box) for k, box in enumerate(boxes, start=1)]
-    middle = np.array([one for one, _ in measured]).reshape(-1, 2)
-    shape = np.array([one for _, one in measured]).reshape(-1, len(FEATURES))
+    measured = [_measured(label, contrast_image, k, box) for k, box in enumerate(boxes, start=1)]
+    middle = np.array([middle_px for middle_px, _ in measured]).reshape(-1, 2)
+    shape = np.array([features for _, features in measured]).reshape(-1, len(FEATURES))
     return Blobs(label, boxes, area[kept], middle, shape)
 
 
 def _measured(
-    label: NDArray[np.int32], apart: DeepImage, number: int, box: Ints
+    label: NDArray[np.int32], contrast_image: DeepImage, number: int, box: Ints
 ) -> tuple[Floats, Floats]:
     """Centroid of a blob, and its shape: the rectangle of equal area and perimeter."""
     left, top, wide, high = (int(v) for v in box)
@@ -82,18 +90,18 @@ def _measured(
     mask = (label[window] == number).astype(np.uint8)
     rows, columns = np.nonzero(mask)
     outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    around = max(cv2.arcLength(one, True) for one in outlines)
+    around = max(cv2.arcLength(outline, True) for outline in outlines)
     area = float(len(rows))
     length = 0.25 * (around + np.sqrt(max(0.0, around**2 - 16.0 * area)))
     length = max(length, 1.0)
-    contrast = float(apart[window][mask > 0].mean())
+    contrast = float(contrast_image[window][mask > 0].mean())
     middle = np.array([left + columns.mean(), top + rows.mean()])
     return middle, np.log([length, max(area / length, 0.5), max(contrast, 0.5)])
 
 
 def usual_area(frames: Sequence[Blobs]) -> float:
     """Usual area of an animal: larger blobs make up half of the total; 0: nothing stands out."""
-    area = np.sort(np.concatenate([one.area_px for one in frames]))
+    area = np.sort(np.concatenate([blobs.area_px for blobs in frames]))
     if not area.size:
         return 0.0
     share = np.cumsum(area) / area.sum()
@@ -103,8 +111,10 @@ def usual_area(frames: Sequence[Blobs]) -> float:
 def count_of(frames: Sequence[Blobs]) -> tuple[int, float]:
     """Median number of animals in some frames, and their mean total area."""
     least = SMALLEST * usual_area(frames)
-    large = [one.area_px[one.area_px >= least] for one in frames]
-    return int(np.median([len(one) for one in large])), float(np.mean([one.sum() for one in large]))
+    large = [blobs.area_px[blobs.area_px >= least] for blobs in frames]
+    return int(np.median([len(areas_px) for areas_px in large])), float(
+        np.mean([areas_px.sum() for areas_px in large])
+    )
 
 
 def detector_of_several(
@@ -113,13 +123,13 @@ def detector_of_several(
     *,
     inside: Bools | None = None,
     threshold: float | None = None,
-    wanted: int | None = None,
+    requested_count: int | None = None,
 ) -> BodyDetector:
     """Learn the scene of several animals from a few frames of a fixed camera.
 
     The median over frames shows animals where they rest or come back. A lighter or darker quantile
-    of each pixel is used if animals are larger against it, or nearer to the number ``wanted``. All
-    of them contain animals that hardly move. A surface fitted to each frame is used if it shows the
+    of each pixel is used if animals are larger against it, or nearer to ``requested_count``. All of
+    them contain animals that hardly move. A surface fitted to each frame is used if it shows the
     same moving animals clearly larger, and more alike in size.
 
     Args:
@@ -127,7 +137,7 @@ def detector_of_several(
         background: the scene without animals.
         inside: (H, W) where animals may be.
         threshold: contrast at the boundary of a body, grey levels.
-        wanted: number of animals; None: unknown.
+        requested_count: number of animals; None: unknown.
 
     Raises:
         InputError: nothing stands out.
@@ -144,13 +154,15 @@ def detector_of_several(
         detector = BodyDetector(ground, polarity, source, 0, inside, threshold)
         count, area = count_of([blobs_of(frame, ground, detector) for frame in frames])
         if count:
-            tried.append((detector, 0 if wanted is None else abs(count - wanted), area))
+            tried.append(
+                (detector, 0 if requested_count is None else abs(count - requested_count), area)
+            )
     if not tried:
         raise InputError(
             "nothing stands out from the background; give --background, or better light"
         )
     nearest = min(away for _, away, _ in tried)
-    tried = [one for one in tried if one[1] == nearest]
+    tried = [trial for trial in tried if trial[1] == nearest]
     largest = max(area for _, _, area in tried)
     fixed = next(detector for detector, _, area in tried if area >= _AS_LARGE * largest)
     surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
@@ -159,23 +171,25 @@ def detector_of_several(
 
 def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]) -> bool:
     """Whether a fixed background hides parts of animals that a surface shows."""
-    whole, parts = (
-        [blobs_of(one, detector.ground_of(one), detector) for one in frames]
+    whole_blobs, parts = (
+        [blobs_of(frame, detector.ground_of(frame), detector) for frame in frames]
         for detector in (surface, fixed)
     )
-    least = SMALLEST * usual_area(whole)
+    least = SMALLEST * usual_area(whole_blobs)
     moving = []
-    for one, changed in zip(whole, parts, strict=True):
-        seen = np.unique(one.label[changed.label > 0])
-        areas = one.area_px[seen[seen > 0] - 1]
+    for blobs, changed in zip(whole_blobs, parts, strict=True):
+        labels = np.unique(blobs.label[changed.label > 0])
+        areas = blobs.area_px[labels[labels > 0] - 1]
         moving.append(areas[areas >= least])
-    if sum(one.sum() for one in moving) < _WHOLE * sum(one.area_px.sum() for one in parts):
+    if sum(areas_px.sum() for areas_px in moving) < _WHOLE * sum(
+        part.area_px.sum() for part in parts
+    ):
         return False
     count, _ = count_of(parts)
-    counts = [len(one) for one in moving]
+    counts = [len(areas_px) for areas_px in moving]
     least = SMALLEST * usual_area(parts)
-    pieces = np.concatenate([one.area_px[one.area_px >= least] for one in parts])
-    steadier = np.std(counts) < np.std([int((one.area_px >= least).sum()) for one in parts])
+    pieces = np.concatenate([part.area_px[part.area_px >= least] for part in parts])
+    steadier = np.std(counts) < np.std([int((part.area_px >= least).sum()) for part in parts])
     more_alike = _unlike(np.concatenate(moving)) < _unlike(pieces)
     return bool(steadier and more_alike and np.median(counts) >= 0.5 * count)
 
@@ -199,10 +213,10 @@ def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]
 def others_mask(blobs: Blobs, number: int, window: tuple[slice, slice], reach_px: int) -> Bools:
     """(h, w) pixels of a window that show other animals, with their blurred edges."""
     label = blobs.label[window]
-    own = label == number + 1
-    other = ((label > 0) & ~own).astype(np.uint8)
+    is_blob = label == number + 1
+    other = ((label > 0) & ~is_blob).astype(np.uint8)
     if not other.any():
         return np.zeros(label.shape, dtype=bool)
     box = np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
-    near_own = cv2.dilate(own.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    near_own = cv2.dilate(is_blob.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     return np.asarray((cv2.dilate(other, box) > 0) & ~near_own)

@@ -46,7 +46,7 @@ class Identity:
     @property
     def frames(self) -> int:
         """Frames in which the animal is alone."""
-        return sum(len(one.frames) for one in self.tracklets)
+        return sum(len(tracklet.frames) for tracklet in self.tracklets)
 
     @property
     def span(self) -> int:
@@ -86,8 +86,8 @@ def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
     links: list[_Link] = []
     for _ in range(_ROUNDS):
         links = _links(tracklets, links)
-    after = {one.before: one for one in links}
-    later = {one.after for one in links}
+    after = {identity_link.before: identity_link for identity_link in links}
+    later = {identity_link.after for identity_link in links}
     out = []
     for first in range(len(tracklets)):
         if first in later:
@@ -102,12 +102,12 @@ def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:
             k = link.after
             chain.append(tracklets[k])
         out.append(Identity(tuple(chain), tuple(unsure), len(chain) - 1))
-    return sorted(out, key=lambda one: -one.span)
+    return sorted(out, key=lambda identity: -identity.span)
 
 
-def _links(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> list[_Link]:
+def _links(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> list[_Link]:
     """Assign ends to starts; shapes are those of all tracklets that certain links join."""
-    cost = _costs(tracklets, known)
+    cost = _costs(tracklets, links)
     out = []
     for olds, news in _groups(cost):
         some = np.array([[cost[old].get(new, np.inf) for new in news] for old in olds])
@@ -122,10 +122,10 @@ def _links(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> list[_Link]
 def _assigned(cost: Floats, alone: Floats) -> list[tuple[int, int]]:
     """Pairs (row, column) of least cost; a row may stay alone at a cost of its own."""
     rows, columns = cost.shape
-    whole = np.full((rows, columns + rows), 1e9)
-    whole[:, :columns] = np.where(np.isfinite(cost), cost, 1e9)
-    whole[np.arange(rows), columns + np.arange(rows)] = alone
-    pairs = zip(*linear_sum_assignment(whole), strict=True)
+    padded_cost = np.full((rows, columns + rows), 1e9)
+    padded_cost[:, :columns] = np.where(np.isfinite(cost), cost, 1e9)
+    padded_cost[np.arange(rows), columns + np.arange(rows)] = alone
+    pairs = zip(*linear_sum_assignment(padded_cost), strict=True)
     return [(int(r), int(c)) for r, c in pairs if c < columns and np.isfinite(cost[r, c])]
 
 
@@ -135,13 +135,13 @@ def _margin(
     """Additional cost if the animal of a row continued elsewhere: exchanged, or in a free start."""
     best = float("inf")
     taken = {c for _, c in pairs}
-    for other, at in pairs:
+    for other, other_column in pairs:
         if other != row:
-            swapped = cost[row, at] + min(cost[other, column], 1e9)
-            best = min(best, float(swapped - cost[row, column] - cost[other, at]))
-    for at in range(cost.shape[1]):
-        if at not in taken:
-            best = min(best, float(cost[row, at] - cost[row, column]))
+            swapped = cost[row, other_column] + min(cost[other, column], 1e9)
+            best = min(best, float(swapped - cost[row, column] - cost[other, other_column]))
+    for column_index in range(cost.shape[1]):
+        if column_index not in taken:
+            best = min(best, float(cost[row, column_index] - cost[row, column]))
     for other in set(range(cost.shape[0])) - {r for r, _ in pairs}:
         if np.isfinite(cost[other, column]):
             best = min(best, float(cost[other, column] - cost[row, column]))
@@ -173,30 +173,32 @@ def _groups(cost: _Costs) -> list[tuple[list[int], list[int]]]:
 def _later_starts(tracklets: Sequence[Tracklet]) -> Iterator[tuple[int, int]]:
     """Pairs of an end and a later start in the same crossing or soon after."""
     begins: dict[int | None, list[int]] = {}
-    for k, one in enumerate(tracklets):
-        begins.setdefault(one.begins_in, []).append(k)
-    first = np.array([one.frames[0] for one in tracklets])
+    for k, tracklet in enumerate(tracklets):
+        begins.setdefault(tracklet.begins_in, []).append(k)
+    first = np.array([tracklet.frames[0] for tracklet in tracklets])
     order = np.argsort(first, kind="stable")
-    for k, one in enumerate(tracklets):
-        last = one.frames[-1]
+    for k, earlier_tracklet in enumerate(tracklets):
+        last = earlier_tracklet.frames[-1]
         low, high = np.searchsorted(first[order], (last + 1, last + _MOST_GAP + 1)).tolist()
         near = set(order[low:high].tolist())
-        if one.ends_in is not None:
-            near |= {j for j in begins.get(one.ends_in, ()) if first[j] > last}
+        if earlier_tracklet.ends_in is not None:
+            near |= {j for j in begins.get(earlier_tracklet.ends_in, ()) if first[j] > last}
         for j in sorted(near):
             yield k, j
 
 
-def _costs(tracklets: Sequence[Tracklet], known: Sequence[_Link]) -> _Costs:
+def _costs(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> _Costs:
     """Cost of each start as the continuation of an end."""
     cost: _Costs = {}
     if not tracklets:
         return cost
     spread = _spread(tracklets)
-    length = float(np.exp(np.median([np.median(one.shapes, axis=0)[0] for one in tracklets])))
-    before, after = _shapes(tracklets, known)
-    out = [_motion(one, last=True) for one in tracklets]
-    into = [_motion(one, last=False) for one in tracklets]
+    length = float(
+        np.exp(np.median([np.median(tracklet.shapes, axis=0)[0] for tracklet in tracklets]))
+    )
+    before, after = _shapes(tracklets, links)
+    out = [_motion(tracklet, last=True) for tracklet in tracklets]
+    into = [_motion(tracklet, last=False) for tracklet in tracklets]
     speed = float(np.median([np.hypot(*velocity) for _, velocity in (*out, *into)]))
     for i, j in _later_starts(tracklets):
         old, new = tracklets[i], tracklets[j]
@@ -229,22 +231,22 @@ def _may_follow(
 
 def _spread(tracklets: Sequence[Tracklet]) -> Floats:
     """(3,) usual spread of an animal's shape from frame to frame."""
-    apart = [
-        np.abs(one.shapes - np.median(one.shapes, axis=0))
-        for one in tracklets
-        if len(one.frames) >= _MOTION_FRAMES
+    deviations = [
+        np.abs(tracklet.shapes - np.median(tracklet.shapes, axis=0))
+        for tracklet in tracklets
+        if len(tracklet.frames) >= _MOTION_FRAMES
     ]
-    if not apart:
+    if not deviations:
         return np.array(_LEAST_SPREAD)
-    return np.asarray(1.4826 * np.median(np.concatenate(apart), axis=0))
+    return np.asarray(1.4826 * np.median(np.concatenate(deviations), axis=0))
 
 
 def _shapes(
-    tracklets: Sequence[Tracklet], known: Sequence[_Link]
+    tracklets: Sequence[Tracklet], links: Sequence[_Link]
 ) -> tuple[list[tuple[Floats, int]], list[tuple[Floats, int]]]:
     """Shape and number of frames of each animal up to each tracklet, and from it on."""
-    earlier = {one.after: one.before for one in known if one.margin >= SURE}
-    later = {one.before: one.after for one in known if one.margin >= SURE}
+    earlier = {link.after: link.before for link in links if link.margin >= SURE}
+    later = {link.before: link.after for link in links if link.margin >= SURE}
     return (
         [_shape_along(tracklets, k, earlier) for k in range(len(tracklets))],
         [_shape_along(tracklets, k, later) for k in range(len(tracklets))],
@@ -263,14 +265,14 @@ def _shape_along(
     return np.median(np.concatenate(shapes), axis=0), number
 
 
-def _motion(one: Tracklet, *, last: bool) -> tuple[Floats, Floats]:
+def _motion(tracklet: Tracklet, *, last: bool) -> tuple[Floats, Floats]:
     """Place at the end or start of a tracklet, px, and velocity there, px a frame."""
     some = slice(-_MOTION_FRAMES, None) if last else slice(None, _MOTION_FRAMES)
-    places = one.middles[some]
+    places = tracklet.middles[some]
     end = places[-1] if last else places[0]
     if len(places) < 2:
         return end, np.zeros(2)
-    at = np.array(one.frames[some], dtype=float)
-    at -= at.mean()
-    velocity = (at[:, None] * (places - places.mean(axis=0))).sum(axis=0) / (at**2).sum()
+    time = np.array(tracklet.frames[some], dtype=float)
+    time -= time.mean()
+    velocity = (time[:, None] * (places - places.mean(axis=0))).sum(axis=0) / (time**2).sum()
     return end, np.asarray(velocity)

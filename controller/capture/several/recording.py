@@ -76,9 +76,9 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
     check_options(options)
     folder = part_folder(options)
     folder.start(resume=options.resume, force=options.force)
-    wanted = None if options.animals in {None, AUTO} else int(str(options.animals))
-    if wanted is not None:
-        refuse_to_overwrite(track_files(options, wanted), options.force)
+    requested_count = None if options.animals in {None, AUTO} else int(str(options.animals))
+    if requested_count is not None:
+        refuse_to_overwrite(track_files(options, requested_count), options.force)
     with stderr_console().status("learning the background ..."):
         film = open_film(options)
         name = str(options.recording)
@@ -89,20 +89,25 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
             film.background,
             inside=film.region.inside,
             threshold=film.threshold,
-            wanted=wanted,
+            requested_count=requested_count,
         )
     count = film.footage.count
     scale = 1.0
     if options.review is not None:
         scale = picture_scale(film.some[::3], count, name)
     with ProgressBar("identities", count, transient=True) as bar:
-        found = find_animals(
-            film.frames(), film.some, detector, wanted=wanted, name=name, on_progress=bar.advance
+        animals_found = find_animals(
+            film.frames(),
+            film.some,
+            detector,
+            requested_count=requested_count,
+            name=name,
+            on_progress=bar.advance,
         )
-        refuse_to_overwrite(track_files(options, len(found.identities)), options.force)
+        refuse_to_overwrite(track_files(options, len(animals_found.identities)), options.force)
         bar.update(0, count, description="frames")
         films = films_of(
-            found,
+            animals_found,
             film.footage.rate_hz,
             name,
             folder,
@@ -110,11 +115,13 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
             part_frames=film_parts.PART_FRAMES,
         )
         with folder.kept_if_interrupted():
-            animals = capture_animals(film.frames, detector, found, films, on_progress=bar.advance)
-        held = _files(options, film, detector, animals)
-        _write(options, film, held, bar, scale)
+            animals = capture_animals(
+                film.frames, detector, animals_found, films, on_progress=bar.advance
+            )
+        files = _files(options, film, detector, animals)
+        _write(options, film, files, bar, scale)
     folder.clear()
-    facts = _facts(options, film, detector, found, animals, held)
+    facts = _facts(options, film, detector, animals_found, animals, files)
     _warn(options, facts)
     return facts
 
@@ -131,26 +138,26 @@ def _files(
         InputError: no animal has a track.
 
     """
-    good = [one.captured for one in animals if one.captured is not None]
+    good = [animal.captured for animal in animals if animal.captured is not None]
     if not good:
         raise InputError(str(animals[0].fault))
     m_per_px = marker_scale(options, detector, film)
     if options.length_m is not None:
-        lengths = np.concatenate([one.length_px for one in good])
+        lengths = np.concatenate([captured.length_px for captured in good])
         m_per_px = scale_of_length(options.length_m, lengths)
     out: list[CaptureFile | None] = []
-    for number, one in enumerate(animals, start=1):
-        if one.captured is None:
+    for number, animal in enumerate(animals, start=1):
+        if animal.captured is None:
             out.append(None)
             continue
         out.append(
             CaptureFile(
-                in_whole_film(options, film, one.captured),
+                in_whole_film(options, film, animal.captured),
                 name=f"{options.recording.stem}-{number}",
                 m_per_px=m_per_px,
                 rate_assumed=film.footage.rate_assumed,
                 source=f"captured from {options.recording.name}, animal {number}",
-                identity_uncertain_after=one.identity.uncertain_after,
+                identity_uncertain_after=animal.identity.uncertain_after,
             )
         )
     return out
@@ -159,18 +166,22 @@ def _files(
 def _write(
     options: CaptureOptions,
     film: OpenedFilm,
-    held: Sequence[CaptureFile | None],
+    capture_files: Sequence[CaptureFile | None],
     bar: ProgressBar,
     scale: float,
 ) -> None:
-    files = track_files(options, len(held))
-    good = [one for one in held if one is not None]
+    files = track_files(options, len(capture_files))
+    good = [capture_file for capture_file in capture_files if capture_file is not None]
     if options.output.suffix.lower() != ".npz":
         write_captures(options.output, good, wide=options.wide)
     else:
-        files = [file for file, one in zip(files, held, strict=True) if one is not None]
-        for file, one in zip(files, good, strict=True):
-            write_captures(file, [one])
+        files = [
+            file
+            for file, capture_file in zip(files, capture_files, strict=True)
+            if capture_file is not None
+        ]
+        for file, capture_file in zip(files, good, strict=True):
+            write_captures(file, [capture_file])
     write_looks(options, film, good, files, bar, scale)
 
 
@@ -178,13 +189,13 @@ def _facts(
     options: CaptureOptions,
     film: OpenedFilm,
     detector: BodyDetector,
-    found: AnimalsFound,
+    animals_found: AnimalsFound,
     animals: Sequence[CapturedAnimal],
-    held: Sequence[CaptureFile | None],
+    capture_files: Sequence[CaptureFile | None],
 ) -> AnimalsFacts:
-    files = track_files(options, len(held))
+    files = track_files(options, len(capture_files))
     listed = []
-    for number, (one, file) in enumerate(zip(animals, held, strict=True), start=1):
+    for number, (animal, file) in enumerate(zip(animals, capture_files, strict=True), start=1):
         facts = None
         merged = 0
         if file is not None:
@@ -196,18 +207,18 @@ def _facts(
             AnimalFacts(
                 number,
                 merged,
-                one.identity.bridged,
-                one.identity.uncertain_after,
+                animal.identity.bridged,
+                animal.identity.uncertain_after,
                 facts,
-                one.fault,
+                animal.fault,
             )
         )
     return AnimalsFacts(
         recording=str(options.recording),
-        frames=found.frames,
+        frames=animals_found.frames,
         animals=tuple(listed),
-        left_out=found.left_out,
-        smaller_objects=found.smaller,
+        left_out=animals_found.left_out,
+        smaller_objects=animals_found.smaller,
         background=detector.background_source,
     )
 
@@ -222,16 +233,16 @@ def _warn(options: CaptureOptions, facts: AnimalsFacts) -> None:
             facts.smaller_objects,
             SMALLEST,
         )
-    for one in facts.animals:
-        if one.fault is not None:
-            LOGGER.warning("%s", one.fault)
-        if one.identity_uncertain_after:
-            frames = ", ".join(map(str, one.identity_uncertain_after))
+    for animal in facts.animals:
+        if animal.fault is not None:
+            LOGGER.warning("%s", animal.fault)
+        if animal.identity_uncertain_after:
+            frames = ", ".join(map(str, animal.identity_uncertain_after))
             LOGGER.warning(
                 "%s: animal %d: identity uncertain after frame %s; look at --review or --overlay",
                 options.recording,
-                one.animal,
+                animal.animal,
                 frames,
             )
-        if one.capture is not None and one.capture.warning is not None:
-            LOGGER.warning("animal %d: %s", one.animal, one.capture.warning)
+        if animal.capture is not None and animal.capture.warning is not None:
+            LOGGER.warning("animal %d: %s", animal.animal, animal.capture.warning)

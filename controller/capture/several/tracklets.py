@@ -112,7 +112,7 @@ class TrackletBuilder:
         for number in range(count):
             if nodes[number] is None:
                 nodes[number] = self._appeared(blobs, number)
-        self._nodes = [one for one in nodes if one is not None]
+        self._nodes = [kept_node for kept_node in nodes if kept_node is not None]
         for number, node in enumerate(self._nodes):
             if isinstance(node, Tracklet):
                 node.add(self._frame, blobs, number)
@@ -122,18 +122,22 @@ class TrackletBuilder:
     def done(self) -> list[Tracklet]:
         """All tracklets, in order of their first frames; crossings have their final numbers."""
         kept = []
-        for one in self.tracklets:
-            begins = one.begins_in
-            ends = one.ends_in
-            short = len(one.frames) < _FEWEST
+        for tracklet in self.tracklets:
+            begins = tracklet.begins_in
+            ends = tracklet.ends_in
+            short = len(tracklet.frames) < _FEWEST
             if short and begins is not None and ends is not None:
                 self._joined([begins, ends])
             elif not short or begins is not None or ends is not None:
-                kept.append(one)
-        for one in kept:
-            one.begins_in = None if one.begins_in is None else self._root(one.begins_in)
-            one.ends_in = None if one.ends_in is None else self._root(one.ends_in)
-        return sorted(kept, key=lambda one: one.frames[0])
+                kept.append(tracklet)
+        for kept_tracklet in kept:
+            kept_tracklet.begins_in = (
+                None if kept_tracklet.begins_in is None else self._root(kept_tracklet.begins_in)
+            )
+            kept_tracklet.ends_in = (
+                None if kept_tracklet.ends_in is None else self._root(kept_tracklet.ends_in)
+            )
+        return sorted(kept, key=lambda kept_part: kept_part.frames[0])
 
     def _links(self, before: Blobs, blobs: Blobs) -> Bools:
         """(n, m) whether a blob of the frame before shows the same animal as one of this frame."""
@@ -154,10 +158,10 @@ class TrackletBuilder:
         fresh = np.asarray(~links.any(axis=0))
         if lost.any() and fresh.any():
             moved = before.middle_px[:, None] - blobs.middle_px[None]
-            apart = np.hypot(moved[..., 0], moved[..., 1])
+            distance_px = np.hypot(moved[..., 0], moved[..., 1])
             reach = _REACH * np.exp(before.shape[:, :1])
-            free: Bools = np.asarray(lost[:, None] & fresh[None, :] & (apart < reach))
-            away: Floats = np.where(free, apart, np.inf)
+            free: Bools = np.asarray(lost[:, None] & fresh[None, :] & (distance_px < reach))
+            away: Floats = np.where(free, distance_px, np.inf)
             for lone in np.flatnonzero(free.any(axis=1)).tolist():
                 nearest = int(np.argmin(away[lone]))
                 if int(np.argmin(away[:, nearest])) == lone:
@@ -166,7 +170,7 @@ class TrackletBuilder:
 
     def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
         """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""
-        before = [one for old in olds if not self._is_part(one := self._nodes[old])]
+        before = [old_node for old in olds if not self._is_part(old_node := self._nodes[old])]
         before = before or [self._nodes[old] for old in olds]
         if len(before) == len(news) == 1:
             node = before[0]
@@ -179,14 +183,16 @@ class TrackletBuilder:
             elif node.count > 1 or area < _PART * self.usual_px:
                 nodes[new] = node
                 return
-        count = sum(1 if isinstance(one, Tracklet) else one.count for one in before)
-        crossing = self._joined([one.number for one in before if isinstance(one, _Crossing)])
-        for one in before:
-            if isinstance(one, Tracklet):
-                one.ends_in = crossing
+        count = sum(1 if isinstance(old_node, Tracklet) else old_node.count for old_node in before)
+        crossing = self._joined(
+            [old_node.number for old_node in before if isinstance(old_node, _Crossing)]
+        )
+        for old_node in before:
+            if isinstance(old_node, Tracklet):
+                old_node.ends_in = crossing
         for new, share in zip(news, self._shares(blobs.area_px[news], count), strict=True):
-            whole = blobs.area_px[new] >= _PART * self.usual_px
-            if share == 1 and whole:
+            is_whole = blobs.area_px[new] >= _PART * self.usual_px
+            if share == 1 and is_whole:
                 nodes[int(new)] = self._new(crossing)
             else:
                 nodes[int(new)] = _Crossing(crossing, share)
@@ -204,7 +210,7 @@ class TrackletBuilder:
             return [max(count, 1 if areas[0] < _JOINED * self.usual_px else 2)]
         for _ in range(count - len(areas)):
             shares[int(np.argmax(areas / self.usual_px - shares))] += 1
-        return [int(one) for one in shares]
+        return [int(share) for share in shares]
 
     def _appeared(self, blobs: Blobs, number: int) -> _Node:
         """A blob that shows nothing of the frame before."""
@@ -220,13 +226,13 @@ class TrackletBuilder:
 
     def _joined(self, crossings: Sequence[int]) -> int:
         """The number of some crossings that are one; of a new one without any."""
-        roots = {self._root(one) for one in crossings}
+        roots = {self._root(crossing) for crossing in crossings}
         if not roots:
             self._parents.append(len(self._parents))
             return len(self._parents) - 1
         first = min(roots)
-        for one in roots:
-            self._parents[one] = first
+        for root in roots:
+            self._parents[root] = first
         return first
 
     def _root(self, crossing: int) -> int:

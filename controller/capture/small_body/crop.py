@@ -69,19 +69,23 @@ class CropStore(Mapping[int, Crop]):
         crop = crop_body(image, ground, points_px)
         if not crop.image.size:
             return
-        own = crop.ground if ground is self._ground else self.file.add(crop.ground)
-        self._crops[number] = _StoredCrop(self.file.add(crop.image), own, crop.origin_px)
+        stored_ground = crop.ground if ground is self._ground else self.file.add(crop.ground)
+        self._crops[number] = _StoredCrop(self.file.add(crop.image), stored_ground, crop.origin_px)
 
     def without(self, frames: Collection[int]) -> "CropStore":
         """Return the crops of all other frames."""
-        kept = {k: one for k, one in self._crops.items() if k not in frames}
+        kept = {k: crop for k, crop in self._crops.items() if k not in frames}
         return CropStore(self.file, kept)
 
     def __getitem__(self, number: int) -> Crop:
         """Read a crop."""
-        one = self._crops[number]
-        ground = self.file.read(one.ground) if isinstance(one.ground, StoredImage) else one.ground
-        return Crop(self.file.read(one.image), ground, one.origin_px)
+        stored_crop = self._crops[number]
+        ground = (
+            self.file.read(stored_crop.ground)
+            if isinstance(stored_crop.ground, StoredImage)
+            else stored_crop.ground
+        )
+        return Crop(self.file.read(stored_crop.image), ground, stored_crop.origin_px)
 
     def __iter__(self) -> Iterator[int]:
         """Numbers of the frames, in the order in which they were put."""
@@ -107,10 +111,10 @@ class Workspace:
         scale = min(1.0, _WORKING_PX / length_px)
         if crops[0].image.ndim == 2:
             # the strongest pixels decide the sign that makes the body positive
-            strong = np.concatenate([_strongest(one) for one in crops])
+            strong = np.concatenate([_strongest(crop) for crop in crops])
             return cls(scale, np.array([np.sign(np.median(strong)) or 1.0]))
-        apart = np.median(np.concatenate([_strongest(one) for one in crops]), axis=0)
-        return cls(scale, apart / max(float(np.linalg.norm(apart)), 1e-9))
+        difference = np.median(np.concatenate([_strongest(crop) for crop in crops]), axis=0)
+        return cls(scale, difference / max(float(np.linalg.norm(difference)), 1e-9))
 
     def to_px(self, points: Floats) -> Floats:
         """Pixels of working coordinates."""
@@ -122,32 +126,36 @@ class Workspace:
 
     def blur_px(self, spot: float) -> float:
         """Blur of the image, from that on the working grid, which adds its own."""
-        own = 0.0 if self.scale == 1.0 else _OWN_BLUR
-        return float(np.sqrt(max(spot**2 - own**2, 0.09))) / self.scale
+        blur = 0.0 if self.scale == 1.0 else _OWN_BLUR
+        return float(np.sqrt(max(spot**2 - blur**2, 0.09))) / self.scale
 
     def contrast(self, crop: Crop) -> tuple[Floats, tuple[int, int]]:
         """Picture (h, w) on the working grid, above 0 where the body is, and its first pixel."""
-        apart = crop.ground.astype(np.float32) - crop.image.astype(np.float32)
-        apart = apart.reshape(*apart.shape[:2], -1) @ self.channels.astype(np.float32)
+        contrast_image = crop.ground.astype(np.float32) - crop.image.astype(np.float32)
+        contrast_image = contrast_image.reshape(
+            *contrast_image.shape[:2], -1
+        ) @ self.channels.astype(np.float32)
         if self.scale == 1.0:
-            return np.asarray(apart, dtype=float), crop.origin_px
-        apart = np.asarray(cv2.GaussianBlur(apart, (0, 0), _SOFTEN / self.scale), dtype=np.float32)
-        size = np.array(apart.shape[::-1])
+            return np.asarray(contrast_image, dtype=float), crop.origin_px
+        contrast_image = np.asarray(
+            cv2.GaussianBlur(contrast_image, (0, 0), _SOFTEN / self.scale), dtype=np.float32
+        )
+        size = np.array(contrast_image.shape[::-1])
         first = np.ceil(self.from_px(np.array(crop.origin_px, dtype=float))).astype(int)
         last = np.floor(self.from_px(np.array(crop.origin_px) + size - 1.0)).astype(int)
         there = self.to_px(first.astype(float)) - crop.origin_px
         back = np.array([[1.0 / self.scale, 0.0, there[0]], [0.0, 1.0 / self.scale, there[1]]])
         wide, high = (int(v) for v in last - first + 1)
         how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        small = cv2.warpAffine(apart, back, (wide, high), flags=how)
+        small = cv2.warpAffine(contrast_image, back, (wide, high), flags=how)
         return np.asarray(small, dtype=float), (int(first[0]), int(first[1]))
 
 
 def _strongest(crop: Crop) -> Floats:
     """(K[, C]) contrast of the twelfth part of the pixels that stands out most."""
-    apart = crop.ground.astype(float) - crop.image.astype(float)
-    much = np.abs(apart) if apart.ndim == 2 else np.linalg.norm(apart, axis=2)
-    return np.asarray(apart[much >= np.percentile(much, 92.0)])
+    difference = crop.ground.astype(float) - crop.image.astype(float)
+    much = np.abs(difference) if difference.ndim == 2 else np.linalg.norm(difference, axis=2)
+    return np.asarray(difference[much >= np.percentile(much, 92.0)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,8 +200,8 @@ def bends_of(line: Floats) -> Floats:
     """(BENDS,) of a line (P, 2), head first, of equal steps."""
     step = -np.diff(line, axis=0)
     angle = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-    at = (np.arange(len(angle)) + 0.5) / len(angle)
-    return np.asarray(np.linalg.lstsq(bend_basis(at), angle, rcond=None)[0])
+    place = (np.arange(len(angle)) + 0.5) / len(angle)
+    return np.asarray(np.linalg.lstsq(bend_basis(place), angle, rcond=None)[0])
 
 
 def reversed_body(frame: Floats) -> Floats:

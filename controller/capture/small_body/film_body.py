@@ -122,7 +122,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
     prior, target = _frame_prior(body.contrast)
     shape = patch.picture.shape
     use = patch.use.ravel()
-    seen = max(float(use.sum()), 1.0)
+    used_px = max(float(use.sum()), 1.0)
     noise2 = 0.0
     values = start
     kept = start
@@ -136,12 +136,12 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
         squares = float(rest @ rest)
         soft = target - prior @ values
         if turn == 0:
-            noise2 = max(squares / seen, _LEAST_NOISE2)
+            noise2 = max(squares / used_px, _LEAST_NOISE2)
         cost = squares / noise2 + float(soft @ soft)
         if cost < best:
             done = best - cost < _SETTLED * cost
             if turn < _LEARNING:  # the residual is noise only near the end
-                noise2 = max(squares / seen, _LEAST_NOISE2)
+                noise2 = max(squares / used_px, _LEAST_NOISE2)
                 cost = squares / noise2 + float(soft @ soft)
             best = cost
             kept = values
@@ -188,8 +188,8 @@ def film_body(
     ribbon = Ribbon(Grid.of(start))
     body_rows, body_target = _body_prior(start, size)
     body = kept_body = start
-    frames = kept = [one.copy() for one in starts]
-    contrast = float(np.median([one[2 + BENDS] for one in starts]))
+    frames = kept = [frame.copy() for frame in starts]
+    contrast = float(np.median([frame[2 + BENDS] for frame in starts]))
     best = np.inf
     damp = 1e-2
     noise2 = 0.0
@@ -197,21 +197,23 @@ def film_body(
     hss = np.eye(size)
     gs = np.zeros(size)
     raised = 1.0
-    seen = sum(float(patch.use.sum()) for patch in patches)
+    used_px = sum(float(patch.use.sum()) for patch in patches)
     for turn in range(_ROUNDS):
         prior, target = _frame_prior(contrast)
-        rows = [_rows(ribbon, one, body, patch) for one, patch in zip(frames, patches, strict=True)]
+        rows = [
+            _rows(ribbon, frame, body, patch) for frame, patch in zip(frames, patches, strict=True)
+        ]
         squares = sum(float(row[-1] @ row[-1]) for row in rows)
         if turn == 0:
-            noise2 = max(squares / seen, _LEAST_NOISE2)
+            noise2 = max(squares / used_px, _LEAST_NOISE2)
         soft_body = body_target - body_rows @ body
-        softs = [target - prior @ one for one in frames]
+        softs = [target - prior @ frame for frame in frames]
         softness = float(soft_body @ soft_body) + sum(float(v @ v) for v in softs)
         cost = squares / noise2 + softness
         if cost < best:
             done = best - cost < _SETTLED * cost and turn > _LEARNING
             if turn < 2 * _LEARNING:
-                noise2 = max(squares / seen, _LEAST_NOISE2)
+                noise2 = max(squares / used_px, _LEAST_NOISE2)
                 cost = squares / noise2 + softness
             best = cost
             kept_body = body
@@ -222,32 +224,32 @@ def film_body(
             blocks = []
             for row, soft in zip(rows, softs, strict=True):
                 products = gram(row) / noise2
-                own = _solvable(products[:FRAME, :FRAME] + prior.T @ prior)
+                frame_block = _solvable(products[:FRAME, :FRAME] + prior.T @ prior)
                 push = products[:FRAME, -1] + prior.T @ soft
-                blocks.append((own, products[:FRAME, FRAME:-1], push))
+                blocks.append((frame_block, products[:FRAME, FRAME:-1], push))
                 hss = hss + products[FRAME:-1, FRAME:-1]
                 gs = gs + products[FRAME:-1, -1]
             spot = float(np.exp(body[1]))
-            each = [
+            noises = [
                 _correlation(row[-1].reshape(patch.picture.shape), spot)
                 for row, patch in zip(rows, patches, strict=True)
             ]
-            raised = float(np.mean(each))
+            raised = float(np.mean(noises))
             if done:
                 break
-            contrast = float(np.median([one[2 + BENDS] for one in frames]))
+            contrast = float(np.median([frame[2 + BENDS] for frame in frames]))
         else:
             damp *= 10.0
         step, steps = _eliminated(hss, gs, blocks, damp)
         body = kept_body + np.clip(step, -0.7, 0.7) * np.where(
             np.arange(size) == 0, max(1.0, 0.05 * start[0]), 1.0
         )
-        frames = [one + move for one, move in zip(kept, steps, strict=True)]
+        frames = [frame + move for frame, move in zip(kept, steps, strict=True)]
     reduced = hss.copy()
     for hff, hfs, _ in blocks:
         reduced = reduced - hfs.T @ np.linalg.solve(hff, hfs)
     covariance = np.asarray(np.linalg.inv(reduced) * raised, dtype=float)
-    contrast = float(np.median([one[2 + BENDS] for one in kept]))
+    contrast = float(np.median([frame[2 + BENDS] for frame in kept]))
     return FilmBody(kept_body, covariance, ribbon.grid, contrast), kept
 
 
@@ -276,12 +278,12 @@ def _eliminated(
     for hff, hfs, gf in blocks:
         factor = cho_factor(hff + damp * np.diag(np.diag(hff)))
         by = cho_solve(factor, hfs)
-        own = cho_solve(factor, gf)
+        solved_frame = cho_solve(factor, gf)
         normal = normal - hfs.T @ by
-        push = push - hfs.T @ own
-        solved.append((by, own))
+        push = push - hfs.T @ solved_frame
+        solved.append((by, solved_frame))
     step = np.asarray(np.linalg.solve(normal, push), dtype=float)
-    return step, [own - by @ step for by, own in solved]
+    return step, [frame_step - by @ step for by, frame_step in solved]
 
 
 def with_shadow(
@@ -315,16 +317,19 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
         shown, slopes = ribbon.picture(frame, body.values, shape)
         bare = np.clip(1.0 - ribbon.cover(frame, body.values, shape), 0.0, 1.0)
         shades = [
-            bare * ribbon.shade(frame, np.concatenate([body.values, one]), shape) for one in tried
+            bare * ribbon.shade(frame, np.concatenate([body.values, body_values]), shape)
+            for body_values in tried
         ]
         rows = np.concatenate([slopes, (patch.picture - shown)[None], shades]) * patch.use
         products = gram(rows.reshape(len(rows), -1))
-        known = len(slopes)
+        body_count = len(slopes)
         # subtract the part that the body could explain from the rest and from the shades
-        own = products[:known, :known] + 1e-9 * np.trace(products[:known, :known]) * np.eye(known)
-        others = products[known:, known:] - products[known:, :known] @ np.linalg.solve(
-            own, products[:known, known:]
-        )
+        body_products = products[:body_count, :body_count] + 1e-9 * np.trace(
+            products[:body_count, :body_count]
+        ) * np.eye(body_count)
+        others = products[body_count:, body_count:] - products[
+            body_count:, :body_count
+        ] @ np.linalg.solve(body_products, products[:body_count, body_count:])
         squares = squares + float(others[0, 0])
         count = count + float(patch.use.sum())
         gain += others[0, 1:]

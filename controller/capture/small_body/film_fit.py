@@ -105,9 +105,9 @@ def fit_film(
         if turn == 0 and (
             length > _SHARP * blur or (length > _LONG * blur and wide > _WIDE * blur)
         ):
-            known = expected_px.copy()
-            known[good] = axis_error_px(_BY_BLUR * blur, length)
-            return _unfitted(skeletons, known)
+            errors_px = expected_px.copy()
+            errors_px[good] = axis_error_px(_BY_BLUR * blur, length)
+            return _unfitted(skeletons, errors_px)
         if len(body.values) == BODY:
             shaded = with_shadow(body, frames, [patches[k] for k in sample])
             body = body if shaded is None else shaded[0]
@@ -117,8 +117,8 @@ def fit_film(
             _recover_lost(fits, views, crops, body, radius, space)
             ground = FilmGround.of(views, fits, body) if fixed else None
             for k, fit in fits.items():
-                beside = 0.0 if ground is None else ground.visible(views[k], fit, body)
-                patches[k] = Patch(views[k].picture - beside, views[k].use)
+                visible = 0.0 if ground is None else ground.visible(views[k], fit, body)
+                patches[k] = Patch(views[k].picture - visible, views[k].use)
         start = body.values
         starts = {k: fit.frame for k, fit in fits.items()}
     out = list(skeletons)
@@ -133,18 +133,20 @@ def fit_film(
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
         out[k] = _skeleton(line, body, space, expected[k])
     rest = [
-        one if k in fits else _with_status(one, expected[k], length) for k, one in enumerate(out)
+        skeleton if k in fits else _with_status(skeleton, expected[k], length)
+        for k, skeleton in enumerate(out)
     ]
     return FittedFilm(tuple(rest), expected, body)
 
 
 def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> FittedFilm:
     """Skeletons unchanged, ``ROUGH`` where their expected error is too large."""
-    good = [one.status is FrameStatus.GOOD for one in skeletons]
-    length = np.array([one.length_px for one in skeletons])
+    good = [skeleton.status is FrameStatus.GOOD for skeleton in skeletons]
+    length = np.array([skeleton.length_px for skeleton in skeletons])
     usual = float(np.median(length[good])) if any(good) else 1.0
     out = [
-        _with_status(one, error, usual) for one, error in zip(skeletons, expected_px, strict=True)
+        _with_status(skeleton, error, usual)
+        for skeleton, error in zip(skeletons, expected_px, strict=True)
     ]
     return FittedFilm(tuple(out), expected_px, None)
 
@@ -183,7 +185,7 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
     """
     expected = film.expected_px.copy()
     out = list(film.skeletons)
-    known = [
+    finite_values = [
         k
         for k, ends in enumerate(ends_px)
         if out[k].status.has_points
@@ -191,9 +193,9 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
         and np.isfinite(ends).all()
         and not solved[k]
     ]
-    if not known:
+    if not finite_values:
         return film
-    beyond = np.array([beyond_tips_px(out[k].points_px, ends_px[k]) for k in known])
+    beyond = np.array([beyond_tips_px(out[k].points_px, ends_px[k]) for k in finite_values])
     usual = np.median(beyond, axis=0)
     share = 1.0
     if film.body is None:
@@ -201,7 +203,7 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
         tips = tips_error_px(usual)
     else:
         tips = tips_error_px(np.maximum(usual, 0.0))
-    for k in known:
+    for k in finite_values:
         expected[k] = np.hypot(share * expected[k], tips)
         out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
     return replace(film, skeletons=tuple(out), expected_px=expected)
@@ -211,11 +213,11 @@ def expected_error(fit: Fit, body: FilmBody) -> float:
     """Expected error of a point, mean along the body, working pixels."""
     length = float(body.values[0])
     slopes = curve_slopes(fit.frame, length)
-    own = slopes[:, :, :-1]
+    frame_slopes = slopes[:, :, :-1]
     size = 2 + BENDS
-    shared = np.einsum("kij,jm->kim", own, fit.by_body[:size])
+    shared = np.einsum("kij,jm->kim", frame_slopes, fit.by_body[:size])
     shared[:, :, 0] += slopes[:, :, -1]
-    square = np.einsum("kij,jl,kil->k", own, fit.inverse[:size, :size], own)
+    square = np.einsum("kij,jl,kil->k", frame_slopes, fit.inverse[:size, :size], frame_slopes)
     square += np.einsum("kij,jl,kil->k", shared, body.covariance, shared)
     return float(np.sqrt(np.maximum(square, 0.0) + (_FORM * length) ** 2).mean())
 
@@ -227,16 +229,16 @@ def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
     of a JPEG, stains) shifts it alike in all frames, which no covariance shows.
     """
     ribbon = Ribbon(body.grid)
-    found = []
+    misfits = []
     for fit in fits:
         cover = ribbon.cover(fit.frame, body.values, fit.residual.shape)
         near = cover > _FREE
-        beside = (cover < _FREE / 3.0) & (fit.residual != 0.0)
-        if near.any() and beside.any():
+        is_beside = (cover < _FREE / 3.0) & (fit.residual != 0.0)
+        if near.any() and is_beside.any():
             squares = fit.residual**2
-            more = float(squares[near].mean() - squares[beside].mean())
-            found.append(np.sqrt(max(more, 0.0)) / body.contrast)
-    return float(np.median(found)) if found else 0.0
+            more = float(squares[near].mean() - squares[is_beside].mean())
+            misfits.append(np.sqrt(max(more, 0.0)) / body.contrast)
+    return float(np.median(misfits)) if misfits else 0.0
 
 
 def _reverse_wrong_stretches(
@@ -292,10 +294,10 @@ def _recover_lost(
 
 
 def _spread(good: list[int], views: Mapping[int, View]) -> list[int]:
-    each = float(np.median([views[k].picture.size for k in good]))
-    most = int(np.clip(_SAMPLE_PX / each, _FEWEST, _MOST))
-    at = np.linspace(0, len(good) - 1, min(most, len(good)))
-    return [good[round(k)] for k in at]
+    picture_px = float(np.median([views[k].picture.size for k in good]))
+    most = int(np.clip(_SAMPLE_PX / picture_px, _FEWEST, _MOST))
+    place = np.linspace(0, len(good) - 1, min(most, len(good)))
+    return [good[round(k)] for k in place]
 
 
 def _first_body(views: Sequence[View], length: float) -> Floats:
@@ -311,8 +313,8 @@ def _skeleton(line: Floats, body: FilmBody, space: Workspace, expected_px: float
         even = None
     points = line[:: (len(line) - 1) // SEGMENTS] if even is None else even.points
     length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-    at = np.linspace(0.0, 1.0, SEGMENTS + 1)
-    radius = np.interp(at, STATIONS, np.exp(body.values[2:BODY])) / space.scale
+    place = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    radius = np.interp(place, STATIONS, np.exp(body.values[2:BODY])) / space.scale
     rough = even is None or expected_px > ROUGH * length
     return Skeleton(points, radius, length, FrameStatus.ROUGH if rough else FrameStatus.GOOD)
 
@@ -356,5 +358,5 @@ class FilmGround:
         x, y = np.subtract(view.first, self.first)
         rows, columns = view.picture.shape
         cover = Ribbon(body.grid).cover(fit.frame, body.values, view.picture.shape)
-        seen = self.pattern[y : y + rows, x : x + columns]
-        return np.asarray(seen * np.clip(1.0 - cover, 0.0, 1.0))
+        visible_pattern = self.pattern[y : y + rows, x : x + columns]
+        return np.asarray(visible_pattern * np.clip(1.0 - cover, 0.0, 1.0))

@@ -41,16 +41,16 @@ class Grid:
     @classmethod
     def of(cls, body: Floats) -> "Grid":
         """Choose a grid as fine as the blur of ``body`` needs."""
-        apart = _APART * float(np.exp(body[1]))
+        spacing = _APART * float(np.exp(body[1]))
         wide = 2.0 * float(np.exp(body[2:BODY].max()))
-        along = int(np.clip(np.ceil(float(body[0]) / apart), 24, 120))
-        return cls(along, int(np.clip(np.ceil(wide / apart), 1, _ROWS)))
+        along = int(np.clip(np.ceil(float(body[0]) / spacing), 24, 120))
+        return cls(along, int(np.clip(np.ceil(wide / spacing), 1, _ROWS)))
 
 
-def bend_basis(at: Floats) -> Floats:
-    """(P, BENDS) cubic B-splines of the tangent angle at ``at`` (P,), 0 the head, 1 the tail."""
+def bend_basis(place: Floats) -> Floats:
+    """(P, BENDS) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head, 1 the tail."""
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, BENDS - 2), [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(at, knots, 3).toarray(), dtype=float)
+    return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
 
 
 def curve_of(frame: Floats, length: float, pieces: int = 400) -> Floats:
@@ -82,9 +82,9 @@ class Ribbon:
     def __init__(self, grid: Grid) -> None:
         n, m = grid.along, grid.across
         self.grid = grid
-        at = (np.arange(n) + 0.5) / n
-        self.basis = bend_basis(at)
-        self.hats = np.stack([np.interp(at, STATIONS, row) for row in np.eye(len(STATIONS))], 1)
+        place = (np.arange(n) + 0.5) / n
+        self.basis = bend_basis(place)
+        self.hats = np.stack([np.interp(place, STATIONS, row) for row in np.eye(len(STATIONS))], 1)
         sums = (np.tri(n, k=-1) + 0.5 * np.eye(n)) / n
         self.sums = sums - sums.mean(axis=0)
         self.side = (2.0 * np.arange(m) + 1.0 - m) / m
@@ -198,7 +198,7 @@ def _ground(shape: tuple[int, ...]) -> Floats:
 
 def gram(rows: Floats) -> Floats:
     """(K, K) products of ``rows`` (K, pixels) in blocks of pixels: no thread starts."""
-    each = max(1, 200_000 // len(rows) ** 2)
-    short = -rows.shape[1] % each
-    parts = np.pad(rows, ((0, 0), (0, short))).reshape(len(rows), -1, each).transpose(1, 0, 2)
+    block = max(1, 200_000 // len(rows) ** 2)
+    short = -rows.shape[1] % block
+    parts = np.pad(rows, ((0, 0), (0, short))).reshape(len(rows), -1, block).transpose(1, 0, 2)
     return np.asarray((parts @ parts.transpose(0, 2, 1)).sum(axis=0))

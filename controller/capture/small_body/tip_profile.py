@@ -67,7 +67,7 @@ def profile_ends(
     if usual <= 0.0:
         return NO_ENDS.copy()
     round_px = max(_LEAST_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
-    ends = [_end(way, level, wide, step, usual, round_px) for way in (even[::-1], even)]
+    ends = [_end(line_end, level, wide, step, usual, round_px) for line_end in (even[::-1], even)]
     return np.stack(ends)
 
 
@@ -81,7 +81,7 @@ def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
     ahead = tips - points_px[[_INNER, -1 - _INNER]]
     ahead = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     ways = (ends_px, ends_px[::-1])
-    near = min(ways, key=lambda way: float(np.hypot(*(way[:, :2] - tips).T).sum()))
+    near = min(ways, key=lambda path: float(np.hypot(*(path[:, :2] - tips).T).sum()))
     return np.column_stack([((near[:, :2] - tips) * ahead).sum(axis=1), near[:, 2]])
 
 
@@ -106,9 +106,9 @@ def _end(
     end = min(round(_INSIDE * wide / step), len(line) - 1)
     path = np.vstack([line[-1 - end :], line[-1] + beyond])
     profile = gaussian_filter1d(_sums(path, level, wide, step) / usual, 1.0 / step)
-    apart = max(1, round(2.0 / step))
+    lag = max(1, round(2.0 / step))
     rest = profile[end + len(beyond) // 3 :]
-    noise = 1.4826 * float(np.median(np.abs(rest[apart:] - rest[:-apart]))) / np.sqrt(2.0)
+    noise = 1.4826 * float(np.median(np.abs(rest[lag:] - rest[:-lag]))) / np.sqrt(2.0)
     low = float(np.clip(_NOISE * noise, _LOW, _MOST_LOW))
     from_px, to_px = (_crossing(profile, share) * step for share in (_HIGH, low))
     hidden_px = (to_px - from_px) * low / (_HIGH - low)
@@ -130,8 +130,8 @@ def _sums(path: Floats, level: NDArray[np.float32], wide: float, step: float) ->
     """(P,) contrast summed across the path, less that of the ground on both sides."""
     reach = _ACROSS * wide + _ACROSS_PX
     across = np.arange(-reach, reach + 0.5 * step, step)
-    seen = seen_across(path, level, across)
-    rim = seen[:, np.abs(across) > _RIM * reach]
+    levels = seen_across(path, level, across)
+    rim = levels[:, np.abs(across) > _RIM * reach]
     # contrast below 0 is cut off, so the median of the noise is below its mean
     ground = np.minimum(rim, np.percentile(rim, _CALM)).mean()
-    return np.asarray((seen - ground).sum(axis=1) * step, dtype=float)
+    return np.asarray((levels - ground).sum(axis=1) * step, dtype=float)

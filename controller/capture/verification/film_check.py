@@ -30,10 +30,10 @@ def possible_form(body: Skeleton) -> bool:
     step = np.diff(points, axis=0)
     chord = float(np.hypot(*step.T).mean())
     angle = gaussian_filter1d(np.unwrap(np.arctan2(step[:, 1], step[:, 0])), _SMOOTH)
-    apart = max(1, round(wide / chord))
-    if apart < len(angle):
-        turn = np.abs(angle[apart:] - angle[:-apart])
-        if float(turn.max()) > _TIGHTEST * max(1.0, apart * chord / wide):
+    lag = max(1, round(wide / chord))
+    if lag < len(angle):
+        turn = np.abs(angle[lag:] - angle[:-lag])
+        if float(turn.max()) > _TIGHTEST * max(1.0, lag * chord / wide):
             return False
     loops = crossings(points)
     if not len(loops):
@@ -47,14 +47,14 @@ def crossings(points: Floats) -> Ints:
     """(K, 2) numbers of the chords of a line (P, 2) that cross each other."""
     step = np.diff(points, axis=0)
     first = points[:-1]
-    apart = first[None] - first[:, None]
+    gap = first[None] - first[:, None]
     across = step[:, None, 0] * step[None, :, 1] - step[:, None, 1] * step[None, :, 0]
     safe = np.where(np.abs(across) < 1e-12, np.inf, across)
-    one = (apart[..., 0] * step[None, :, 1] - apart[..., 1] * step[None, :, 0]) / safe
-    other = (apart[..., 0] * step[:, None, 1] - apart[..., 1] * step[:, None, 0]) / safe
+    along_first = (gap[..., 0] * step[None, :, 1] - gap[..., 1] * step[None, :, 0]) / safe
+    other = (gap[..., 0] * step[:, None, 1] - gap[..., 1] * step[:, None, 0]) / safe
     number = np.arange(len(step))
     far = number[None] - number[:, None] > 1
-    hit = far & (one > 0.0) & (one < 1.0) & (other > 0.0) & (other < 1.0)
+    hit = far & (along_first > 0.0) & (along_first < 1.0) & (other > 0.0) & (other < 1.0)
     return np.asarray(np.argwhere(hit), dtype=np.int64)
 
 
@@ -101,15 +101,15 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
 
     """
     out = agreeing_ends(skeletons)
-    used = [k for k, one in enumerate(out) if one.status.has_points]
+    used = [k for k, skeleton in enumerate(out) if skeleton.status.has_points]
     for k in used:
         if not possible_form(out[k]):
             out[k] = no_skeleton(FrameStatus.KNOT)
     _check_lengths(out)
-    used = [k for k, one in enumerate(out) if one.status.has_points]
+    used = [k for k, skeleton in enumerate(out) if skeleton.status.has_points]
     some = used[:: max(1, len(used) // _SAMPLE)]
     shown = {k: _profile(out[k], store, k) for k in some}
-    usual = _usual([one for one in shown.values() if one is not None])
+    usual = _usual([shown_profile for shown_profile in shown.values() if shown_profile is not None])
     if usual is None:
         return out
     for k in used:
@@ -133,27 +133,27 @@ def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
         store: the frames.
 
     """
-    used = [k for k, one in enumerate(skeletons) if one.status.has_points]
+    used = [k for k, skeleton in enumerate(skeletons) if skeleton.status.has_points]
     some = used[:: max(1, -(-len(used) // _FAINT_SAMPLE))]
-    profiles = [one for k in some if (one := _profile(skeletons[k], store, k)) is not None]
+    profiles = [profile for k in some if (profile := _profile(skeletons[k], store, k)) is not None]
     usual = _usual(profiles)
     if usual is None:
         return False
-    beyond = np.array([_along_a_ray(one.rings @ usual.direction) for one in profiles])
-    apart = (beyond[:, 1] - beyond[:, 0])[np.isfinite(beyond).all(axis=1)]
-    if len(apart) < _FEWEST_FAINT:
+    beyond = np.array([_along_a_ray(profile.rings @ usual.direction) for profile in profiles])
+    differences = (beyond[:, 1] - beyond[:, 0])[np.isfinite(beyond).all(axis=1)]
+    if len(differences) < _FEWEST_FAINT:
         return False
-    middle = float(np.median(apart))
-    same = float(np.mean(np.sign(apart) == np.sign(middle)))
+    middle = float(np.median(differences))
+    same = float(np.mean(np.sign(differences) == np.sign(middle)))
     least = max(_LEAST_LEVELS, _FAINT_BEYOND * float(usual.contrast.mean()))
     return same >= _SAME_TIP and abs(middle) > least
 
 
 def _along_a_ray(rings: Floats) -> Floats:
     """(2,) contrast that goes on through all rings (2, rings, angles) in one direction."""
-    known: Bools = np.asarray(np.isfinite(rings).any(axis=2))
-    lowest = np.nanmin(np.where(known[..., None], rings, np.inf), axis=1)
-    return np.asarray(np.where(known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan))
+    is_known: Bools = np.asarray(np.isfinite(rings).any(axis=2))
+    lowest = np.nanmin(np.where(is_known[..., None], rings, np.inf), axis=1)
+    return np.asarray(np.where(is_known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan))
 
 
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
@@ -162,22 +162,22 @@ def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
     A body does not change its ends from one frame to the next. The direction of most frames is
     kept.
     """
-    used = [k for k, one in enumerate(skeletons) if one.status.has_points]
+    used = [k for k, skeleton in enumerate(skeletons) if skeleton.status.has_points]
     sign = np.ones(len(skeletons), dtype=int)
     for before, k in pairwise(used):
         against = margin_of(skeletons[k], skeletons[before]) < -_CONTRADICTS
         sign[k] = -sign[before] if against and k - before <= _NEAR else sign[before]
     wrong = -1 if sign[used].sum() >= 0 else 1
     return [
-        one.reversed() if one.status.has_points and sign[k] == wrong else one
-        for k, one in enumerate(skeletons)
+        skeleton.reversed() if skeleton.status.has_points and sign[k] == wrong else skeleton
+        for k, skeleton in enumerate(skeletons)
     ]
 
 
 def _check_lengths(bodies: list[Skeleton]) -> None:
     """Reject bodies whose length is outside the film's range."""
-    length = np.array([one.length_px for one in bodies])
-    good = np.array([one.status is FrameStatus.GOOD for one in bodies])
+    length = np.array([body.length_px for body in bodies])
+    good = np.array([body.status is FrameStatus.GOOD for body in bodies])
     if good.sum() < _FEWEST:
         return
     off = length / float(np.median(length[good])) - 1.0
@@ -194,7 +194,7 @@ def _profile(body: Skeleton, store: FrameStore, number: int) -> BodyProfile | No
 def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
     if not profiles:
         return None
-    mean = np.array([np.nanmean(one.sides, axis=(0, 1)) for one in profiles])
+    mean = np.array([np.nanmean(profile.sides, axis=(0, 1)) for profile in profiles])
     mean = mean[np.isfinite(mean).all(axis=1)]
     if not len(mean):
         return None
@@ -203,7 +203,7 @@ def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
     direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
     with warnings.catch_warnings():  # a point may have no ground on either side
         warnings.simplefilter("ignore", RuntimeWarning)
-        along = np.array([np.nanmean(one.sides, axis=0) @ direction for one in profiles])
+        along = np.array([np.nanmean(profile.sides, axis=0) @ direction for profile in profiles])
         level = np.nanmean(along, axis=1)
     best = along[level >= np.nanpercentile(level, _USUAL) * 0.5]
     if not len(best):
@@ -217,18 +217,18 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
     sides = profile.sides @ usual.direction
     expected = float(usual.contrast.mean())
     for side in sides:
-        known = np.isfinite(side)
-        if known.mean() < _KNOWN:
+        is_known = np.isfinite(side)
+        if is_known.mean() < _KNOWN:
             continue
-        standard_error = profile.noise / np.sqrt(max(1.0, 0.25 * known.sum()))
+        standard_error = profile.noise / np.sqrt(max(1.0, 0.25 * is_known.sum()))
         least = max(_LEAST_LEVELS, _SHARE * expected, _NOISE * standard_error)
-        if float(side[known].mean()) < least:
+        if float(side[is_known].mean()) < least:
             return FrameStatus.EMPTY
-    seen = np.maximum(usual.contrast, 0.0) > max(_LEAST_LEVELS, 3.0 * profile.noise)
+    is_visible = np.maximum(usual.contrast, 0.0) > max(_LEAST_LEVELS, 3.0 * profile.noise)
     faint = [_averaged(side) < _FAINT * usual.contrast for side in sides]
-    if _longest(faint[0] & faint[1] & seen) >= _BOTH_SIDES:
+    if _longest(faint[0] & faint[1] & is_visible) >= _BOTH_SIDES:
         return FrameStatus.EMPTY
-    if any(_longest(one & seen) >= _ONE_SIDE for one in faint):
+    if any(_longest(faint_side & is_visible) >= _ONE_SIDE for faint_side in faint):
         return FrameStatus.EMPTY
     for tip, rings in enumerate(profile.rings @ usual.direction):
         near = usual.contrast[5:16] if tip == 0 else usual.contrast[-16:-5]
@@ -240,10 +240,10 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
 
 def _averaged(side: Floats) -> Floats:
     """(101,) averaged over a few stations; infinite without ground."""
-    known = np.isfinite(side)
-    weight = uniform_filter1d(known.astype(float), _STRETCH, mode="nearest")
-    total = uniform_filter1d(np.where(known, side, 0.0), _STRETCH, mode="nearest")
-    return np.where(known & (weight > 0.5), total / np.maximum(weight, 1e-9), np.inf)
+    is_known = np.isfinite(side)
+    weight = uniform_filter1d(is_known.astype(float), _STRETCH, mode="nearest")
+    total = uniform_filter1d(np.where(is_known, side, 0.0), _STRETCH, mode="nearest")
+    return np.where(is_known & (weight > 0.5), total / np.maximum(weight, 1e-9), np.inf)
 
 
 def _longest(mask: Bools) -> int:

@@ -51,26 +51,26 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
     noise = []
     for sign in (1.0, -1.0):
         places = line[:, None] + sign * reach[..., None] * side[:, None]
-        seen = _seen(image, places)
-        seen[_own(places, line, half)] = np.nan
-        noise.append(np.diff(seen, axis=0).ravel())
-        grounds.append(_mean(seen))
+        levels = _seen(image, places)
+        levels[_own(places, line, half)] = np.nan
+        noise.append(np.diff(levels, axis=0).ravel())
+        grounds.append(_mean(levels))
     steps = np.concatenate(noise)
     steps = steps[np.isfinite(steps)]
     spread = 1.4826 * float(np.median(np.abs(steps))) / np.sqrt(2.0) if steps.size else 0.0
     rings = [
-        _rings(image, line[::way], half[::way], -along[0] if way > 0 else along[-1])
-        for way in (1, -1)
+        _rings(image, line[::order], half[::order], -along[0] if order > 0 else along[-1])
+        for order in (1, -1)
     ]
     return BodyProfile(np.stack(grounds) - on, np.stack(rings), spread)
 
 
-def _mean(seen: Floats) -> Floats:
+def _mean(levels: Floats) -> Floats:
     """(P, C) mean over the samples (P, A, C) that show ground; NaN where fewer than half do."""
-    known = np.isfinite(seen)
-    count = known.sum(axis=1)
-    total = np.where(known, seen, 0.0).sum(axis=1)
-    return np.where(2 * count >= seen.shape[1], total / np.maximum(count, 1), np.nan)
+    is_known = np.isfinite(levels)
+    count = is_known.sum(axis=1)
+    total = np.where(is_known, levels, 0.0).sum(axis=1)
+    return np.where(2 * count >= levels.shape[1], total / np.maximum(count, 1), np.nan)
 
 
 def _own(places: Floats, line: Floats, half: Floats) -> Floats:
@@ -99,16 +99,16 @@ def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floa
     angle = np.arctan2(outward[1], outward[0]) + _FAN
     unit = np.column_stack([np.cos(angle), np.sin(angle)])
     places = line[0] + away[:, None, None] * unit
-    seen = _seen(image, places)
+    levels = _seen(image, places)
     square = _squares(places, line[_AT_TIP.stop :])
-    seen[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
-    known = np.asarray(np.isfinite(seen).all(axis=-1))
-    out = np.full(seen.shape, np.nan)
-    for k, ring in enumerate(seen):
-        if known[k].sum() > len(_FAN) // 2:
-            usual = np.median(ring[known[k]], axis=0)
-            whole = np.where(known[k][:, None], ring, usual)
-            out[k] = usual - uniform_filter1d(whole, 3, axis=0, mode="nearest")
+    levels[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
+    is_known = np.asarray(np.isfinite(levels).all(axis=-1))
+    out = np.full(levels.shape, np.nan)
+    for k, ring in enumerate(levels):
+        if is_known[k].sum() > len(_FAN) // 2:
+            usual = np.median(ring[is_known[k]], axis=0)
+            filled_ring = np.where(is_known[k][:, None], ring, usual)
+            out[k] = usual - uniform_filter1d(filled_ring, 3, axis=0, mode="nearest")
     return out
 
 
@@ -116,8 +116,8 @@ def _seen(image: NDArray[np.float32], places: Floats) -> Floats:
     """(..., C) grey values at places (A, B, 2); NaN outside the image."""
     x, y = np.moveaxis(places, -1, 0).astype(np.float32)
     shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    found: Floats = np.asarray(shown, dtype=np.float64).reshape(*places.shape[:-1], image.shape[2])
+    levels: Floats = np.asarray(shown, dtype=np.float64).reshape(*places.shape[:-1], image.shape[2])
     rows, columns = image.shape[:2]
     outside = (x < 0) | (y < 0) | (x > columns - 1) | (y > rows - 1)
-    found[outside] = np.nan
-    return found
+    levels[outside] = np.nan
+    return levels

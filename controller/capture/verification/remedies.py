@@ -34,7 +34,7 @@ def remedy(options: CaptureOptions, film: OpenedFilm, detector: BodyDetector) ->
     tried = list(_tried(options, film, detector, frames))
     if not tried:
         return None
-    words, share = max(tried, key=lambda one: one[1])
+    words, share = max(tried, key=lambda trial: trial[1])
     if share < max(_MOST, before + _MORE):
         return None
     command = shlex.join(
@@ -64,6 +64,6 @@ def _tried(
         alone = make_detector(frames, cropped=True, inside=inside, threshold=film.threshold)
         yield "--cropped", whole_share(alone, frames)
     if film.threshold is None and film.footage.deep is None:
-        usual = float(np.median([detector.detect(one).silhouette.threshold for one in frames]))
+        usual = float(np.median([detector.detect(frame).silhouette.threshold for frame in frames]))
         for level in {max(1, round(part * usual)) for part in _THRESHOLDS}:
             yield f"--threshold {level}", whole_share(replace(detector, threshold=level), frames)

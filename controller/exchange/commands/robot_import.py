@@ -40,7 +40,7 @@ def import_robot(
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:
         raise InputError(f"--scale {scale:g}: 0.001 to 1000")
-    made = robot_import.import_robot(
+    imported = robot_import.import_robot(
         file,
         out.stem,
         servo,
@@ -48,19 +48,19 @@ def import_robot(
         reverse=reverse,
         assumed=Assumptions(assume or ()),
     )
-    joints = ", ".join(made.joint_names)
+    joints = ", ".join(imported.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
-    comment += [f"- {note}" for note in made.notes]
+    comment += [f"- {note}" for note in imported.notes]
     with atomic_write(out) as part:
-        part.write_text(robot_toml(made.robot, "\n".join(comment)), encoding="utf-8")
+        part.write_text(robot_toml(imported.robot, "\n".join(comment)), encoding="utf-8")
     facts: dict[str, object] = {
         "robot": str(out),
-        "joints": made.robot.joint_count,
-        "axes": made.robot.joint_axes,
-        "length_m": round(made.robot.length_m, 4),
-        "mass_kg": round(made.robot.mass_kg, 4),
-        "kinematics_error_m": made.kinematics_error_m,
+        "joints": imported.robot.joint_count,
+        "axes": imported.robot.joint_axes,
+        "length_m": round(imported.robot.length_m, 4),
+        "mass_kg": round(imported.robot.mass_kg, 4),
+        "kinematics_error_m": imported.kinematics_error_m,
     }
-    show(facts | ({"notes": list(made.notes)} if as_json else {}), as_json)
-    for note in () if as_json else made.notes:
+    show(facts | ({"notes": list(imported.notes)} if as_json else {}), as_json)
+    for note in () if as_json else imported.notes:
         console.print(f"- {note}", markup=False)

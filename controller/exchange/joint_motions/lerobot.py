@@ -115,7 +115,7 @@ def _rows(path: Path, feature: str, episode: int) -> tuple[Floats, Floats]:
         raise InputError(f"{path}: episode {episode} has no rows in {path / 'data'}")
     try:
         values = np.array(rows, dtype=float)
-        time_s = np.array([np.nan if at is None else at for at in times], dtype=float)
+        time_s = np.array([np.nan if moment is None else moment for moment in times], dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"{path}: {feature}: expected a list of numbers in each row") from None
     return time_s, values.reshape(len(values), -1)

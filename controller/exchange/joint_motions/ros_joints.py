@@ -39,10 +39,10 @@ class RosJoints:
         try:
             with bags.AnyReader([path], default_typestore=store) as bag:
                 topic, kind = _topic(path, bag, request)
-                using = [each for each in bag.connections if each.topic == topic]
+                using = [connection for connection in bag.connections if connection.topic == topic]
                 messages = (
-                    (stamp, bag.deserialize(data, one.msgtype))
-                    for one, stamp, data in bag.messages(connections=using)
+                    (stamp, bag.deserialize(data, connection.msgtype))
+                    for connection, stamp, data in bag.messages(connections=using)
                 )
                 rows = _states(messages) if kind == _STATE else _points(path, messages)
                 return _motion(path, topic, rows)
@@ -55,7 +55,7 @@ class RosJoints:
 
 
 def _topic(path: Path, bag: Any, request: JointRequest) -> tuple[str, str]:
-    kinds = {each.topic: each.msgtype for each in bag.connections}
+    kinds = {connection.topic: connection.msgtype for connection in bag.connections}
     fit = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
     if request.topic is not None:
         if request.topic not in fit:
@@ -92,17 +92,17 @@ def _states(messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
 
 def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
     """Times, names and positions of the one JointTrajectory, or of the first points of several."""
-    held = list(messages)
-    if len(held) == 1:
-        ((_, message),) = held
+    messages_list = list(messages)
+    if len(messages_list) == 1:
+        ((_, message),) = messages_list
         for point in message.points:
             start = point.time_from_start
             yield start.sec + 1e-9 * start.nanosec, tuple(message.joint_names), point.positions
         return
-    for received, message in held:
+    for received, message in messages_list:
         if len(message.points) != 1:
             raise InputError(
-                f"{path}: {len(held)} trajectories of several points; give a bag with one"
+                f"{path}: {len(messages_list)} trajectories of several points; give a bag with one"
             )
         yield 1e-9 * received, tuple(message.joint_names), message.points[0].positions
 
@@ -116,18 +116,18 @@ def _motion(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
     cells = 0
     for time_s, row_names, positions in rows:
         names = names or row_names
-        held = dict(zip(row_names, np.asarray(positions, float).tolist(), strict=False))
-        if not {*names} & {*held}:
+        angle_by_name = dict(zip(row_names, np.asarray(positions, float).tolist(), strict=False))
+        if not {*names} & {*angle_by_name}:
             others += 1  # of another publisher, or without positions
             unlike |= {*row_names} - {*names}
             continue
-        unlike |= {*held} - {*names}
+        unlike |= {*angle_by_name} - {*names}
         cells += len(names)
         check_expansion(path, cells, 8 * cells)
         if cells > MOST_CELLS:
             raise InputError(f"{path}: holds more than {MOST_CELLS} angles; give a part of it")
         times.append(time_s)
-        angles.append([held.get(name, np.nan) for name in names])
+        angles.append([angle_by_name.get(name, np.nan) for name in names])
     if not names or not angles:
         raise InputError(f"{path}: {topic}: no message has names and positions of joints")
     notes = [f"topic {topic}"]

@@ -106,23 +106,25 @@ def _root(model: mujoco.MjModel, data: mujoco.MjData) -> MovingBody:
             f"a robot is one free chain of hinges; free bodies that carry hinges: {names}"
         )
     first = with_hinges[0]
-    own = model.jnt_type[model.jnt_bodyid == first]
-    slides = (own == mujoco.mjtJoint.mjJNT_FREE) | (own == mujoco.mjtJoint.mjJNT_SLIDE)
+    joint_types = model.jnt_type[model.jnt_bodyid == first]
+    slides = (joint_types == mujoco.mjtJoint.mjJNT_FREE) | (
+        joint_types == mujoco.mjtJoint.mjJNT_SLIDE
+    )
     if not slides.any():
         raise InputError(
             f"body {element_name(model, 'body', first)}: is bolted to the world; a robot's first "
             "body has a freejoint, or slides"
         )
-    made = {first: MovingBody(element_name(model, "body", first), _welded(model, first))}
+    moving_bodies = {first: MovingBody(element_name(model, "body", first), _welded(model, first))}
     for body in range(first + 1, model.nbody):
         above = int(weld[model.body_parentid[body]])
-        if weld[body] != body or above not in made:
+        if weld[body] != body or above not in moving_bodies:
             continue
-        here = MovingBody(element_name(model, "body", body), _welded(model, body))
-        here.parent, here.hinges = made[above], _hinges(model, data, body)
-        made[above].children.append(here)
-        made[body] = here
-    return made[first]
+        moving_body = MovingBody(element_name(model, "body", body), _welded(model, body))
+        moving_body.parent, moving_body.hinges = moving_bodies[above], _hinges(model, data, body)
+        moving_bodies[above].children.append(moving_body)
+        moving_bodies[body] = moving_body
+    return moving_bodies[first]
 
 
 def _welded(model: mujoco.MjModel, body: int) -> list[int]:
@@ -139,14 +141,14 @@ def _hinges_behind(model: mujoco.MjModel, root: int) -> bool:
 
 
 def _hinges(model: mujoco.MjModel, data: mujoco.MjData, body: int) -> list[Hinge]:
-    found = []
+    hinges = []
     for joint in np.flatnonzero(model.jnt_bodyid == body):
         name = element_name(model, "joint", int(joint))
         if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
             kind = mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower()
             raise InputError(f"joint {name}: is a {kind} joint; only hinges are servos")
-        found.append(Hinge(name, int(joint), data.xanchor[joint].copy(), data.xaxis[joint].copy()))
-    return found
+        hinges.append(Hinge(name, int(joint), data.xanchor[joint].copy(), data.xaxis[joint].copy()))
+    return hinges
 
 
 def _take_wheels(
@@ -196,9 +198,9 @@ def centre_m(model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int]) -> F
 def _walk(body: MovingBody) -> Iterator[MovingBody]:
     stack = [body]
     while stack:
-        here = stack.pop()
-        yield here
-        stack += reversed(here.children)
+        moving_body = stack.pop()
+        yield moving_body
+        stack += reversed(moving_body.children)
 
 
 def _spine(root: MovingBody) -> list[MovingBody]:
@@ -214,7 +216,7 @@ def _spine(root: MovingBody) -> list[MovingBody]:
         paths.append(path[::-1])
     paths.sort(key=lambda path: (not _is_straight(path), -sum(len(b.hinges) for b in path)))
     for path in paths:
-        if len(path) > 1 and all(_is_pair(_others(here, path)) for here in path):
+        if len(path) > 1 and all(_is_pair(_others(branch_body, path)) for branch_body in path):
             return path
     fork = next((body for body in _walk(root) if not _is_pair(body.children[1:])), root)
     names = ", ".join(child.name for child in fork.children)
@@ -231,8 +233,8 @@ def _is_straight(path: list[MovingBody]) -> bool:
     return steps == 0.0 or float(np.linalg.norm(anchors[-1] - anchors[0])) > _STRAIGHT * steps
 
 
-def _others(here: MovingBody, path: list[MovingBody]) -> list[MovingBody]:
-    return [child for child in here.children if child not in path]
+def _others(body: MovingBody, path: list[MovingBody]) -> list[MovingBody]:
+    return [child for child in body.children if child not in path]
 
 
 def _is_pair(children: list[MovingBody]) -> bool:
@@ -270,11 +272,11 @@ def _with_branches(path: list[MovingBody], wheels: list[list[int]]) -> BodyTree:
             branches.append(
                 Branch(
                     number[id(body)],
-                    [hinge for each in chain for hinge in each.hinges],
+                    [hinge for chain_body in chain for hinge in chain_body.hinges],
                     [
-                        each.bodies if k == len(each.hinges) - 1 else []
-                        for each in chain
-                        for k in range(len(each.hinges))
+                        chain_body.bodies if k == len(chain_body.hinges) - 1 else []
+                        for chain_body in chain
+                        for k in range(len(chain_body.hinges))
                     ],
                     child.name,
                 )

@@ -123,20 +123,20 @@ class ChainFigures:
                 f"joints lie up to {worst_m:.2g} m from one line at zero angles; the robot's "
                 "file puts them on the line"
             )
-        for hinge, before, here in zip(hinges[1:], at_m, at_m[1:], strict=False):
-            if here > before + 1e-9:
+        for hinge, before, ahead_m in zip(hinges[1:], at_m, at_m[1:], strict=False):
+            if ahead_m > before + 1e-9:
                 raise InputError(
-                    f"joint {hinge.name}: lies {here - before:.4g} m ahead of the one before it at "
-                    "zero angles; the chain must be straight there"
+                    f"joint {hinge.name}: lies {ahead_m - before:.4g} m ahead of the one before it "
+                    "at zero angles; the chain must be straight there"
                 )
         return [min(at_m[: k + 1]) for k in range(len(at_m))]
 
     def _links(self) -> list[LinkFigures]:
         inner_m = [-float(step) for step in np.diff(self.joints_m)]
         lengths_m = [0.0, *(length if length > 1e-6 else 0.0 for length in inner_m), 0.0]
-        known = [k for k in range(1, len(lengths_m) - 1) if lengths_m[k] > _SHORTEST_M]
+        known_links = [k for k in range(1, len(lengths_m) - 1) if lengths_m[k] > _SHORTEST_M]
         last = len(lengths_m) - 1
-        ends = {k: self._end_m(k, lengths_m, known) for k in (0, last)}
+        ends = {k: self._end_m(k, lengths_m, known_links) for k in (0, last)}
         for k, (length_m, why) in ends.items():
             lengths_m[k] = length_m
             end = "head" if k == 0 else "tail"
@@ -150,7 +150,7 @@ class ChainFigures:
         radii_m = self._radii_m(lengths_m)
         return [self._link(k, lengths_m[k], radii_m[k]) for k in range(last + 1)]
 
-    def _end_m(self, k: int, lengths_m: list[float], known: list[int]) -> tuple[float, str]:
+    def _end_m(self, k: int, lengths_m: list[float], known_links: list[int]) -> tuple[float, str]:
         """Length of the head or the tail, and what states it."""
         name = self._tree.names[k]
         key = f"{name}.length_m"
@@ -164,7 +164,7 @@ class ChainFigures:
             return even_m, "as its centre of mass and inertia state (an even cylinder)"
         reach_m = self._reach_m(k, sign, joint_m)
         if reach_m is not None and reach_m > _SHORTEST_M:
-            for other in sorted(known, key=lambda each: abs(each - k)):
+            for other in sorted(known_links, key=lambda link: abs(link - k)):
                 its_joint_m = self.joints_m[other] if k == 0 else self.joints_m[other - 1]
                 its_reach_m = self._reach_m(other, sign, its_joint_m)
                 if its_reach_m is None or abs(its_reach_m - reach_m) > _ALIKE * reach_m:
@@ -178,8 +178,8 @@ class ChainFigures:
                     f"{reach_m:.4g} m)",
                 )
             return reach_m, "as far as its shape reaches"
-        if known:
-            nearest = min(known, key=lambda each: abs(each - k))
+        if known_links:
+            nearest = min(known_links, key=lambda known_link: abs(known_link - k))
             return (
                 lengths_m[nearest],
                 f"as its neighbour {self._tree.names[nearest]}: it has no shape of its own",
@@ -223,15 +223,15 @@ class ChainFigures:
         """Geoms of a link that have a size: those with mass, else those that are only drawn."""
         model = self._model
         flat = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
-        found = [
+        geom_indices = [
             g
             for g in range(model.ngeom)
             if model.geom_bodyid[g] in group
             and model.geom_type[g] not in flat
             and float(model.geom_rbound[g]) > 2e-4
         ]
-        solid = [g for g in found if model.geom(g).name not in source.massless_geoms]
-        return solid or found
+        solid = [g for g in geom_indices if model.geom(g).name not in source.massless_geoms]
+        return solid or geom_indices
 
     def _mass(self, k: int, source: ModelSource) -> _Mass:
         """Mass of a link about its centre; the zero mass between two hinges of one body.
@@ -249,18 +249,18 @@ class ChainFigures:
         kg = float(masses.sum())
         if source.stated_mass_kg is not None:
             names = [model.body(body).name for body in group]
-            kg = sum(source.stated_mass_kg.get(each, 0.0) for each in names)
+            kg = sum(source.stated_mass_kg.get(body_name, 0.0) for body_name in names)
         if kg <= 0.0:
             ends = k in (0, len(self._tree.groups) - 1)
             here_m = [*self.joints_m[max(k - 1, 0) : k + 1]]
             if not ends and abs(here_m[0] - here_m[-1]) < 1e-6:
                 return _Mass(0.0, np.zeros(3), np.zeros((3, 3)))
             others = [
-                source.stated_mass_kg.get(model.body(each[0]).name, 0.0)
-                for each in self._tree.groups
-                if each and source.stated_mass_kg is not None
+                source.stated_mass_kg.get(model.body(group_bodies[0]).name, 0.0)
+                for group_bodies in self._tree.groups
+                if group_bodies and source.stated_mass_kg is not None
             ]
-            likely = float(np.median([each for each in others if each > 0.0] or [0.1]))
+            likely = float(np.median([mass_kg for mass_kg in others if mass_kg > 0.0] or [0.1]))
             kg = self._assumed.number(
                 f"{name}.mass_kg", 1e-4, 1000.0, f"link {name}: states no mass", likely
             )
@@ -279,16 +279,20 @@ class ChainFigures:
         """Radius of each link: from its shape, its inertia, or the others."""
         mean_m = float(np.mean([length for length in lengths_m if length > 0.0]))
         radii_m = [self._radius_m(k, mean_m) for k in range(len(lengths_m))]
-        known = [radius for radius in radii_m if radius is not None]
+        known_radii_m = [radius for radius in radii_m if radius is not None]
         missing = [
             self._tree.names[k]
             for k, radius in enumerate(radii_m)
             if radius is None and self._tree.groups[k]
         ]
         given = self._assumed.given("radius_m", 1e-4, 10.0) if missing else None
-        other_m = given or (max(known) if known else _ASSUMED_RADIUS * mean_m)
+        other_m = given or (max(known_radii_m) if known_radii_m else _ASSUMED_RADIUS * mean_m)
         if missing and given is None:
-            how = "that of the thickest other" if known else f"{_ASSUMED_RADIUS:g} of a mean link"
+            how = (
+                "that of the thickest other"
+                if known_radii_m
+                else f"{_ASSUMED_RADIUS:g} of a mean link"
+            )
             self.notes.append(
                 f"radius of {len(missing)} links is assumed, {other_m:.3g} m ({how}): nothing "
                 f"states it: {', '.join(missing[:3])}{', ...' if len(missing) > 3 else ''}; "

@@ -107,11 +107,11 @@ def _include(root: LineElement, path: Path) -> None:
             return
         parent, include = places[0]
         file = path.parent / include.get("file", "")
-        at = list(parent).index(include)
+        position = list(parent).index(include)
         inner, _ = parse(file, name=str(include.get("file", "")))
         parent.remove(include)
         for child in reversed(list(inner)):
-            parent.insert(at, child)
+            parent.insert(position, child)
     raise InputError(f"{path}: includes more than {_MOST_INCLUDES} files")
 
 
@@ -146,19 +146,19 @@ class _Defaults:
 
     @staticmethod
     def of(root: LineElement) -> "_Defaults":
-        found = _Defaults({"": {}})
+        defaults = _Defaults({"": {}})
         stack = [(default, "", True) for default in root.findall("default")]
         while stack:
             default, above, is_main = stack.pop()
             name = "" if is_main else default.get("class", "")
-            values = dict(found.geom.get(above, {}))
+            values = dict(defaults.geom.get(above, {}))
             for geom in default.findall("geom"):
                 values.update(geom.attrib)
-            found.geom[name] = values
+            defaults.geom[name] = values
             if is_main and default.get("class"):
-                found.geom[default.get("class", "")] = values
+                defaults.geom[default.get("class", "")] = values
             stack += [(child, name, False) for child in default.findall("default")]
-        return found
+        return defaults
 
     def value(self, geom: LineElement, name: str, childclass: str) -> str | None:
         chosen = self.geom.get(geom.get("class", childclass), {})
@@ -170,13 +170,13 @@ def _geoms(root: LineElement) -> Iterator[tuple[LineElement, LineElement, str]]:
     stack = [(body, "") for body in children(root, "worldbody")]
     while stack:
         body, childclass = stack.pop()
-        own = body.get("childclass", childclass)
+        child_class = body.get("childclass", childclass)
         for child in body:
             assert isinstance(child, LineElement)
             if child.tag == "geom":
-                yield body, child, own
+                yield body, child, child_class
             elif child.tag in ("body", "frame", "replicate"):
-                stack.append((child, own))
+                stack.append((child, child_class))
 
 
 def _resolve_meshes(
@@ -264,7 +264,7 @@ def _replace(
 
 def _massless(root: LineElement, defaults: _Defaults) -> Iterator[str]:
     """Names of geoms without mass, which get one if they have none."""
-    names = {each.get("name") for each in root.iter("geom")}
+    names = {named_geom.get("name") for named_geom in root.iter("geom")}
     number = 0
     for _, geom, childclass in _geoms(root):
         is_looks = any(

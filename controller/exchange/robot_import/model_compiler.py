@@ -62,7 +62,7 @@ def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelS
     notes = []
     if replaced:
         notes.append(f"{replaced} characters are not UTF-8; names that hold them differ")
-    if any(each.tag.startswith("xacro:") for each in root.iter()):
+    if any(element.tag.startswith("xacro:") for element in root.iter()):
         root, _ = parse(path, name="expanded xacro", text=_expanded(path))
         notes.append("xacro was run with its default arguments; lines are those of its output")
     check_parts(path, root)
@@ -131,26 +131,26 @@ def _compiled(source: ModelSource) -> tuple[mujoco.MjModel | None, str]:
     text, places = source.text()
     with TemporaryDirectory() as folder:
         copy = Path(folder) / f"model.{source.root.tag}"
-        made = Path(folder) / "model.mjb"
+        compiled_file = Path(folder) / "model.mjb"
         copy.write_text(text, encoding="utf-8")
-        said = compile_model(copy, made)
+        said = compile_model(copy, compiled_file)
         if said is not None:
             return None, with_places(" ".join(said.split()), places)
-        return mujoco.MjModel.from_binary_path(str(made)), ""
+        return mujoco.MjModel.from_binary_path(str(compiled_file)), ""
 
 
-def compile_model(source: Path, made: Path) -> str | None:
+def compile_model(source: Path, compiled_file: Path) -> str | None:
     """Let MuJoCo compile a model in a process of its own; its message if it cannot, or None.
 
     A model may ask for any memory and time, and crash the compiler; that process is limited in all.
     """
     limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
     ended = run_code(
-        _COMPILER, str(source), str(made), *limits, folder=source.parent
+        _COMPILER, str(source), str(compiled_file), *limits, folder=source.parent
     )  # MuJoCo writes its log there
     if ended.returncode == _SAID:
         return ended.stdout
-    if ended.returncode or not made.is_file():
+    if ended.returncode or not compiled_file.is_file():
         return (
             f"its compiler gave up: {_MOST_MEMORY_BYTES / 1e9:g} GB of memory and {_MOST_CPU_S} s "
             "are enough for a robot's model"

@@ -124,7 +124,7 @@ def _other_letters(raw: bytes) -> str | None:
         raw.decode("utf-8")
     except UnicodeDecodeError:
         text = raw.decode("utf-8-sig", errors="replace")
-        return _DECLARATION.sub(lambda found: "\n" * found[0].count("\n"), text, count=1)
+        return _DECLARATION.sub(lambda match: "\n" * match[0].count("\n"), text, count=1)
     return None
 
 
@@ -135,7 +135,7 @@ def check_parts(path: Path, root: LineElement) -> None:
         InputError: it has.
 
     """
-    parts = sum(each.tag in ("body", "link", "joint") for each in root.iter())
+    parts = sum(element.tag in ("body", "link", "joint") for element in root.iter())
     if parts > MOST_PARTS:
         raise InputError(
             f"{path}: holds {parts} bodies and joints; a chain has at most {MOST_PARTS}"

@@ -96,14 +96,14 @@ def import_robot(
     assumed = Assumptions() if assumed is None else assumed
     try:
         model, source = load_model(path, assumed)
-        found = _read(model, source, name, servo_model, scale, reverse, assumed)
+        imported = _read(model, source, name, servo_model, scale, reverse, assumed)
         assumed.check_used("keys: LINK.length_m, LINK.mass_kg, MESH.mass_kg, radius_m")
     except ConfigError as error:
         raise InputError(f"{path}: {error.faults[0]}") from None
     except InputError as error:
         named = [f"{path}: {fault.removeprefix(f'{path}: ')}" for fault in error.faults]
         raise InputError(named) from None
-    return found
+    return imported
 
 
 def _read(
@@ -158,8 +158,8 @@ def _wheel_notes(friction: list[float], tree: BodyTree) -> list[str]:
     if not tree.wheels:
         return []
     states = (
-        f"; they state a friction of {', '.join(f'{each:g}' for each in friction)}: --set "
-        f"world.friction.across={friction[0]:g}"
+        f"; they state a friction of {', '.join(f'{coefficient:g}' for coefficient in friction)}: "
+        f"--set world.friction.across={friction[0]:g}"
         if friction
         else ""
     )
@@ -243,7 +243,7 @@ def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
         table[key] = round(scale * float(str(table[key])), 12)
     segments = table["segments_m"]
     assert isinstance(segments, list)
-    table["segments_m"] = [round(scale * each, 12) for each in segments]
+    table["segments_m"] = [round(scale * segment_m, 12) for segment_m in segments]
     table["segment_mass_kg"] = round(scale**3 * float(str(table["segment_mass_kg"])), 9)
     return table
 

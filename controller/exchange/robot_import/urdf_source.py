@@ -84,10 +84,10 @@ def _drop_repeated(source: ModelSource) -> None:
     repeated: dict[str, list[str]] = {}
     for parent in list(source.root.iter()):
         for tag in _ONCE.get(parent.tag, ()):
-            found = children(parent, tag)
-            if len(found) < 2:
+            elements = children(parent, tag)
+            if len(elements) < 2:
                 continue
-            first, *others = found
+            first, *others = elements
             for other in others:
                 parent.remove(other)
                 differs = " with other values" if other.attrib != first.attrib else ""
@@ -153,10 +153,10 @@ def _first_link(source: ModelSource, path: Path) -> str:
     if len(first) != 1:
         listed = ", ".join(first) or "each hangs on another"
         raise InputError(f"{path}: one link must be the first, on which all hang: {listed}")
-    here = first[0]
-    holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == here]
-    if here != "world" and not _is_free_base(root, here, holding):
-        return here
+    root_link = first[0]
+    holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == root_link]
+    if root_link != "world" and not _is_free_base(root, root_link, holding):
+        return root_link
     turning = [j for j in holding if j.get("type") not in ("fixed", "floating", "planar")]
     if turning:
         raise InputError(
@@ -165,21 +165,26 @@ def _first_link(source: ModelSource, path: Path) -> str:
             "freely; use a fixed or floating joint, or remove the link world"
         )
     if len(holding) != 1:
-        held = ", ".join(str(_end(joint, "child")) for joint in holding) or "nothing"
-        raise InputError(f"{path}: link {here} holds {held}; one robot is read at a time")
+        children_text = ", ".join(str(_end(joint, "child")) for joint in holding) or "nothing"
+        raise InputError(
+            f"{path}: link {root_link} holds {children_text}; one robot is read at a time"
+        )
     root.remove(holding[0])
-    root.remove(next(link for link in root.findall("link") if link.get("name") == here))
+    root.remove(next(link for link in root.findall("link") if link.get("name") == root_link))
     name_held = _end(holding[0], "child")
     kind = holding[0].get("type")
     source.notes.append(
-        f"link {here} is dropped: it holds {name_held} by the {kind} joint {holding[0].get('name')}"
+        f"link {root_link} is dropped: it holds {name_held} "
+        f"by the {kind} joint {holding[0].get('name')}"
     )
     return _first_link(source, path)
 
 
 def _is_free_base(root: LineElement, name: str, holding: list[LineElement]) -> bool:
     """Whether a link is a mere frame from which the robot moves freely."""
-    link = next(each for each in root.findall("link") if each.get("name") == name)
+    link = next(
+        link_element for link_element in root.findall("link") if link_element.get("name") == name
+    )
     is_frame = not any(child.tag in ("inertial", "visual", "collision") for child in link)
     return is_frame and [joint.get("type") for joint in holding] in (["floating"], ["planar"])
 
@@ -205,8 +210,8 @@ def _check_limits(root: LineElement, path: Path) -> None:
 
 def _end(joint: object, end: str) -> str | None:
     assert isinstance(joint, LineElement)
-    found = joint.find(end)
-    return None if found is None else found.get("link")
+    end_element = joint.find(end)
+    return None if end_element is None else end_element.get("link")
 
 
 def _choose_shapes(source: ModelSource, path: Path, *, meshes: bool) -> None:
@@ -294,12 +299,12 @@ def _mend_inertias(source: ModelSource) -> None:
 
 def _friction(root: LineElement) -> dict[str, float]:
     """Gazebo's ``mu1`` by link."""
-    found = {}
+    friction_by_link = {}
     for gazebo in root.findall("gazebo"):
         value = numbers(gazebo.findtext("mu1"), 1) or numbers(gazebo.findtext("mu"), 1)
         if value is not None and gazebo.get("reference"):
-            found[str(gazebo.get("reference"))] = value[0]
-    return found
+            friction_by_link[str(gazebo.get("reference"))] = value[0]
+    return friction_by_link
 
 
 def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, str]]:
@@ -311,7 +316,7 @@ def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, st
     masses: dict[str, float] = {}
     heaviest: dict[str, tuple[float, str]] = {}
     for link in root.findall("link"):
-        own = name = str(link.get("name"))
+        owner = name = str(link.get("name"))
         steps = 0
         while name in parent and steps < len(parent):
             name = parent[name]
@@ -320,13 +325,13 @@ def _stated_masses_kg(root: LineElement) -> tuple[dict[str, float], dict[str, st
         value = numbers(None if stated is None else stated.get("value"), 1) or [0.0]
         masses[name] = masses.get(name, 0.0) + value[0]
         if value[0] > heaviest.get(name, (0.0, ""))[0]:
-            heaviest[name] = value[0], own
+            heaviest[name] = value[0], owner
     return masses, {name: part for name, (_, part) in heaviest.items()}
 
 
 def _float(root: LineElement, first: str) -> None:
     """Join the first link to MuJoCo's world by a floating joint; bodies without mass compile."""
-    names = {each.get("name") for each in root.iter()}
+    names = {element.get("name") for element in root.iter()}
     ground = next(name for name in ("_ground", "_ground_", "_ground__") if name not in names)
     options = added(root, "mujoco")
     sliver = repr(_SLIVER_KG)

@@ -98,7 +98,7 @@ def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
 
     """
     try:
-        found = SearchProgress.model_validate_json(file.read_bytes())
+        progress = SearchProgress.model_validate_json(file.read_bytes())
     except FileNotFoundError:
         raise InputError(
             f"{file}: no such file, so there is nothing to continue; leave --resume out"
@@ -107,7 +107,7 @@ def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
         fault = error.errors(include_url=False)[0]
         place = ".".join(map(str, fault["loc"]))
         raise InputError(f"{file}: {place}: {fault['msg']}; start again with --force") from None
-    before = found.model_dump()
+    before = progress.model_dump()
     now = asked.model_dump()
     other = [
         f"{file}: its search has {key} {before[key]}, asked for {now[key]}; give the same, or "
@@ -117,4 +117,4 @@ def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
     ]
     if other:
         raise InputError(other)
-    return found
+    return progress

@@ -19,7 +19,7 @@ def list_policies(as_json: Json = False) -> None:
             policy.model_dump(exclude={"network"})
             | {
                 "weights": sum(
-                    len(each.bias) * (len(each.weights[0]) + 1) for each in policy.network
+                    len(layer.bias) * (len(layer.weights[0]) + 1) for layer in policy.network
                 )
             }
             for policy in policies

@@ -64,13 +64,20 @@ def policy_trials(
         for seed in range(first_seed, first_seed + seeds)
     ]
     some = study.policy_trials(planned, workers)
-    found = list(show_progress(some, "trials", len(planned)))
+    trial_results = list(show_progress(some, "trials", len(planned)))
     table = [
-        _row(*row, [each for each in found if (each[0].motion, each[0].world) == row])
+        _row(
+            *row,
+            [
+                trial_result
+                for trial_result in trial_results
+                if (trial_result[0].motion, trial_result[0].world) == row
+            ],
+        )
         for row in rows
     ]
     if as_json:
-        trials = [asdict(trial) | asdict(result) for trial, result in found]
+        trials = [asdict(trial) | asdict(result) for trial, result in trial_results]
         print(json.dumps({"table": [asdict(row) for row in table], "trials": trials}))
         return
     grid = Table(box=None, pad_edge=False)
@@ -108,21 +115,23 @@ class _Row:
     """Evidence of the poses: ``measured (simulator)``."""
 
 
-def _row(motion: str, world: str, found: list[tuple[PolicyTrial, PolicyTrialResult]]) -> _Row:
-    whole = [result for _, result in found if result.tripped is None]
-    speeds = [result.speed_m_s for result in whole]
-    poses = {f"{result.pose_evidence} ({result.pose_source})": None for _, result in found}
+def _row(
+    motion: str, world: str, trial_results: list[tuple[PolicyTrial, PolicyTrialResult]]
+) -> _Row:
+    untripped = [result for _, result in trial_results if result.tripped is None]
+    speeds = [result.speed_m_s for result in untripped]
+    poses = {f"{result.pose_evidence} ({result.pose_source})": None for _, result in trial_results}
     pose = ", ".join(poses)
-    if not whole:
-        return _Row(motion, world, None, None, None, None, None, len(found), pose)
+    if not untripped:
+        return _Row(motion, world, None, None, None, None, None, len(trial_results), pose)
     return _Row(
         Path(motion).stem,
         world,
         round(fmean(speeds), 4),
         round(stdev(speeds), 4) if len(speeds) > 1 else None,
-        round(fmean(result.body_lengths_cycle for result in whole), 3),
-        round(fmean(result.energy_j_m for result in whole), 2),
-        round(fmean(result.course_rad**2 for result in whole) ** 0.5, 3),
-        len(found) - len(whole),
+        round(fmean(result.body_lengths_cycle for result in untripped), 3),
+        round(fmean(result.energy_j_m for result in untripped), 2),
+        round(fmean(result.course_rad**2 for result in untripped) ** 0.5, 3),
+        len(trial_results) - len(untripped),
         pose,
     )

@@ -118,7 +118,7 @@ def stereo(
     stand = None
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))
-    made = stereo_ground.stereo_ground(
+    terrain = stereo_ground.stereo_ground(
         pair,
         disparities,
         spacing / scale,
@@ -127,24 +127,24 @@ def stereo(
         math.inf if far is None else far,
         is_level=level_ground,
     )
-    seen = made.elevation
+    elevation = terrain.elevation
     placed = replace(
-        seen,
-        z_m=scale * seen.z_m,
+        elevation,
+        z_m=scale * elevation.z_m,
         spacing_m=spacing,
-        x0_m=scale * seen.x0_m,
-        y0_m=scale * seen.y0_m,
+        x0_m=scale * elevation.x0_m,
+        y0_m=scale * elevation.y0_m,
     )
     world = MapWorld.of(out, placed.height_field(fill))
     world.write(
         [
             f"From {left.name} and {right.name}, at a scale of {scale:g}; samples {spacing:g} m",
             "apart. (0, 0) is below the left camera, x is where it looked.",
-            *_stand_words(made),
+            *_stand_words(terrain),
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
     )
-    finish(world, _facts(made), picture, as_json=as_json)
+    finish(world, _facts(terrain), picture, as_json=as_json)
 
 
 def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:
@@ -160,26 +160,26 @@ def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list
     return faults
 
 
-def _stand_words(made: "StereoGround") -> list[str]:
-    stand = made.stand
+def _stand_words(terrain: "StereoGround") -> list[str]:
+    stand = terrain.stand
     return [
         f"The camera stood {stand.height_m:.3f} m above the ground, tilted down by",
         f"{math.degrees(stand.tilt_rad):.1f} degrees and rolled by "
-        f"{math.degrees(stand.roll_rad):.1f}, {_how(made)}.",
+        f"{math.degrees(stand.roll_rad):.1f}, {_how(terrain)}.",
     ]
 
 
-def _how(made: "StereoGround") -> str:
-    return "fitted to the points, which are taken for level ground" if made.fitted else "given"
+def _how(terrain: "StereoGround") -> str:
+    return "fitted to the points, which are taken for level ground" if terrain.fitted else "given"
 
 
-def _facts(made: "StereoGround") -> dict[str, object]:
-    stand = made.stand
+def _facts(terrain: "StereoGround") -> dict[str, object]:
+    stand = terrain.stand
     return {
-        "camera": _how(made),
+        "camera": _how(terrain),
         "camera_height_m": round(stand.height_m, 4),
         "camera_tilt_deg": round(math.degrees(stand.tilt_rad), 2),
         "camera_roll_deg": round(math.degrees(stand.roll_rad), 2),
-        "matched_share": round(made.known_share, 4),
-        "mapped_share": round(made.used_share, 4),
+        "matched_share": round(terrain.known_share, 4),
+        "mapped_share": round(terrain.used_share, 4),
     }

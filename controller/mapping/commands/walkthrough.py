@@ -87,20 +87,22 @@ def walkthrough(
     from snakewalk.controller.mapping.mosaic import route, walk, walk_ground  # noqa: PLC0415  an extra
 
     with ProgressBar("models", transient=True) as bar:
-        made = walk.read_walk(positions, config, bar.update)
+        walk_steps = walk.read_walk(positions, config, bar.update)
     ground = None
     if world is not None:
-        ground = walk_ground.walk_ground(made, spacing, error, fill)
+        ground = walk_ground.walk_ground(walk_steps, spacing, error, fill)
     per_step = max(1, round(seconds * fps))
     with ProgressBar("frames", transient=True) as bar, atomic_write(out) as part:
-        facts = route.film(made, part, size_px, per_step, fps, alone=alone, on_frame=bar.update)
+        facts = route.film(
+            walk_steps, part, size_px, per_step, fps, alone=alone, on_frame=bar.update
+        )
     shown = {
         "film": str(out),
         "frames": facts.frames,
         "frame_ms": round(1000.0 * facts.frame_s, 1),
         "hole_share": round(facts.hole_share, 4),
-        "valid_share": [round(float(model.valid.mean()), 4) for model in made.models],
-        **(_step_facts(made.steps) if made.steps or as_json else {}),
+        "valid_share": [round(float(model.valid.mean()), 4) for model in walk_steps.models],
+        **(_step_facts(walk_steps.steps) if walk_steps.steps or as_json else {}),
     }
     if world is None or ground is None:
         show(shown, as_json)
@@ -108,7 +110,8 @@ def walkthrough(
     written = MapWorld.of(world, ground.field)
     written.write(
         [
-            f"From {positions.name}, {len(made.models)} positions; samples {spacing:g} m apart.",
+            f"From {positions.name}, {len(walk_steps.models)} positions; "
+            f"samples {spacing:g} m apart.",
             "(0, 0) is below the first left camera, x is where it looked.",
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
@@ -139,13 +142,17 @@ def _step_facts(steps: "Sequence[Step]") -> dict[str, object]:
         "step_s": [round(step.seconds, 1) for step in steps],
     }
     places, angles = (
-        [None if each is None else 1000.0 * each for each in errors]
+        [None if error_m is None else 1000.0 * error_m for error_m in errors]
         for errors in (
             [step.place_error_m for step in steps],
             [step.angle_error_rad for step in steps],
         )
     )
-    if any(each is not None for each in places):
-        facts["place_error_mm"] = [None if each is None else round(each, 2) for each in places]
-        facts["angle_error_mrad"] = [None if each is None else round(each, 2) for each in angles]
+    if any(place_error is not None for place_error in places):
+        facts["place_error_mm"] = [
+            None if place_error is None else round(place_error, 2) for place_error in places
+        ]
+        facts["angle_error_mrad"] = [
+            None if angle_error is None else round(angle_error, 2) for angle_error in angles
+        ]
     return facts

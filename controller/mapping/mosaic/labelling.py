@@ -141,10 +141,10 @@ def energy(costs: Costs, base: Ints, penalty: float, labels: Ints) -> float:
     unequal = 0
     for axis in (0, 1):
         parts = (slice(None, -1), slice(1, None))
-        one, two = (np.moveaxis(place, axis, 0)[part] for part in parts)
+        first_place, two = (np.moveaxis(place, axis, 0)[part] for part in parts)
         scale_one, scale_two = (np.moveaxis(labels // window, axis, 0)[part] for part in parts)
         both = np.logical_and(*(np.moveaxis(has, axis, 0)[part] for part in parts))
-        unequal += int(((one != two).any(axis=-1) | (scale_one != scale_two))[both].sum())
+        unequal += int(((first_place != two).any(axis=-1) | (scale_one != scale_two))[both].sum())
     return float(data[has].sum()) + penalty * unequal
 
 

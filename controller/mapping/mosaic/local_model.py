@@ -100,7 +100,9 @@ def joined(depth_m: Floats, axis: int) -> Bools:
 
     The result is one shorter along the axis, and False outside the valid region.
     """
-    one, two = (np.moveaxis(depth_m, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
+    near_m, two = (
+        np.moveaxis(depth_m, axis, 0)[part] for part in (slice(None, -1), slice(1, None))
+    )
     with np.errstate(invalid="ignore"):
-        together = np.abs(one - two) <= LARGEST_STEP * np.minimum(one, two)
+        together = np.abs(near_m - two) <= LARGEST_STEP * np.minimum(near_m, two)
     return np.asarray(np.moveaxis(together, 0, axis))

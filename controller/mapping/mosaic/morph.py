@@ -37,20 +37,20 @@ class MorphableModel:
 
     def colours(self, share: float) -> Floats:
         """(H, W, 3) colours of the vertices by Eq. 2 to 4."""
-        own = self.first.image.astype(float)
+        first_colour = self.first.image.astype(float)
         other = sampled(self.second.image.astype(np.float32), self.counterpart_px)
-        there = np.where(self.common[..., None], other, own)
-        return (1.0 - share) * own + share * there
+        there = np.where(self.common[..., None], other, first_colour)
+        return (1.0 - share) * first_colour + share * there
 
 
 def sampled(image: Floats, places_px: Floats) -> Floats:
     """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside."""
-    at = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
+    map_px = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
     return np.asarray(
         cv2.remap(
             image,
-            at[..., 0],
-            at[..., 1],
+            map_px[..., 0],
+            map_px[..., 1],
             cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_CONSTANT,
             borderValue=(np.nan,) * 4,
@@ -66,27 +66,31 @@ def dense_flow(
     Between labelled pixels the difference from the reprojection is interpolated.
     """
     pixel = np.stack(np.meshgrid(*(np.arange(n) for n in first.valid.shape[::-1])), axis=-1)
-    seen = project(second.camera, pose.moved(first.points_m))
+    projected_px = project(second.camera, pose.moved(first.points_m))
     grid = np.ix_(flow.rows, flow.columns)
-    off = flow.flow_px + pixel[grid] - seen[grid]
+    off = flow.flow_px + pixel[grid] - projected_px[grid]
     with np.errstate(invalid="ignore"):
         good = np.isfinite(off).all(axis=-1) & (flow.correlation >= LEAST_CORRELATION)
     weight = good.astype(np.float32)
-    held = np.where(good[..., None], off, 0.0).astype(np.float32)
+    offsets_px = np.where(good[..., None], off, 0.0).astype(np.float32)
     size = 3
     smooth = cv2.blur(weight, (size, size))
-    mean = cv2.blur(held, (size, size)) / np.maximum(smooth, 1e-6)[..., None]
+    mean = cv2.blur(offsets_px, (size, size)) / np.maximum(smooth, 1e-6)[..., None]
     step = flow.rows[1] - flow.rows[0]
-    at_row = ((np.arange(seen.shape[0]) - flow.rows[0]) / step).astype(np.float32)
-    at_column = ((np.arange(seen.shape[1]) - flow.columns[0]) / step).astype(np.float32)
+    at_row = ((np.arange(projected_px.shape[0]) - flow.rows[0]) / step).astype(np.float32)
+    at_column = ((np.arange(projected_px.shape[1]) - flow.columns[0]) / step).astype(np.float32)
     map_x, map_y = np.meshgrid(at_column, at_row)
     spread = [
-        np.asarray(cv2.remap(each, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-        for each in (mean * weight[..., None], weight)
+        np.asarray(
+            cv2.remap(image, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        )
+        for image in (mean * weight[..., None], weight)
     ]
-    known = spread[1] > 0.5
+    is_known = spread[1] > 0.5
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(known[..., None], seen + spread[0] / spread[1][..., None], np.nan)
+        return np.where(
+            is_known[..., None], projected_px + spread[0] / spread[1][..., None], np.nan
+        )
 
 
 def morphable(

@@ -49,13 +49,13 @@ def mosaic(views: Sequence[LocalModel], rectified: bool = True) -> Mosaic:
     image = placed[0].image
     domains = [placed[0].valid]
     for view in placed[1:]:
-        known = np.isfinite(points[..., 2])
-        own = view.points_m
+        is_known = np.isfinite(points[..., 2])
+        points_m = view.points_m
         if rectified:
-            own = continued(points, known & view.valid, own)
-        new = view.valid & ~known
+            points_m = continued(points, is_known & view.valid, points_m)
+        new = view.valid & ~is_known
         domains.append(new)
-        points = np.where(new[..., None], own, points)
+        points = np.where(new[..., None], points_m, points)
         image = np.where(new[..., None], view.image, image)
     model = LocalModel(
         np.ascontiguousarray(points), np.ascontiguousarray(image), camera, views[0].baseline_m
@@ -67,13 +67,13 @@ def _rotations(views: Sequence[LocalModel]) -> Floats:
     """(n, 3, 3) rotations from each view's axes to the first one's."""
     turns = [np.eye(3)]
     for k in range(1, len(views)):
-        found = None
+        relative = None
         for j in range(k):
-            found = _relative(views[j], views[k])
-            if found is not None:
-                turns.append(turns[j] @ found)
+            relative = _relative(views[j], views[k])
+            if relative is not None:
+                turns.append(turns[j] @ relative)
                 break
-        if found is None:
+        if relative is None:
             raise InputError(
                 f"view {k + 1} does not overlap an earlier view; let neighbours share a third of "
                 "their width, and turn the camera about its left lens"

@@ -39,10 +39,13 @@ def continued(values: Floats, given: Bools, shape: Floats) -> Floats:
         low, high = (np.moveaxis(index, axis, 0)[part] for part in parts)
         low_given, high_given = (np.moveaxis(given, axis, 0)[part] for part in parts)
         low_offset, high_offset = (np.moveaxis(offset, axis, 0)[part] for part in parts)
-        for here, other, beside in ((low, high_given, high_offset), (high, low_given, low_offset)):
-            edge = (here >= 0) & other
-            np.add.at(weight, here[edge], 1.0)
-            np.add.at(right, here[edge], beside[edge])
+        for known_index, other, known_offset in (
+            (low, high_given, high_offset),
+            (high, low_given, low_offset),
+        ):
+            edge = (known_index >= 0) & other
+            np.add.at(weight, known_index[edge], 1.0)
+            np.add.at(right, known_index[edge], known_offset[edge])
         both = (low >= 0) & (high >= 0)
         pairs.append(np.stack([low[both], high[both]]))
     low, high = np.concatenate(pairs, axis=1)

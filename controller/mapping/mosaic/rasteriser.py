@@ -78,7 +78,7 @@ def draw(
     points_m: Floats,
     camera: Floats,
     drawn: Bools,
-    own: Image,
+    first_image: Image,
     other: Image | None = None,
     counterpart_px: Floats | None = None,
     share: float = 0.0,
@@ -90,20 +90,20 @@ def draw(
         points_m: (H, W, 3) vertices in the axes of the camera.
         camera: (3, 3) matrix of the canvas.
         drawn: (H - 1, W - 1) cells to draw.
-        own: texture whose pixels are the vertices.
+        first_image: texture whose pixels are the vertices.
         other: second texture.
         counterpart_px: (H, W, 2) vertices in the second texture, or NaN.
         share: share of the second texture at a counterpart.
 
     """
     if other is None or counterpart_px is None:
-        other = own
+        other = first_image
         counterpart_px = np.full((*points_m.shape[:2], 2), np.nan)
     _draw(
         np.ascontiguousarray(points_m),
         np.ascontiguousarray(camera),
         drawn,
-        np.ascontiguousarray(own),
+        np.ascontiguousarray(first_image),
         np.ascontiguousarray(other),
         np.ascontiguousarray(counterpart_px),
         share,
@@ -141,7 +141,7 @@ def _place(points: Floats, camera: Floats, corner: Ints, screen: Floats, inverse
     " uint8[:, :, ::1], int64, int64)"
 )
 def _shade(
-    own: Image,
+    first_image: Image,
     other: Image,
     counterpart: Floats,
     share: float,
@@ -163,7 +163,7 @@ def _shade(
             size += parts[k]
     mixed = share * size
     for channel in range(3):
-        value = _texel(own, column, row, channel)
+        value = _texel(first_image, column, row, channel)
         if mixed > 0.0:
             there = _texel(other, there_u / size, there_v / size, channel)
             value = (1.0 - mixed) * value + mixed * there
@@ -178,7 +178,7 @@ def _draw(
     points: Floats,
     camera: Floats,
     drawn: Bools,
-    own: Image,
+    first_image: Image,
     other: Image,
     counterpart: Floats,
     share: float,
@@ -220,4 +220,4 @@ def _draw(
                 depth[y, x] = 1.0 / over
                 parts[0] = (1.0 - v - w) * inverse[0] / over
                 parts[1], parts[2] = v * inverse[1] / over, w * inverse[2] / over
-                _shade(own, other, counterpart, share, corner, parts, colour, y, x)
+                _shade(first_image, other, counterpart, share, corner, parts, colour, y, x)

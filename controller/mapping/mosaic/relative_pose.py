@@ -76,14 +76,14 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
         )
         rotation = cv2.Rodrigues(turn)[0]
         translation_m = np.asarray(shift, float).ravel()
-        seen = project(second.camera, points_m @ rotation.T + translation_m)
-        off_px = np.linalg.norm(seen - matches.second_px, axis=1)
+        projected_px = project(second.camera, points_m @ rotation.T + translation_m)
+        off_px = np.linalg.norm(projected_px - matches.second_px, axis=1)
         kept = off_px <= _TOLERANCE_PX * np.sqrt(matches.scale)
     error_px = float(np.sqrt((off_px[kept] ** 2).mean())) if kept.any() else float("nan")
     return RelativePose(np.asarray(rotation, float), translation_m, kept, error_px)
 
 
-def pose_error(found: RelativePose, first_pose: Floats, second_pose: Floats) -> tuple[float, float]:
+def pose_error(pose: RelativePose, first_pose: Floats, second_pose: Floats) -> tuple[float, float]:
     """Error of a pose for known poses (3, 4) of the positions, camera to world.
 
     Returns:
@@ -93,6 +93,6 @@ def pose_error(found: RelativePose, first_pose: Floats, second_pose: Floats) -> 
     turn = second_pose[:, :3].T @ first_pose[:, :3]
     shift = second_pose[:, :3].T @ (first_pose[:, 3] - second_pose[:, 3])
     place = -turn.T @ shift
-    found_place = -found.rotation.T @ found.translation_m
-    angle_rad = float(Rotation.from_matrix(found.rotation.T @ turn).magnitude())
+    found_place = -pose.rotation.T @ pose.translation_m
+    angle_rad = float(Rotation.from_matrix(pose.rotation.T @ turn).magnitude())
     return float(np.linalg.norm(found_place - place)), angle_rad

@@ -60,12 +60,15 @@ def views_along(walk: StereoWalk, per_step: int) -> Iterator[RouteView]:
     numbers = np.arange(count, dtype=float)
     places = PchipInterpolator(numbers, walk.poses[:, :, 3])
     turns = Slerp(numbers, Rotation.from_matrix(walk.poses[:, :, :3]))
-    for at in np.linspace(0.0, count - 1.0, per_step * (count - 1) + 1):
-        step = min(int(at), count - 2)
-        own = walk.poses[step]
-        axes = turns(at).as_matrix()
+    for step_place in np.linspace(0.0, count - 1.0, per_step * (count - 1) + 1):
+        step = min(int(step_place), count - 2)
+        first_pose = walk.poses[step]
+        axes = turns(step_place).as_matrix()
         yield RouteView(
-            step, at - step, axes.T @ own[:, :3], own[:, :3].T @ (places(at) - own[:, 3])
+            step,
+            step_place - step,
+            axes.T @ first_pose[:, :3],
+            first_pose[:, :3].T @ (places(step_place) - first_pose[:, 3]),
         )
 
 

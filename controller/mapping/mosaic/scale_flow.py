@@ -82,17 +82,20 @@ def flow_problem(
     )
     pixel = np.stack(np.meshgrid(columns, rows), axis=-1)
     points_m = first.points_m[rows[:, None], columns[None]]
-    seen = project(second.camera, pose.moved(points_m))
-    expected = seen - pixel
-    base = np.where(np.isfinite(seen), np.rint(seen), -10_000).astype(np.int64) - search_px
+    projected_px = project(second.camera, pose.moved(points_m))
+    expected = projected_px - pixel
+    base = (
+        np.where(np.isfinite(projected_px), np.rint(projected_px), -10_000).astype(np.int64)
+        - search_px
+    )
     lines = _epipolar_lines(second.camera, pose, points_m)
     size = 2 * search_px + 1
     costs = np.full((len(rows), len(columns), len(scales), size, size), np.inf, np.float32)
-    one = grey(first.image)
+    grey_first = grey(first.image)
     two = grey(second.image)
     for k, scale in enumerate(scales):
         _data_terms(
-            one,
+            grey_first,
             reduced(two, scale),
             scale,
             second.valid,
@@ -180,7 +183,7 @@ def _epipolar_lines(camera: Floats, pose: RelativePose, points_m: Floats) -> Flo
     " int64, float64, float32[:, :, :, :])"
 )
 def _data_terms(  # noqa: C901  a compiled loop
-    one: Picture,
+    first_picture: Picture,
     two: Picture,
     scale: float,
     valid: Bools,
@@ -199,14 +202,15 @@ def _data_terms(  # noqa: C901  a compiled loop
         for column in range(columns):
             u, v = pixel[row, column, 0], pixel[row, column, 1]
             if not (
-                radius <= v < one.shape[0] - radius and radius <= u < one.shape[1] - radius
+                radius <= v < first_picture.shape[0] - radius
+                and radius <= u < first_picture.shape[1] - radius
             ) or np.isnan(lines[row, column, 0]):
                 continue
             n = 0
             mean = 0.0
             for y in range(-radius, radius + 1):
                 for x in range(-radius, radius + 1):
-                    patch[n] = one[v + y, u + x]
+                    patch[n] = first_picture[v + y, u + x]
                     mean += patch[n]
                     n += 1
             mean /= count

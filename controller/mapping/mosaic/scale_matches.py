@@ -78,13 +78,13 @@ def match_over_scale(
         wide: half the width of a search region without it, in picture widths.
 
     """
-    one = grey(first.image)
+    grey_first = grey(first.image)
     two = grey(second.image)
     pyramid = [(scale, reduced(two, scale)) for scale in scales]
-    inside = np.zeros(one.shape, np.uint8)
+    inside = np.zeros(grey_first.shape, np.uint8)
     edge = _RADIUS_PX + 1
     inside[edge:-edge, edge:-edge] = first.valid[edge:-edge, edge:-edge]
-    corners = cv2.goodFeaturesToTrack(one, _MOST_POINTS, 0.002, 8, mask=inside)
+    corners = cv2.goodFeaturesToTrack(grey_first, _MOST_POINTS, 0.002, 8, mask=inside)
     places = np.zeros((0, 2)) if corners is None else np.asarray(corners, float).reshape(-1, 2)
     columns, rows = np.rint(places).astype(int).T if len(places) else np.zeros((2, 0), int)
     centres = places
@@ -97,10 +97,10 @@ def match_over_scale(
     for k, (column, row) in enumerate(zip(columns, rows, strict=True)):
         if not np.isfinite(centres[k]).all():
             continue
-        patch = one[row - _RADIUS_PX : row + _RADIUS_PX + 1, column - _RADIUS_PX :][
+        patch = grey_first[row - _RADIUS_PX : row + _RADIUS_PX + 1, column - _RADIUS_PX :][
             :, : 2 * _RADIUS_PX + 1
         ]
-        best = _best(patch, pyramid, centres[k], half * one.shape[1])
+        best = _best(patch, pyramid, centres[k], half * grey_first.shape[1])
         if best is not None:
             kept.append((column, row, *best))
     table = np.array(kept, dtype=float).reshape(-1, 6)
@@ -114,7 +114,7 @@ def _best(
     half_px: float,
 ) -> tuple[float, float, float, float] | None:
     """Column, row, scale and correlation of the best match; None if not unique."""
-    found: list[tuple[float, float, float, float]] = []
+    vertices: list[tuple[float, float, float, float]] = []
     rivals: list[tuple[float, float, float]] = []
     for scale, picture in pyramid:
         low = np.floor((centre - half_px) / scale).astype(int) - _RADIUS_PX
@@ -130,10 +130,10 @@ def _best(
         fine_column = column + _vertex(likeness[row], column)
         u = float(fine_column + left + _RADIUS_PX) * scale
         v = float(fine_row + top + _RADIUS_PX) * scale
-        found.append((u, v, scale, top_value))
+        vertices.append((u, v, scale, top_value))
         near = slice(max(row - _RADIUS_PX, 0), row + _RADIUS_PX + 1)
-        beside = slice(max(column - _RADIUS_PX, 0), column + _RADIUS_PX + 1)
-        likeness[near, beside] = -1.0
+        near_columns = slice(max(column - _RADIUS_PX, 0), column + _RADIUS_PX + 1)
+        likeness[near, near_columns] = -1.0
         row, column = divmod(int(likeness.argmax()), likeness.shape[1])
         rivals.append(
             (
@@ -142,24 +142,24 @@ def _best(
                 float(likeness[row, column]),
             )
         )
-    if not found:
+    if not vertices:
         return None
-    best = max(found, key=lambda each: each[3])
-    others = [*((u, v, value) for u, v, _, value in found), *rivals]
-    apart = [
+    best = max(vertices, key=lambda vertex: vertex[3])
+    others = [*((u, v, value) for u, v, _, value in vertices), *rivals]
+    likeness_values = [
         value
         for u, v, value in others
         if np.hypot(u - best[0], v - best[1]) > 1.5 * _RADIUS_PX * best[2]
     ]
-    if best[3] < _LEAST_CORRELATION or best[3] < max(apart, default=-1.0) + _UNIQUE:
+    if best[3] < _LEAST_CORRELATION or best[3] < max(likeness_values, default=-1.0) + _UNIQUE:
         return None
     return best
 
 
-def _vertex(values: NDArray[np.float32], at: int) -> float:
+def _vertex(values: NDArray[np.float32], peak_index: int) -> float:
     """Offset of a parabola's vertex through a maximum and its neighbours."""
-    if not 0 < at < len(values) - 1:
+    if not 0 < peak_index < len(values) - 1:
         return 0.0
-    below, here, above = (float(value) for value in values[at - 1 : at + 2])
-    curve = below - 2.0 * here + above
+    below, peak, above = (float(value) for value in values[peak_index - 1 : peak_index + 2])
+    curve = below - 2.0 * peak + above
     return 0.0 if curve >= 0.0 else 0.5 * (below - above) / curve

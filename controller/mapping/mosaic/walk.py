@@ -106,8 +106,8 @@ class _at:  # noqa: N801  reads as a clause
 def rectified(folder: Path, left: str, right: str, calibration: StereoCalibration) -> RectifiedPair:
     """Read and rectify a pair of pictures, red first."""
     pictures = (read_colours(folder / name)[..., ::-1] for name in (left, right))
-    one, two = (np.ascontiguousarray(picture) for picture in pictures)
-    return rectify(calibration, one, two)
+    left_picture, two = (np.ascontiguousarray(picture) for picture in pictures)
+    return rectify(calibration, left_picture, two)
 
 
 def _model(
@@ -129,7 +129,7 @@ def _step(
     morph = morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
     errors: tuple[float | None, float | None] = (None, None)
     if positions[0].pose is not None and positions[1].pose is not None:
-        errors = pose_error(pose, *(np.array(each.pose) for each in positions))
+        errors = pose_error(pose, *(np.array(position.pose) for position in positions))
     step = Step(
         len(matches.scale),
         int(pose.inliers.sum()),

@@ -69,21 +69,21 @@ def walk_ground(
         stand = fit_ground(points[0], errors[0])
     world = np.concatenate(points) @ stand.world_from_camera().T
     world[:, 2] += stand.height_m
-    seen = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
-    field = seen.height_field(fill_m)
-    colour = _colours(seen, world, np.concatenate(colours))
+    elevation_map = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
+    field = elevation_map.height_field(fill_m)
+    colour = _colours(elevation_map, world, np.concatenate(colours))
     return WalkGround(replace(field, colour=colour), stand, fitted)
 
 
-def _colours(seen: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:
+def _colours(elevation_map: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:
     """(rows, columns, 3) mean colours of the points near each sample's surface."""
-    rows, columns = seen.z_m.shape
-    place = points_m[:, :2] - [seen.x0_m, seen.y0_m]
-    column, row = np.rint(place / seen.spacing_m).astype(int).T
-    near = np.abs(points_m[:, 2] - seen.z_m[row, column]) <= seen.spacing_m
+    rows, columns = elevation_map.z_m.shape
+    place = points_m[:, :2] - [elevation_map.x0_m, elevation_map.y0_m]
+    column, row = np.rint(place / elevation_map.spacing_m).astype(int).T
+    near = np.abs(points_m[:, 2] - elevation_map.z_m[row, column]) <= elevation_map.spacing_m
     cell = (row * columns + column)[near]
     count = np.bincount(cell, minlength=rows * columns)
-    sums = [np.bincount(cell, each, rows * columns) for each in colours[near].T.astype(float)]
+    sums = [np.bincount(cell, channel, rows * columns) for channel in colours[near].T.astype(float)]
     mean = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
     mean[count == 0] = _HOLE
     return np.rint(mean).astype(np.uint8).reshape(rows, columns, 3)

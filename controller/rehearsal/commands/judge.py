@@ -22,8 +22,12 @@ def judge(
     """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""
     record = read_log(log)
     numbers = summary(record)
-    found = judged(read_truth(truth), record, numbers.trip, numbers.outcome)
-    facts = found.facts()
-    show(facts if as_json else {"verdict": found.text, **facts}, as_json)
-    if not found.has_arrived or not found.is_true or found.claimed < found.waypoints:
+    judgement = judged(read_truth(truth), record, numbers.trip, numbers.outcome)
+    facts = judgement.facts()
+    show(facts if as_json else {"verdict": judgement.text, **facts}, as_json)
+    if (
+        not judgement.has_arrived
+        or not judgement.is_true
+        or judgement.claimed < judgement.waypoints
+    ):
         raise SystemExit(1)

@@ -120,10 +120,12 @@ def _table(rows: Sequence[dict[str, Any]]) -> Table:
 def _worst_errors(metrics: Sequence[dict[str, Any]]) -> tuple[str, ...]:
     cells = []
     for key in _METRICS.values():
-        pairs = [(each[key], each[f"true_{key}"]) for each in metrics]
-        errors = [100.0 * (one / true - 1.0) for one, true in pairs if one and true]
+        pairs = [(task_metrics[key], task_metrics[f"true_{key}"]) for task_metrics in metrics]
+        errors = [100.0 * (measured / true - 1.0) for measured, true in pairs if measured and true]
         cells.append(f"{max(errors, key=abs):+.1f}" if errors else "")
-    false = sum(max(each["alarms"] - each["true_alarms"], 0) for each in metrics)
+    false = sum(
+        max(task_metrics["alarms"] - task_metrics["true_alarms"], 0) for task_metrics in metrics
+    )
     return (*cells, str(false) if metrics else "")
 
 

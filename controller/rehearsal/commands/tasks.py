@@ -71,13 +71,13 @@ def tasks(
     require_extra("tasks need", "mujoco")
     by = controller or list(CONTROLLERS)
     planned = [
-        TaskRun(task.name, one, seed)
+        TaskRun(task.name, controller_name, seed)
         for seed in range(first_seed, first_seed + seeds)
         for task in chosen
-        for one in by
+        for controller_name in by
     ]
-    known = read_lines(out, lambda row: TaskResult(**row), "a result of a task")
-    results = {TaskRun(row.task, row.controller, row.seed): row for row in known}
+    lines = read_lines(out, lambda row: TaskResult(**row), "a result of a task")
+    results = {TaskRun(row.task, row.controller, row.seed): row for row in lines}
     missing = [item for item in planned if item not in results]
     finished = show_progress(
         each(run_task, missing, workers=workers),
@@ -98,7 +98,8 @@ def _print(rows: Sequence[TaskResult], chosen: Sequence[ControllerTask], by: Seq
     grid = Table("task", *by, box=None)
     for task in chosen:
         cells = [
-            [row for row in rows if (row.task, row.controller) == (task.name, one)] for one in by
+            [row for row in rows if (row.task, row.controller) == (task.name, controller_name)]
+            for controller_name in by
         ]
         grid.add_row(task.name, *map(cell, cells))
     console.print(grid)

@@ -36,19 +36,19 @@ def plan_with_repertoire(
     if physics or carry:
         require_extra("candidates and runs on the physics need", "mujoco")
     job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
-    found = plan_facts(job)
+    facts = plan_facts(job)
     if not as_json:
-        found["actions"] = ", ".join(job.action_names)
+        facts["actions"] = ", ".join(job.action_names)
     if physics:
         with ProgressBar("candidates on the physics", physics) as bar:
             cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
-        found |= cost.to_dict()
+        facts |= cost.to_dict()
     if out is not None:
         save_plan(job, out)
-        found["plan"] = str(out)
+        facts["plan"] = str(out)
     complete = True
     if carry:
-        found["ran"], complete = run_route(job, None, RunOptions(film=False, force=force))
-    show(found, as_json)
+        facts["ran"], complete = run_route(job, None, RunOptions(film=False, force=force))
+    show(facts, as_json)
     if not complete:
         raise SystemExit(1)

@@ -136,9 +136,9 @@ def _errors(played: Sequence[PlayedAction]) -> dict[str, object]:
         np.array([getattr(action, key) for action in played])
         for key in ("requested", "recorded", "measured")
     )
-    found: dict[str, object] = {}
+    errors: dict[str, object] = {}
     for key, off in (("choice", recorded - requested), ("body", measured - recorded)):
         median = np.median(np.abs(off), axis=0)
-        found[f"{key}_error_median_m_s"] = round(float(median[0]), 4)
-        found[f"{key}_error_median_rad_s"] = round(float(median[1]), 4)
-    return found
+        errors[f"{key}_error_median_m_s"] = round(float(median[0]), 4)
+        errors[f"{key}_error_median_rad_s"] = round(float(median[1]), 4)
+    return errors

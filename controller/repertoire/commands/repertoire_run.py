@@ -37,8 +37,8 @@ def run_plan(
 ) -> None:
     """Run a plan on servos or in the simulator, and compare predicted with measured poses."""
     job = load_plan(plan, replan=not open_loop)
-    found, complete = run_route(job, picture, options)
-    show({"plan": str(plan), **found}, options.as_json)
+    facts, complete = run_route(job, picture, options)
+    show({"plan": str(plan), **facts}, options.as_json)
     if not complete and not open_loop:
         raise SystemExit(1)
 

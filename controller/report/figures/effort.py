@@ -81,8 +81,8 @@ def _slow(axes: Axes, record: RunRecord) -> None:
     lowest = np.where(np.isnan(slow.voltage_v), np.inf, slow.voltage_v).min(axis=1)
     lowest[np.isinf(lowest)] = np.nan
     if not np.isfinite(lowest).any() or np.nanmax(lowest) - np.nanmin(lowest) <= FLAT_V:
-        held = f", supply {np.nanmedian(lowest):.1f} V throughout" if len(lowest) else ""
-        axes.set_title(f"Temperature (limit {limit:g} °C){held}")
+        supply_text = f", supply {np.nanmedian(lowest):.1f} V throughout" if len(lowest) else ""
+        axes.set_title(f"Temperature (limit {limit:g} °C){supply_text}")
         legend_above(axes)
         return
     volts = axes.twinx()

@@ -53,5 +53,5 @@ def joints_figure(record: RunRecord) -> Figure | None:
 
 
 def _largest(values: Floats) -> float:
-    known = np.abs(values[np.isfinite(values)])
-    return max(float(np.quantile(known, 0.999)), 1e-3) if known.size else 1e-3
+    finite_values = np.abs(values[np.isfinite(values)])
+    return max(float(np.quantile(finite_values, 0.999)), 1e-3) if finite_values.size else 1e-3

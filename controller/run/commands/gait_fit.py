@@ -68,7 +68,7 @@ def fit_gait(
 
         draw_fit(fit, points_m, body.name, picture)
     limit = np.array(body.limit_rad)
-    found: dict[str, object] = {
+    facts: dict[str, object] = {
         "curve": str(curve),
         "robot": body.name,
         "residual_m": round(fit.residual_m, 6),
@@ -77,12 +77,12 @@ def fit_gait(
         "joint_rad": [round(float(angle), 5) for angle in fit.joint_rad],
     }
     if output is not None:
-        found["output"] = str(output)
+        facts["output"] = str(output)
     if picture is not None:
-        found["picture"] = str(picture)
+        facts["picture"] = str(picture)
     if not as_json:
-        found["joint_rad"] = " ".join(f"{angle:.3f}" for angle in fit.joint_rad)
-    show(found, as_json)
+        facts["joint_rad"] = " ".join(f"{angle:.3f}" for angle in fit.joint_rad)
+    show(facts, as_json)
 
 
 def _read(path: Path) -> list[list[float]]:

@@ -32,7 +32,7 @@ def list_gaits(as_json: Json = False) -> None:
         table = Table(box=None, pad_edge=False)
         for title in ("set", "gait", "robot"):
             table.add_column(title)
-        for each in sets:
-            table.add_row(each.name, each.gait, each.robot)
+        for parameters in sets:
+            table.add_row(parameters.name, parameters.gait, parameters.robot)
         console.print()
         console.print(table)

@@ -72,7 +72,7 @@ def run_gait(
     """Run a gait on servos or in the simulator; leaves a log, a report and a film."""
     if (live or gamepad is not None) and (then or by == "cpg"):
         raise InputError("--live changes gaits by keys and joins: leave out --then and --by cpg")
-    own = key_values("--set", set_) or {}
+    set_options = key_values("--set", set_) or {}
     given = {
         "run.gait.look_heading_rad": look_heading_rad,
         "run.gait.look_at_m": _point(look_at),
@@ -89,7 +89,7 @@ def run_gait(
             seconds=seconds,
             seed=seed,
             then=[_change(text) for text in then or []],
-            keys=own | {key: value for key, value in given.items() if value is not None},
+            keys=set_options | {key: value for key, value in given.items() if value is not None},
         )
         prepared = replace(
             gait,
@@ -164,12 +164,12 @@ def _names(prepared: GaitRun, hands: Hands | None) -> Callable[[float], str]:
 
 def _change(text: str) -> tuple[float, str, dict[str, Any]]:
     what, *values = text.split(",")
-    name, at, seconds = what.rpartition("@")
+    name, when_text, seconds = what.rpartition("@")
     try:
         at_s = float(seconds)
     except ValueError:
-        at = ""
-    if not at or not name:
+        when_text = ""
+    if not when_text or not name:
         raise InputError(f"--then {text}: expected NAME@SECONDS[,PARAM=VALUE...]")
     return at_s, name, parameters(values)
 

@@ -38,7 +38,7 @@ def show_gait(
     body = prepared.robot
     cycle = GaitCycle(gait, body)
     spans = ranges(gait.model)
-    found: dict[str, object] = {
+    facts: dict[str, object] = {
         "gait": gait.name,
         "title": gait.title,
         "source": gait.source,
@@ -51,7 +51,7 @@ def show_gait(
         from snakewalk.controller.figures.gait import draw_gait  # noqa: PLC0415  --picture: an extra
 
         draw_gait(gait, body, picture)
-        found["picture"] = str(picture)
+        facts["picture"] = str(picture)
     values = gait.params.model_dump()
     if as_json:
         rows = {
@@ -64,10 +64,10 @@ def show_gait(
             }
             for key, span in spans.items()
         }
-        print(json.dumps(found | {"parameters": rows}))
+        print(json.dumps(facts | {"parameters": rows}))
         return
-    found["needs"] = ", ".join(needed_joints(type(gait)))
-    show(found, as_json=False)
+    facts["needs"] = ", ".join(needed_joints(type(gait)))
+    show(facts, as_json=False)
     table = Table(box=None, pad_edge=False)
     for title in ("parameter", "value", "least", "most", ""):
         table.add_column(title, justify="left" if title in {"parameter", ""} else "right")

@@ -55,12 +55,12 @@ def init(
 ) -> None:
     """Write run, robot and world files to edit, with schemas for editors."""
     if from_ is None:
-        known = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
-        fitting = (name for name, body in known.items() if body == (robot or "yaw16"))
+        names = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
+        fitting = (name for name, body in names.items() if body == (robot or "yaw16"))
         from_ = next(fitting, _USED_FIRST[0])
     run = load_run(from_)
-    beside = Path(from_).parent if from_.endswith(".toml") else None
-    body = load_robot(run.robot if robot is None else robot, beside if robot is None else None)
+    run_folder = Path(from_).parent if from_.endswith(".toml") else None
+    body = load_robot(run.robot if robot is None else robot, run_folder if robot is None else None)
     if body.limbs:
         raise InputError(
             f"robot {body.name}: has legs, which walk by gaits: snakewalk gait run trot --robot "
@@ -70,7 +70,7 @@ def init(
         raise InputError(
             f"run {run.name}: a {run.motion} is not a walk; choose the run of a walk for --from"
         )
-    track = Path(run.track) if beside is None else beside / run.track
+    track = Path(run.track) if run_folder is None else run_folder / run.track
     texts = {
         "run.toml": template(
             run.model_copy(
@@ -86,7 +86,7 @@ def init(
         ),
         "robot.toml": template(body.model_copy(update={"name": "my-robot"}), _ROBOT),
         "world.toml": template(
-            load_world(run.world, beside).model_copy(update={"name": "my-world"}), _WORLD
+            load_world(run.world, run_folder).model_copy(update={"name": "my-world"}), _WORLD
         ),
     }
     schemas = {f"schema/{kind}.json": json_schema(kind) for kind in ("run", "robot", "world")}

@@ -27,9 +27,9 @@ def list_(as_json: Json = False) -> None:
         "policies": [[n, "snakewalk gait policy list, run"] for n in shipped("policies")],
         "gaits": [[n, f"{(g := load_gait(n)).gait} on {g.robot}"] for n in shipped("gaits")],
         "plug-ins": [
-            [f"{each.kind} {each.name}", each.package]
-            for each in plugins()
-            if each.kind != "command" or not each.package.startswith(f"{OWN}.")
+            [f"{plugin.kind} {plugin.name}", plugin.package]
+            for plugin in plugins()
+            if plugin.kind != "command" or not plugin.package.startswith(f"{OWN}.")
         ],
     }
     if as_json:

@@ -111,17 +111,17 @@ def plan(
         world=world,
         track=track,
     )
-    found, warnings = _facts(prepared)
+    facts, warnings = _facts(prepared)
     if as_json:
-        found["warnings"] = warnings
-    show(found, as_json)
+        facts["warnings"] = warnings
+    show(facts, as_json)
     for line in () if as_json else warnings:
         console.print(f"warning: {line}")
 
 
 def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
     ahead = prepared.forecast()
-    found: dict[str, object] = {
+    plan_facts: dict[str, object] = {
         "run": prepared.run.name,
         "robot": prepared.robot.name,
         "world": prepared.world.name,
@@ -146,16 +146,16 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         assert hold is not None
         low_a, high_a = float(hold.current_a.min()), float(hold.current_a.max())
         amps = f"{low_a:.2f} A" if low_a == high_a else f"{low_a:.2f} to {high_a:.2f} A"
-        found["on_trip"] = f"hold for {safety.hold_s:g} s with at most {amps} a joint"
+        plan_facts["on_trip"] = f"hold for {safety.hold_s:g} s with at most {amps} a joint"
     if safety.stop_output is not None:
-        found["stop_output"] = safety.stop_output
+        plan_facts["stop_output"] = safety.stop_output
     if ahead.slide is not None:
-        found["steeper_than_held"] = (
+        plan_facts["steeper_than_held"] = (
             f"{math.degrees(ahead.slide.slope_rad):.1f} deg of "
             f"{math.degrees(ahead.slide.holding_rad):.1f}, for {ahead.slide.lasted_s:.2f} s"
         )
     if prepared.run.motion != "serpenoid":
-        found["states"] = prepared.library.counts
+        plan_facts["states"] = prepared.library.counts
     missing = missing_watchdogs(prepared.robot)
     warnings = [*prepared.warnings, *prepared.climb_warnings, *missing]
     if safety.stop_output is not None:
@@ -164,9 +164,9 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
             warnings.append(f"{output.fault}, or plan on the computer of the robot")
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
-        found |= facts
+        plan_facts |= facts
         warnings += more
-    return found, warnings
+    return plan_facts, warnings
 
 
 def _ground_facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:

@@ -71,10 +71,10 @@ def check(
             page = stack.enter_context(_page(prepared, config, source, view_at))
         feed = stack.enter_context(closing(plugin.open_feed(argument, clock)))
         on_line = (lambda line: None) if as_json else _print
-        found = watch(feed, clock, seconds, config, on_line, page=page, judge=judge)
-    faults = _faults(found, judge)
+        statistics = watch(feed, clock, seconds, config, on_line, page=page, judge=judge)
+    faults = _faults(statistics, judge)
     mount = {"link": config.link, "offset_m": list(config.offset_m)}
-    show({**found.facts(), "mount": mount, "faults": faults}, as_json)
+    show({**statistics.facts(), "mount": mount, "faults": faults}, as_json)
     if faults:
         raise SystemExit(1)
 
@@ -93,28 +93,28 @@ def watch(
     The time begins with the first message. Without one the check lasts at least ``WAIT_S``, because
     ROS 2 needs seconds to find a publisher.
     """
-    found = FeedStatistics(config)
+    statistics = FeedStatistics(config)
     start_s = clock.now_s()
     due_s, end_s = start_s + LINE_S, start_s + max(seconds, WAIT_S)
     while clock.now_s() < end_s:
         clock.sleep_until_s(clock.now_s() + LOOK_S)
         for arrived in feed.arrived(clock.now_s()):
-            if not found.senders:
+            if not statistics.senders:
                 end_s = clock.now_s() + seconds
-            found.add(arrived)
-        if page is not None and found.newest is not None:
-            page.show(clock.now_s() - start_s, found.newest)
+            statistics.add(arrived)
+        if page is not None and statistics.newest is not None:
+            page.show(clock.now_s() - start_s, statistics.newest)
         if clock.now_s() >= due_s:
             due_s += LINE_S
-            on_line(_line(found))
+            on_line(_line(statistics))
             if page is not None:
-                page.report(clock.now_s() - start_s, found.facts(), _faults(found, judge))
-    return found
+                page.report(clock.now_s() - start_s, statistics.facts(), _faults(statistics, judge))
+    return statistics
 
 
-def _faults(found: FeedStatistics, judge: Judge) -> list[str]:
-    fault = None if found.newest is None else judge(found.newest)
-    return [*found.faults(), *([] if fault is None else [fault])]
+def _faults(statistics: FeedStatistics, judge: Judge) -> list[str]:
+    fault = None if statistics.newest is None else judge(statistics.newest)
+    return [*statistics.faults(), *([] if fault is None else [fault])]
 
 
 @contextmanager
@@ -129,10 +129,10 @@ def _page(
         yield PoseCheckPage(log, prepared, config, source)
 
 
-def _line(found: FeedStatistics) -> str:
-    facts = found.facts()
+def _line(statistics: FeedStatistics) -> str:
+    facts = statistics.facts()
     if "position_m" not in facts:
-        return f"no pose; {found.last_fault or 'nothing arrived'}"
+        return f"no pose; {statistics.last_fault or 'nothing arrived'}"
     x_m, y_m, z_m = facts["position_m"]
     place = (
         f"x {x_m:+.3f}  y {y_m:+.3f}  z {z_m:+.3f} m   heading {facts['heading_deg']:+.1f} deg   "

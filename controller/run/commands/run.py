@@ -139,7 +139,7 @@ def _facts(result: RunResult, name: str) -> dict[str, object]:
 
 def _name(run: RunConfig, *replaced: str | None) -> str:
     """Return the name of the result folder: the run and all that differs from its file."""
-    files = [Path(each).stem for each in replaced if each is not None]
+    files = [Path(replaced_file).stem for replaced_file in replaced if replaced_file is not None]
     parts = [run.name, *files, run.motion, f"seed{run.seed}"]
     if run.pose is not None:
         parts.append(f"pose-{run.pose.partition(':')[0]}")

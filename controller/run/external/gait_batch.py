@@ -68,16 +68,16 @@ def run_together(
     with ExitStack() as stack:
         opened = [stack.enter_context(RunLog(path)) for path in logs]
         runs = [
-            _Row(batch, number, each, log)
-            for number, (each, log) in enumerate(zip(prepared, opened, strict=True))
+            _Row(batch, number, prepared_run, log)
+            for number, (prepared_run, log) in enumerate(zip(prepared, opened, strict=True))
         ]
-        while live := [each for each in runs if not each.is_over]:
-            for each in live:
-                each.step(cycle * period_s)
+        while live := [run for run in runs if not run.is_over]:
+            for run in live:
+                run.step(cycle * period_s)
             cycle += 1
             batch.advance(cycle * period_s)
             on_cycle(cycle * period_s)
-    return [BatchOutcome(each.link.tripped, each.derating.least) for each in runs]
+    return [BatchOutcome(run.link.tripped, run.derating.least) for run in runs]
 
 
 class _Row:

@@ -97,8 +97,8 @@ class RobotBatch:
                 row.take_output(is_slice=stop % self._slice == 0)
 
     def _table(self, robot: RobotConfig, pose: InitialPose) -> Bytes:
-        for known, table in self._tables:
-            if known == robot:
+        for table_robot, table in self._tables:
+            if table_robot == robot:
                 return table
         body = self.bodies.template
         body.reset(self._run.start_m, pose.heading_rad, pose.joint_rad)

@@ -128,11 +128,11 @@ def simulated_line(
             "line has one series; serve the servos of each port alone: snakewalk bus serve --servos"
         )
     ids = [robot.servo_ids[row] for row in joints]
-    at = np.array(joints, np.intp)
+    indices = np.array(joints, np.intp)
     records = [robot.servo_records[row] for row in joints]
     motors = motors_of(robot)
     mounting = deviation.mounting(robot)
-    mounting = Mounting(mounting.sign[at], mounting.zero_rad[at])
+    mounting = Mounting(mounting.sign[indices], mounting.zero_rad[indices])
     on_it = [motors[row] for row in joints]
     line: SimLine | FeetechLine
     if records[0].is_feetech:
@@ -151,7 +151,7 @@ def simulated_line(
             imu=imu,
         )
     if deviation.torque is not None:
-        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[at]
+        line.firmware.drive.torque_constant_n_m_a[:] *= deviation.torque[indices]
     return line
 
 

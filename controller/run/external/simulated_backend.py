@@ -69,11 +69,11 @@ def simulated(
     """
     if deviation is None:
         deviation = Deviation.of_run(run, robot)
-    made = _SimulatedBody(run, robot, world, ground, deviation)
-    body = made.plant
+    simulated_body = _SimulatedBody(run, robot, world, ground, deviation)
+    body = simulated_body.plant
     joint_rad = deviation.shaft_rad(initial_pose.joint_rad)
     body.reset(run.start_m, initial_pose.heading_rad, joint_rad)
-    servos = SimulatedBus.of(robot, body, deviation, made.imu())
+    servos = SimulatedBus.of(robot, body, deviation, simulated_body.imu())
     chain = ServoChain(
         servos.bus(),
         servos.robot,
@@ -96,7 +96,7 @@ def simulated(
         lambda: body.qpos,
         lambda: servos.busy_s,
         servos.energy,
-        made.twin,
+        simulated_body.twin,
         lay_down,
         servos.cut_power,
     )
@@ -118,21 +118,21 @@ def split(
         PortError: a port is missing, held, or not permitted.
 
     """
-    (here,) = (set(each.ids) for each in robot.ports if each.port == SIMULATED)
-    rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in here]
+    (simulated_ids,) = (set(segment.ids) for segment in robot.ports if segment.port == SIMULATED)
+    rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in simulated_ids]
     deviation = Deviation.of_run(run, robot)
-    made = _SimulatedBody(run, robot, world, ground, deviation)
-    plant = made.plant
+    simulated_body = _SimulatedBody(run, robot, world, ground, deviation)
+    plant = simulated_body.plant
     plant.reset(run.start_m, initial_pose.heading_rad, initial_pose.joint_rad)
     motors = motors_of(robot)
     body = SplitPlant(plant, motors, [j for j in range(robot.joint_count) if j not in rows])
     clock = RealTimeClock()
-    imu = made.imu()
+    imu = simulated_body.imu()
     line = simulated_line(
         robot,
         body,
         replace(deviation, slip_rad=None),
-        imu if imu is not None and imu.config.id in here else None,
+        imu if imu is not None and imu.config.id in simulated_ids else None,
         rows=rows,
         clock=clock,
     )
@@ -150,7 +150,7 @@ def split(
 
     chain.on_state = follow
     return Backend(
-        port_map_text((each.port, each.ids) for each in robot.ports),
+        port_map_text((segment.port, segment.ids) for segment in robot.ports),
         chain,
         clock,
         plant.head_pose,

@@ -50,9 +50,11 @@ class SimulatedBus:
         clock = SimClock(plant.time_s)
         lines: list[SimLine | FeetechLine] = []
         for port in robot.ports:
-            rows = [row for row, each in enumerate(robot.servo_ids) if each in port.ids]
-            own = imu if imu is not None and imu.config.id in port.ids else None
-            line = simulated_line(robot, shared.share(rows), deviation, own, rows=rows, clock=clock)
+            rows = [row for row, servo_id in enumerate(robot.servo_ids) if servo_id in port.ids]
+            imu_on_port = imu if imu is not None and imu.config.id in port.ids else None
+            line = simulated_line(
+                robot, shared.share(rows), deviation, imu_on_port, rows=rows, clock=clock
+            )
             line.label = f"{port.port} (simulated)"
             lines.append(line)
         # a servo of Protocol 2.0 may act within a slice: last, so that the body follows its stops

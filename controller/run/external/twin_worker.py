@@ -81,14 +81,14 @@ class RehearsedTwin:
 
     def arrived(self) -> Sequence[TwinAnswer]:
         """Return the answers that are due."""
-        found = list[TwinAnswer]()
+        answers = list[TwinAnswer]()
         while self._due_s <= self._now_s():
             answer = next(self._pieces, None)
             if answer is None:
                 break
-            found.append(answer)
+            answers.append(answer)
             self._due_s += PIECE_S
-        return found
+        return answers
 
     def close(self) -> None:
         """Do nothing: nothing has to be ended."""
@@ -120,7 +120,7 @@ class ProcessTwin:
         return self._receive()
 
     def _receive(self) -> list[TwinAnswer]:
-        found = self._kept
+        kept = self._kept
         self._kept = []
         try:
             while self._line.poll():
@@ -128,10 +128,10 @@ class ProcessTwin:
                 if message is None:
                     self._listens = True
                 else:
-                    found.append(message)
+                    kept.append(message)
         except (EOFError, OSError):  # it has ended
             self._listens = False
-        return found
+        return kept
 
     def close(self) -> None:
         """End the worker."""

@@ -49,17 +49,17 @@ def prepare_gait(
 
     """
     keys = gait_keys(keys)
-    gait, known = gait_by_name(name, parameters)
-    if known is not None:
-        robot = robot or known.robot
-        world = world or known.world
+    gait, gait_set = gait_by_name(name, parameters)
+    if gait_set is not None:
+        robot = robot or gait_set.robot
+        world = world or gait_set.world
     changes = [(at_s, gait_by_name(other, values)[0]) for at_s, other, values in then]
     gaits = [gait, *(other for _, other in changes)]
-    pitch = any(each.needs.pitch for each in gaits)
-    own = robot or fitting_robot(each.needs for each in gaits)
-    body = load_body(own, keys)
-    for each in gaits:
-        each.check(body)
+    pitch = any(named_gait.needs.pitch for named_gait in gaits)
+    robot_name = robot or fitting_robot(named_gait.needs for named_gait in gaits)
+    body = load_body(robot_name, keys)
+    for named_gait in gaits:
+        named_gait.check(body)
     run, ground = assemble(
         {
             "name": name.removesuffix(".toml").rpartition("/")[2],
@@ -77,7 +77,7 @@ def prepare_gait(
                     for at_s, g in changes
                 ],
             },
-            "compliance": known.compliance if known is not None else None,
+            "compliance": gait_set.compliance if gait_set is not None else None,
         },
         keys,
         body,
@@ -110,5 +110,5 @@ def gait_by_name(name: str, parameters: dict[str, Any] | None) -> tuple[Gait, Ga
             f"{name}: no such gait; there are {', '.join(GAITS)}; "
             f"sets of parameters: {', '.join(shipped('gaits'))}; your own ends in .toml"
         )
-    known = load_gait(name)
-    return make_gait(known.gait, dict(known.parameters) | (parameters or {})), known
+    gait_set = load_gait(name)
+    return make_gait(gait_set.gait, dict(gait_set.parameters) | (parameters or {})), gait_set

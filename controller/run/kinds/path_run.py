@@ -38,7 +38,7 @@ class PathRun(GroundedRun):
             InputError: with the fault.
 
         """
-        x_m, y_m = (float(at) for at in point_m)
+        x_m, y_m = (float(coordinate) for coordinate in point_m)
         where = f"waypoint ({x_m:.2f}, {y_m:.2f})"
         if not self.on_map(point_m):
             wide_m = self._map_size_m

@@ -188,9 +188,9 @@ class PlaybackRun(PathlessRun):
         """Return a fresh motion that plays the recording."""
         if self._asked.scale != 1.0:
             on_event("limit", f"joint angles scaled by {self._asked.scale:g}")
-        told = self.clipped
-        if told is not None:
-            on_event("limit", told)
+        clipped_text = self.clipped
+        if clipped_text is not None:
+            on_event("limit", clipped_text)
         for line in self.notes:
             on_event("recording", line)
         if self.no_thrust is not None:

@@ -330,11 +330,11 @@ class WalkRun(PathRun):
     def _too_steep(self, section: SteepSection) -> str:
         x_m, y_m = self.path.position(section.begin_m)
         slope = np.degrees(section.slope_rad)
-        known = np.degrees(self._climbed_rad)
+        climbed_deg = np.degrees(self._climbed_rad)
         return (
             f"the path climbs {slope:.1f} deg from {section.begin_m:.1f} to {section.end_m:.1f} m, "
-            f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {known:.1f} deg; "
-            "move the waypoints, or expect it to stay there"
+            f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {climbed_deg:.1f} "
+            "deg; move the waypoints, or expect it to stay there"
         )
 
     @property

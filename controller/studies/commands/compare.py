@@ -51,8 +51,8 @@ def compare(
         pictures().draw_comparison(runs, picture)
     changed = differing(runs)
     if as_json:
-        told = zip(logs, runs, strict=True)
-        summaries = [{"log": str(log)} | run.summary.to_dict() for log, run in told]
+        logs_and_runs = zip(logs, runs, strict=True)
+        summaries = [{"log": str(log)} | run.summary.to_dict() for log, run in logs_and_runs]
         drawn = None if picture is None else str(picture)
         print(json.dumps({"summaries": summaries, "differing": changed, "picture": drawn}))
         return
@@ -69,12 +69,14 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
         console.print("Run, robot and world are the same.\n")
     numbers = _table("number", "What came of it", runs)
     summaries = [flat(run.summary.to_dict()) for run in runs]
-    for key in dict.fromkeys(key for each in summaries for key in each):
-        values = [each.get(key) for each in summaries]
+    for key in dict.fromkeys(key for summary in summaries for key in summary):
+        values = [summary.get(key) for summary in summaries]
         is_known = any(value not in (None, "") for value in values)
         if is_known and key not in {"config_hash", "software"}:
             cells = [labelled(key, value) for value in values]
-            label = min((each for each, _ in cells), key=len)  # without the unit, if one is known
+            label = min(
+                (spelling for spelling, _ in cells), key=len
+            )  # without the unit, if one is known
             numbers.add_row(label, *(text for _, text in cells))
     console.print(numbers)
 

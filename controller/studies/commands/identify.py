@@ -252,7 +252,7 @@ def _friction(
         friction = ground.friction.model_copy(update={"law": laws.best})
         ground = ground.model_copy(update={"friction": friction})
     with ProgressBar("friction", transient=True) as bar:
-        found = fit_friction(
+        friction_fit = fit_friction(
             [logs[path] for path in paths],
             mass=outs.robot is not None,
             workers=workers,
@@ -260,16 +260,16 @@ def _friction(
         )
     if out is not None:
         with atomic_write(out) as part:
-            text = template(found.world(ground), "\n".join(found.comment(paths)))
+            text = template(friction_fit.world(ground), "\n".join(friction_fit.comment(paths)))
             part.write_text(text, encoding="utf-8")
-    if found.mass is not None and outs.robot is not None:
-        _write_mass(outs.robot, first.robot, found.mass, paths)
-    kept, _ = resistance_of(found.world(ground))
-    _tell_friction(found, laws, kept, logs, paths, outs, as_json=as_json)
+    if friction_fit.mass is not None and outs.robot is not None:
+        _write_mass(outs.robot, first.robot, friction_fit.mass, paths)
+    kept, _ = resistance_of(friction_fit.world(ground))
+    _tell_friction(friction_fit, laws, kept, logs, paths, outs, as_json=as_json)
 
 
 def _tell_friction(
-    found: FrictionFit,
+    friction_fit: FrictionFit,
     laws: LawFit | None,
     kept: Resistance,
     logs: dict[Path, FrictionLog],
@@ -280,9 +280,9 @@ def _tell_friction(
 ) -> None:
     first = logs[paths[0]].goals
     out = outs.world
-    told, names = resistance_of(first.world)
+    assumed, names = resistance_of(first.world)
     table_key = "ground" if laws is None else "friction"
-    errors = {str(path): (log.errors(told), log.errors(kept)) for path, log in logs.items()}
+    errors = {str(path): (log.errors(assumed), log.errors(kept)) for path, log in logs.items()}
     settings = [f"world.{table_key}.{key}={getattr(kept, key):.4g}" for key in names]
     law = laws.best if laws is not None and laws.is_decided else None
     if law is not None:
@@ -292,10 +292,14 @@ def _tell_friction(
         result: dict[str, object] = {
             "law": law,
             "law_misfit": {} if laws is None else {k: round(v, 3) for k, v in laws.misfit.items()},
-            "correlation": found.together,
-            "friction": {key: one.value for key, one in found.found.items()},
-            "interval_95": {key: [one.low, one.high] for key, one in found.found.items()},
-            "not_told": [key for key, one in found.found.items() if not one.determined],
+            "correlation": friction_fit.together,
+            "friction": {key: estimate.value for key, estimate in friction_fit.found.items()},
+            "interval_95": {
+                key: [estimate.low, estimate.high] for key, estimate in friction_fit.found.items()
+            },
+            "not_told": [
+                key for key, estimate in friction_fit.found.items() if not estimate.determined
+            ],
             "settings": settings,
             "errors": {
                 log_name: {
@@ -307,17 +311,17 @@ def _tell_friction(
             "fitted": [log_name for log_name in errors if log_name in fitted],
             "out": out and str(out),
         }
-        if found.mass is not None:
-            mass = found.mass.times(_spine_kg(first.robot))
+        if friction_fit.mass is not None:
+            mass = friction_fit.mass.times(_spine_kg(first.robot))
             result |= {"mass_kg": mass.value, "mass_interval_95_kg": [mass.low, mass.high]}
             result["robot_out"] = str(outs.robot)
         print(json.dumps(result))
         return
     table = Table("friction", "value", "95 % interval", "", box=None)
-    for key, one in found.found.items():
-        note = "" if one.determined else "not identified from these logs"
-        interval = f"{one.low:.4g} to {one.high:.4g}"
-        table.add_row(key.replace("_", " "), f"{one.value:.4g}", interval, note)
+    for key, estimate in friction_fit.found.items():
+        note = "" if estimate.determined else "not identified from these logs"
+        interval = f"{estimate.low:.4g} to {estimate.high:.4g}"
+        table.add_row(key.replace("_", " "), f"{estimate.value:.4g}", interval, note)
     console.print(table)
     for log_name, ((before_m, before_rad), (after_m, after_rad)) in errors.items():
         console.print(
@@ -326,18 +330,18 @@ def _tell_friction(
             f"{math.degrees(after_rad):.1f} degrees with this"
             f"{'' if log_name in fitted else ' (not fitted)'}"
         )
-    for pair, correlation in found.together.items():
-        known = "ratio" if correlation > 0.0 else "product"
+    for pair, correlation in friction_fit.together.items():
+        combination = "ratio" if correlation > 0.0 else "product"
         console.print(
             f"{pair.replace('_', ' ')}: these logs hardly separate them (correlation "
-            f"{correlation:.2f}); their {known} is more accurate",
+            f"{correlation:.2f}); their {combination} is more accurate",
             soft_wrap=True,
         )
     if laws is not None:
         console.print(laws.text(), soft_wrap=True)
-    console.print(" ".join(f"--set {one}" for one in settings), soft_wrap=True)
-    if found.mass is not None:
-        mass = found.mass.times(_spine_kg(first.robot))
+    console.print(" ".join(f"--set {setting}" for setting in settings), soft_wrap=True)
+    if friction_fit.mass is not None:
+        mass = friction_fit.mass.times(_spine_kg(first.robot))
         console.print(
             f"{outs.robot}: the links weigh {mass.value:.4g} kg, 95 % of {mass.low:.4g} to "
             f"{mass.high:.4g}; {first.robot.name} has {_spine_kg(first.robot):.4g}",
@@ -383,41 +387,53 @@ def _servo(
     refuse_to_overwrite([out, robot_file and robot_file.out], force)
     fitted = [read_pendulum_log(path) for path in logs]
     judged = [read_pendulum_log(path) for path in judge]
-    found = None if start is None else read_bam(start)
+    start_constants = None if start is None else read_bam(start)
     _check_one_servo((*fitted, *judged))
     if robot_file is not None:  # before a minute of fits, whether the servo is the robot's
-        check_servo(robot_file.before, fitted[0].actuator if found is None else found.actuator)
-    if fit or found is None:
+        check_servo(
+            robot_file.before,
+            fitted[0].actuator if start_constants is None else start_constants.actuator,
+        )
+    if fit or start_constants is None:
         with ProgressBar("fits", transient=True) as bar:
-            found = fit_pendulum(
+            start_constants = fit_pendulum(
                 fitted,
-                found,
+                start_constants,
                 seed=search.seed,
                 backlash=search.backlash,
                 on_progress=bar.update,
             )
     if out is not None:
         with atomic_write(out) as part:
-            part.write_text(bam_text(found), encoding="utf-8")
+            part.write_text(bam_text(start_constants), encoding="utf-8")
     forecasts = {}
     if robot_file is not None:
-        after = _write_robot(robot_file, found, logs)
+        after = _write_robot(robot_file, start_constants, logs)
         forecasts = {
             str(log.path): [
-                round(robot_error_deg(robot, log, found), 3) for robot in (robot_file.before, after)
+                round(robot_error_deg(robot, log, start_constants), 3)
+                for robot in (robot_file.before, after)
             ]
             for log in (*fitted, *judged)
         }
     errors = {
-        str(log.path): (round(error_deg(found, log), 3), fit and k < len(fitted))
+        str(log.path): (round(error_deg(start_constants, log), 3), fit and k < len(fitted))
         for k, log in enumerate((*fitted, *judged))
     }
     mean_deg = round(fmean(error for error, _ in errors.values()), 3)
-    rows = list(zip(CONSTANTS, found.values, found.low, found.high, strict=True))
-    reached = _reached_bounds(found) if fit else {}
+    rows = list(
+        zip(
+            CONSTANTS,
+            start_constants.values,
+            start_constants.low,
+            start_constants.high,
+            strict=True,
+        )
+    )
+    reached = _reached_bounds(start_constants) if fit else {}
     if as_json:
         result = {
-            "actuator": found.actuator,
+            "actuator": start_constants.actuator,
             "constants": {c.name: float(value) for c, value, _, _ in rows},
             "interval_95": {
                 c.name: [float(low), float(high)] for c, _, low, high in rows if math.isfinite(low)
@@ -432,14 +448,16 @@ def _servo(
             result |= {"robot_out": str(robot_file.out), "robot_errors_deg": forecasts}
         print(json.dumps(result))
         return
-    console.print(_constants_table(found, reached))
+    console.print(_constants_table(start_constants, reached))
     for path, (error, used) in errors.items():
         console.print(
             f"{path}: {error:.2f} degrees off on average{'' if used else ' (not fitted)'}"
         )
     console.print(f"mean {mean_deg:.2f} degrees")
     if robot_file is not None:
-        before_deg, after_deg = (fmean(each) for each in zip(*forecasts.values(), strict=True))
+        before_deg, after_deg = (
+            fmean(forecast) for forecast in zip(*forecasts.values(), strict=True)
+        )
         console.print(
             f"{robot_file.out}: its simulated servo is {after_deg:.2f} degrees off on average, "
             f"that of {robot_file.before.name} {before_deg:.2f}",
@@ -447,9 +465,9 @@ def _servo(
         )
 
 
-def _reached_bounds(found: ServoConstants) -> dict[str, tuple[float, str]]:
+def _reached_bounds(constants: ServoConstants) -> dict[str, tuple[float, str]]:
     """Return the constants on an end of their range, and warn of each."""
-    reached = ranges(found.actuator).bounds_reached(found.values)
+    reached = ranges(constants.actuator).bounds_reached(constants.values)
     for name, (bound, which) in reached.items():
         LOGGER.warning(
             "%s: %g is the %s end of its range, so other constants may be wrong, too; check mass, "
@@ -461,10 +479,10 @@ def _reached_bounds(found: ServoConstants) -> dict[str, tuple[float, str]]:
     return reached
 
 
-def _constants_table(found: ServoConstants, reached: dict[str, tuple[float, str]]) -> Table:
+def _constants_table(constants: ServoConstants, reached: dict[str, tuple[float, str]]) -> Table:
     table = Table("constant", "value", "95 % interval", "", box=None)
     for constant, value, low, high in zip(
-        CONSTANTS, found.values, found.low, found.high, strict=True
+        CONSTANTS, constants.values, constants.low, constants.high, strict=True
     ):
         interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
         note = f"{reached[constant.name][1]} end of the range" if constant.name in reached else ""
@@ -472,9 +490,9 @@ def _constants_table(found: ServoConstants, reached: dict[str, tuple[float, str]
     return table
 
 
-def _write_robot(file: _RobotFile, found: ServoConstants, logs: list[Path]) -> RobotConfig:
+def _write_robot(file: _RobotFile, constants: ServoConstants, logs: list[Path]) -> RobotConfig:
 
-    after = with_keys(robot_with(file.before, found), {"name": file.out.stem}, str(file.out))
+    after = with_keys(robot_with(file.before, constants), {"name": file.out.stem}, str(file.out))
     with atomic_write(file.out) as part:
-        part.write_text(robot_toml(after, robot_comment(found, logs)), encoding="utf-8")
+        part.write_text(robot_toml(after, robot_comment(constants, logs)), encoding="utf-8")
     return after

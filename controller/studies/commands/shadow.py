@@ -34,14 +34,16 @@ def shadow(
     robot = record.header.robot
     goals, measured = goals_of(record, None if world is None else load_world(world))
     with ProgressBar("shadow", transient=True) as bar:
-        found = diagnose(goals, measured, workers=workers, on_progress=bar.update)
+        diagnosis = diagnose(goals, measured, workers=workers, on_progress=bar.update)
     if as_json:
-        print(json.dumps({"log": str(log), "text": found.text(robot)} | found.to_dict(robot)))
+        print(
+            json.dumps({"log": str(log), "text": diagnosis.text(robot)} | diagnosis.to_dict(robot))
+        )
     else:
-        console.print(found.text(robot))
-        for cause in found.causes[1:4] if found.named else ():
+        console.print(diagnosis.text(robot))
+        for cause in diagnosis.causes[1:4] if diagnosis.named else ():
             console.print(
-                f"  less likely by e^{found.evidence_over(cause):.0f}: {cause.text(robot)}"
+                f"  less likely by e^{diagnosis.evidence_over(cause):.0f}: {cause.text(robot)}"
             )
-    if found.named is not None:
+    if diagnosis.named is not None:
         raise SystemExit(1)

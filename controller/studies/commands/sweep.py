@@ -119,14 +119,16 @@ def sweep(
                 refused[row.ended] += 1
     for why, times in refused.items():
         LOGGER.warning("%d of %d points %s", times, len(missing), why)
-    rows = [asdict(one) for one in digest(table_rows(out))] if out.exists() else []
+    rows = (
+        [asdict(digested_row) for digested_row in digest(table_rows(out))] if out.exists() else []
+    )
     if picture is not None:
         pictures().draw_sweep(read_table(out) if out.exists() else [], picture)
     if parquet is not None and out.exists():
         table_to_parquet(out, parquet, KINDS)
     if as_json:
-        found = {"table": str(out), "run": len(missing), "held": len(planned.points)}
-        print(json.dumps(found | {"left_out": planned.left_out, "gaits": rows}))
+        facts = {"table": str(out), "run": len(missing), "held": len(planned.points)}
+        print(json.dumps(facts | {"left_out": planned.left_out, "gaits": rows}))
     else:
         _show(out, rows)
     if missing and refused.total() == len(missing):
@@ -139,7 +141,7 @@ def _show(out: Path, rows: list[dict[str, Any]]) -> None:
     grid.add_column("gait, robot")
     for key, head in _HEADS.items():
         grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
-    for one in rows:
-        named = f"{one['gait']} {one['robot']} {one['keys']}".rstrip()
-        grid.add_row(named, *["" if one[key] is None else str(one[key]) for key in _HEADS])
+    for row in rows:
+        named = f"{row['gait']} {row['robot']} {row['keys']}".rstrip()
+        grid.add_row(named, *["" if row[key] is None else str(row[key]) for key in _HEADS])
     console.print(grid)

@@ -185,22 +185,24 @@ def trials(
     cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
     _check_used(cases, track, seconds)
     changes = {"track": track, "seconds": seconds}
-    seen = range(first_seed, first_seed + seeds)
-    planned = study.plan_trials(cases, seen, start_spread, changes)  # refuses bad input first
-    found = _run(planned, cases, changes, start_spread, _Where(workers, dask), out)
+    seed_range = range(first_seed, first_seed + seeds)
+    planned = study.plan_trials(cases, seed_range, start_spread, changes)  # refuses bad input first
+    finished_trials = _run(planned, cases, changes, start_spread, _Where(workers, dask), out)
     if parquet is not None and out is not None:
         table_to_parquet(out, parquet, KINDS)
-    summaries = study.table(found, cases)
+    summaries = study.table(finished_trials, cases)
     if picture is not None:
         pictures().draw_trials(summaries, picture)
-    rows = [asdict(one) for one in summaries]
+    rows = [asdict(summary) for summary in summaries]
     if as_json:
-        settings = {"seeds": list(seen), "start_spread_m": start_spread}
-        print(json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in found]}))
+        settings = {"seeds": list(seed_range), "start_spread_m": start_spread}
+        print(
+            json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in finished_trials]})
+        )
     else:
         _print(rows, [key for key, values in overs if len(values) > 1])
-    if all(trial.cause == "refused" for trial in found):
-        raise InputError(f"no run was possible: {study.reasons(found)}")
+    if all(trial.cause == "refused" for trial in finished_trials):
+        raise InputError(f"no run was possible: {study.reasons(finished_trials)}")
 
 
 def _check_results(picture: Path | None, parquet: Path | None, out: Path | None) -> None:
@@ -267,21 +269,21 @@ def _run(
     if out is not None:
         configs = {case: study.config_digest(case, changes) for case in cases}
         table = TrialsTable(out, configs, start_spread)
-    found = table.finished(planned) if table else []
-    done = {(trial.case, trial.seed) for trial in found}
+    finished = table.finished(planned) if table else []
+    done = {(trial.case, trial.seed) for trial in finished}
     missing = [item for item in planned if item not in done]
     with table or nullcontext():
         some = study.trials(
             missing, where.workers, dask=where.dask, spread_m=start_spread, changes=changes
         )
         for trial in show_progress(
-            some, str(out or "trials"), len(planned), done=len(found), transient=False
+            some, str(out or "trials"), len(planned), done=len(finished), transient=False
         ):
-            found.append(trial)
+            finished.append(trial)
             LOGGER.debug("%s", trial)
             if table:
                 table.add(trial)
-    return found
+    return finished
 
 
 def _check_keys(keys: list[str]) -> None:

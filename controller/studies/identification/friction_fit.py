@@ -119,14 +119,14 @@ class FrictionLog:
         """
         header = record.header
         pose = record.pose
-        told = header.run.pose
+        pose_kind = header.run.pose
         true = header.backend == "sim" and header.run.pose_is_true
-        measured = told == "camera" or true
+        measured = pose_kind == "camera" or true
         if not measured:
-            way = told or "the IMU or the joints"
+            estimator = pose_kind or "the IMU or the joints"
             raise InputError(
-                f"the pose of this run was estimated by {way}, which assumes the friction; use "
-                "a run with a pose measured by a camera, or a simulated run"
+                f"the pose of this run was estimated by {estimator}, which assumes the friction; "
+                "use a run with a pose measured by a camera, or a simulated run"
             )
         goals, answered = goals_of(record, world, in_water=True)
         cycle = record.cycle
@@ -134,16 +134,18 @@ class FrictionLog:
         count = len(goals.since_start_s)
         is_start = goals.world.ground.kind == "water"
         time_s = cycle.time_s[:stop][slice(count) if is_start else slice(-count, None)]
-        known = np.isfinite(pose.links_m).all(axis=(1, 2))
-        pose_s = pose.time_s[known]
+        is_known = np.isfinite(pose.links_m).all(axis=(1, 2))
+        pose_s = pose.time_s[is_known]
         if not ((pose_s < time_s[0] + WINDOW_S).any() and (pose_s > time_s[-1] - WINDOW_S).any()):
             raise InputError(
                 "the log does not hold where the body was in its last seconds: friction is found "
                 "from how it moves"
             )
-        places = _places(pose.links_m[known])
-        at = np.stack([np.interp(time_s, pose_s, column) for column in places.T], axis=1)
-        motion = _motion(goals, at)
+        places = _places(pose.links_m[is_known])
+        places_at_goals = np.stack(
+            [np.interp(time_s, pose_s, column) for column in places.T], axis=1
+        )
+        motion = _motion(goals, places_at_goals)
         if np.hypot(motion[:, 0], motion[:, 1]).max() < MOVED_M:
             raise InputError(
                 f"the body moves less than {1e3 * MOVED_M:g} mm in each second of the log, too "
@@ -155,18 +157,18 @@ class FrictionLog:
     def simulated(
         goals: Goals,
         deviation: Deviation,
-        seen: Callable[[Floats], Floats] = lambda links_m: links_m,
+        observed: Callable[[Floats], Floats] = lambda links_m: links_m,
     ) -> "FrictionLog":
         """Return the log of a simulated robot.
 
         Args:
             goals: the sent goals.
             deviation: differences of the robot from its file and its world.
-            seen: measurement of its links (T, L, 3).
+            observed: measurement of its links (T, L, 3).
 
         """
         answers, links_m = answers_and_links(goals, deviation)
-        return FrictionLog(goals, answers, _motion(goals, _places(seen(links_m))))
+        return FrictionLog(goals, answers, _motion(goals, _places(observed(links_m))))
 
     def vector(self) -> Floats:
         """All that is compared (N,)."""
@@ -248,19 +250,21 @@ class FrictionFit:
 
     def world(self, world: WorldConfig) -> WorldConfig:
         """Return a world with this friction; undetermined values stay."""
-        told = [name for name, one in self.found.items() if one.determined and name != RATIO]
-        changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in told}
+        determined = [
+            name for name, estimate in self.found.items() if estimate.determined and name != RATIO
+        ]
+        changes = {name: float(f"{getattr(self.friction, name):.4g}") for name in determined}
         part, _ = resistance_of(world)
         return with_resistance(world, part.model_copy(update=changes))
 
     def comment(self, paths: Sequence[Path]) -> list[str]:
         """Lines for the head of a world's file."""
         lines = [f"Friction found by `snakewalk robot identify` from {', '.join(map(str, paths))}:"]
-        for name, one in self.found.items():
-            note = "" if one.determined else "; not identified from these logs"
+        for name, estimate in self.found.items():
+            note = "" if estimate.determined else "; not identified from these logs"
             lines.append(
-                f"{name.replace('_', ' ')} {one.value:.4g}, 95 % of {one.low:.4g} to "
-                f"{one.high:.4g}{note}"
+                f"{name.replace('_', ' ')} {estimate.value:.4g}, 95 % of {estimate.low:.4g} to "
+                f"{estimate.high:.4g}{note}"
             )
         return lines
 
@@ -315,8 +319,8 @@ class _Fit:
         self._workers = workers
         self._on_progress = on_progress
         first = logs[0].goals
-        told, frictions = resistance_of(first.world)
-        self._start = np.log([getattr(told, name) for name in frictions] + [1.0] * mass)
+        resistance, frictions = resistance_of(first.world)
+        self._start = np.log([getattr(resistance, name) for name in frictions] + [1.0] * mass)
         self._names = (*frictions, *[MASS] * mass)
         constants = Constants(first.robot)
         self._steps = constants.step[2:]
@@ -388,24 +392,28 @@ class _Fit:
             spread = math.sqrt(float(weights @ covariance @ weights))
             return Found.of_log(float(weights @ values), spread)
 
-        each = np.eye(len(values))
-        found = {name: of(each[i]) for i, name in enumerate(self._names)}
-        mass = found.pop(MASS, None)
+        unit_steps = np.eye(len(values))
+        estimates = {name: of(unit_steps[i]) for i, name in enumerate(self._names)}
+        mass = estimates.pop(MASS, None)
         if mass is not None:  # and what the links weigh more, each
             k = len(self._names)
             robot = self._logs[0].goals.robot
-            each[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
-            each[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
-            mass = of(each[k - 1])
+            unit_steps[k - 1, k : k + robot.link_count] = 1.0 / (robot.link_count * mass.value)
+            unit_steps[k - 1, k : k + robot.link_count] /= robot.mean_link_mass_kg
+            mass = of(unit_steps[k - 1])
         pairs = {}
-        for i, one in enumerate(found):
-            for j, other in enumerate(list(found)[:i]):
+        for i, second_name in enumerate(estimates):
+            for j, other in enumerate(list(estimates)[:i]):
                 size = math.sqrt(covariance[i, i] * covariance[j, j])
-                pairs[f"{other}, {one}"] = float(covariance[i, j]) / size
-        found[RATIO] = of(each[1] - each[0])
-        told, _ = resistance_of(self._logs[0].goals.world)
-        together = {names: one for names, one in pairs.items() if abs(one) > _TOGETHER_FROM}
-        return FrictionFit(_friction(self._names, values, told), found, together, mass)
+                pairs[f"{other}, {second_name}"] = float(covariance[i, j]) / size
+        estimates[RATIO] = of(unit_steps[1] - unit_steps[0])
+        resistance, _ = resistance_of(self._logs[0].goals.world)
+        together = {
+            names: correlation
+            for names, correlation in pairs.items()
+            if abs(correlation) > _TOGETHER_FROM
+        }
+        return FrictionFit(_friction(self._names, values, resistance), estimates, together, mass)
 
     def _simulated(self, values: Floats) -> Floats:
         out: Floats = _simulated(self._logs, self._names, values)[self._known]
@@ -446,10 +454,12 @@ class _Fit:
             self._noise[kind] = max(floor, float((rest[of] ** 2).sum()) / spare)
 
 
-def _friction(names: Sequence[str], logs: Floats, told: Resistance) -> Resistance:
+def _friction(names: Sequence[str], logs: Floats, resistance: Resistance) -> Resistance:
     values = np.clip(np.exp(logs[: len(names)]), 1e-3, 5.0)  # range that a world accepts
-    found = dict(zip(names, map(float, values), strict=True))
-    return told.model_copy(update={name: each for name, each in found.items() if name != MASS})
+    friction_values = dict(zip(names, map(float, values), strict=True))
+    return resistance.model_copy(
+        update={name: value for name, value in friction_values.items() if name != MASS}
+    )
 
 
 def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats) -> Floats:
@@ -497,7 +507,7 @@ def _motion(goals: Goals, places: Floats) -> Floats:
     hz = goals.run.cycle_hz
     edges = np.arange(round(SETTLED_S * hz), len(places), round(WINDOW_S * hz))
     first, last = places[edges[:-1]], places[edges[1:]]
-    way, (c, s) = last[:, :2] - first[:, :2], (np.cos(first[:, 2]), np.sin(first[:, 2]))
-    ahead = c * way[:, 0] + s * way[:, 1]
-    left = c * way[:, 1] - s * way[:, 0]
+    displacement_m, (c, s) = last[:, :2] - first[:, :2], (np.cos(first[:, 2]), np.sin(first[:, 2]))
+    ahead = c * displacement_m[:, 0] + s * displacement_m[:, 1]
+    left = c * displacement_m[:, 1] - s * displacement_m[:, 0]
     return np.column_stack([ahead, left, last[:, 2] - first[:, 2]])

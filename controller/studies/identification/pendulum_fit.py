@@ -188,8 +188,8 @@ def _cost(values: Floats, logs: Sequence[PendulumLog], kept: Floats) -> float:
 
 def _errors(values: Floats, logs: Sequence[PendulumLog], squares: Floats, step_s: float) -> Floats:
     """(M,) errors of all logs, one after the other."""
-    whole = np.append(values, squares)
-    return np.concatenate([swing_rad(whole, log, step_s) - log.position_rad for log in logs])
+    residuals = np.append(values, squares)
+    return np.concatenate([swing_rad(residuals, log, step_s) - log.position_rad for log in logs])
 
 
 def _fit(
@@ -278,8 +278,8 @@ def _intervals(
     )
     sums = np.stack(
         [
-            (jacobian[at] * (weight[at] * errors[at])[:, None]).sum(axis=0)
-            for at in (blocks == block for block in np.unique(blocks))
+            (jacobian[block] * (weight[block] * errors[block])[:, None]).sum(axis=0)
+            for block in (blocks == block for block in np.unique(blocks))
         ]
     )
     # a prior as wide as the range keeps undetermined values from inflating the rest

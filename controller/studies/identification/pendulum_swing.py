@@ -31,7 +31,7 @@ from snakewalk.sim.servo.motor import (
     p_gain_per_rad,
 )
 
-_GEAR: Final[Indices] = np.array([NAMES.index(each.name) for each in fields(Gearbox)])
+_GEAR: Final[Indices] = np.array([NAMES.index(field.name) for field in fields(Gearbox)])
 FINE_S = 1e-3
 """Longest step of a result (ours); half of it moves no angle of the XL330's logs by 0.004 rad."""
 _ROW = readonly_array(layout="C")

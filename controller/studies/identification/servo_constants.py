@@ -138,8 +138,10 @@ def is_of(model: str, actuator: str) -> bool:
 
 def _motors(actuator: str) -> list[MotorModel]:
     models = [servo_model(name) for name in shipped_models() if is_of(name, actuator)]
-    known = [model for model in models if model.motor is not None and model.units.full_pwm]
-    return [MotorModel.of(model) for model in known]
+    models_with_motor = [
+        model for model in models if model.motor is not None and model.units.full_pwm
+    ]
+    return [MotorModel.of(model) for model in models_with_motor]
 
 
 @cache
@@ -249,19 +251,19 @@ def robot_with(robot: RobotConfig, constants: ServoConstants) -> RobotConfig:
 
     """
     check_servo(robot, constants.actuator)
-    found = {name: float(f"{constants[name]:.5g}") for name in NAMES}
-    known = {name: found[name] for name in MotorConfig.model_fields if name in found}
+    rounded = {name: float(f"{constants[name]:.5g}") for name in NAMES}
+    motor_constants = {name: rounded[name] for name in MotorConfig.model_fields if name in rounded}
     changes: dict[str, object] = {
-        "servo.motor": known,
-        "servo.armature_kg_m2": found["armature_kg_m2"],
-        "servo.gear_drag_n_m_s": found["viscous_n_m_s"],
+        "servo.motor": motor_constants,
+        "servo.armature_kg_m2": rounded["armature_kg_m2"],
+        "servo.gear_drag_n_m_s": rounded["viscous_n_m_s"],
     }
-    own = robot.servo.model
-    if set(robot.servo_models) != {own}:  # joints with another servo keep what they had
+    main_model = robot.servo.model
+    if set(robot.servo_models) != {main_model}:  # joints with another servo keep what they had
         kept = zip(robot.armatures_kg_m2, robot.gear_drags_n_m_s, strict=True)
         changes["joints"] = [
             joint.model_dump(exclude_defaults=True)
-            | ({} if model == own else {"armature_kg_m2": armature, "gear_drag_n_m_s": drag})
+            | ({} if model == main_model else {"armature_kg_m2": armature, "gear_drag_n_m_s": drag})
             for joint, model, (armature, drag) in zip(
                 robot.joints, robot.servo_models, kept, strict=True
             )

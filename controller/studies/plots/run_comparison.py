@@ -19,8 +19,14 @@ _OF_THE_POSE = ("path_error_m", "speed_m_s")
 def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
     """Draw one colour a run; panels that no run has values for are left out."""
     panels = [
-        (title, unit, key, [getattr(run, key) for run in runs], [getattr(run, at) for run in runs])
-        for title, unit, key, at in (
+        (
+            title,
+            unit,
+            key,
+            [getattr(run, key) for run in runs],
+            [getattr(run, time_key) for run in runs],
+        )
+        for title, unit, key, time_key in (
             ("Centre of mass from the path", "m", "path_error_m", "pose_s"),
             ("Forward speed", "m/s", "speed_m_s", "pose_s"),
             ("Highest current of a joint", "A", "current_a", "cycle_s"),
@@ -40,11 +46,11 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
         for axes, (title, unit, key, values, times) in zip(rest, panels, strict=True):
             for number, (time_s, value) in enumerate(zip(times, values, strict=True)):
                 if np.isfinite(value).any():
-                    at, _, mean, _ = thin(time_s, value)
+                    thin_time_s, _, mean, _ = thin(time_s, value)
                     colour = SERIES[number % len(SERIES)]
                     is_solid = key not in _OF_THE_POSE or runs[number].summary.is_measured
                     dash = "-" if is_solid else "--"
-                    axes.plot(at, mean, color=colour, linewidth=1.1, linestyle=dash)
+                    axes.plot(thin_time_s, mean, color=colour, linewidth=1.1, linestyle=dash)
             axes.set_title(title)
             axes.set_ylabel(unit)
             axes.set_xlim(left=0.0)

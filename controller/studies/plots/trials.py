@@ -68,8 +68,8 @@ def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
 
 def _place(row: CaseSummary) -> dict[str, str]:
     keys = {key: str(value) for key, value in row.keys.items()}
-    own = {"relief": f"{row.relief:g}", "world": row.world, "robot": row.robot}
-    return keys | own | {"motion": row.motion, "run": row.run}
+    fixed_keys = {"relief": f"{row.relief:g}", "world": row.world, "robot": row.robot}
+    return keys | fixed_keys | {"motion": row.motion, "run": row.run}
 
 
 def _label(names: list[str]) -> str:

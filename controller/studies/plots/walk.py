@@ -39,7 +39,7 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
         figure = Figure(figsize=size, layout="constrained", dpi=110)
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
         for axes, graph in zip(panels.flat, graphs, strict=False):
-            for result in (one for one in results if one.graph == graph):
+            for result in (graph_result for graph_result in results if graph_result.graph == graph):
                 color = _COLORS[result.rule]
                 axes.plot(result.grid, 100.0 * result.visited, color=color, label=result.rule)
                 if np.isfinite(result.cover).any() and np.nanmean(result.cover) <= _SHOWN:

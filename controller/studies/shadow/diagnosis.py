@@ -175,13 +175,13 @@ class Diagnosis:
             "at": None if self.named is None else self.named.at,
             "causes": [
                 {
-                    "cause": one.cause,
-                    "at": one.at,
-                    "values": [round(value, 4) for value in one.values],
-                    "log_evidence": round(one.evidence, 2),
-                    "text": one.text(robot),
+                    "cause": cause.cause,
+                    "at": cause.at,
+                    "values": [round(value, 4) for value in cause.values],
+                    "log_evidence": round(cause.evidence, 2),
+                    "text": cause.text(robot),
                 }
-                for one in self.causes
+                for cause in self.causes
             ],
             "residual_a": [round(float(value), 5) for value in self.residual_a],
             "residual_rad": [round(float(value), 5) for value in self.residual_rad],
@@ -190,7 +190,7 @@ class Diagnosis:
     @property
     def probability(self) -> float:
         """Probability of the best cause among all, with equal priors."""
-        logs = np.array([each.evidence for each in self.causes])
+        logs = np.array([cause.evidence for cause in self.causes])
         return float(1.0 / np.exp(logs - logs[0]).sum())
 
 
@@ -290,7 +290,7 @@ def goals_of(
     if world.ground.kind == "water":
         count = min(count, round(MOST_S * header.run.cycle_hz))
     rows = (cycle.deadline_s, cycle.sent_rad, cycle.current_a, cycle.measured_rad)
-    due_s, sent_rad, current_a, measured_rad = (each[:count] for each in rows)
+    due_s, sent_rad, current_a, measured_rad = (row[:count] for row in rows)
     least = LEAST_S * header.run.cycle_hz
     if len(due_s) >= least:
         parts = (due_s, sent_rad, current_a, measured_rad)
@@ -332,9 +332,9 @@ def diagnose(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Diagnosis:
     """Find the cause of differences between ``measured`` (2, T, J) and the shadow."""
-    apart = features(goals, measured) - features(goals, answers(goals, NO_DEVIATION))
-    if np.abs(apart).max() < 1.0:  # a step of the registers: there is nothing to explain
-        return Diagnosis((), *_residuals(goals, apart))
+    difference = features(goals, measured) - features(goals, answers(goals, NO_DEVIATION))
+    if np.abs(difference).max() < 1.0:  # a step of the registers: there is nothing to explain
+        return Diagnosis((), *_residuals(goals, difference))
     return Signatures(goals, workers=workers, on_progress=on_progress).diagnose(measured)
 
 
@@ -374,50 +374,50 @@ class Signatures:
 
     def diagnose(self, measured: Floats) -> Diagnosis:
         """Say what differs, of measured currents and angles (2, T, J)."""
-        apart = features(self._goals, measured) - self._plain
+        difference = features(self._goals, measured) - self._plain
         constants = self._constants
-        likely = self._likelihood([apart])
-        first = [self._linear(likely, apart, parts) for _, _, parts in constants.causes]
+        likely = self._likelihood([difference])
+        first = [self._linear(likely, difference, parts) for _, _, parts in constants.causes]
         order = sorted(range(len(first)), key=lambda k: -first[k][0])
-        well = likely.of(apart)
+        well = likely.of(difference)
         refined = {}
         for cause, count in _REFINED.items():
             for k in [k for k in order if constants.causes[k][0] == cause][:count]:
                 evidence, explained = first[k]
                 worth = evidence > well
                 parts = constants.causes[k][2]
-                refined[k] = self._refined(likely, apart, parts) if worth else explained
+                refined[k] = self._refined(likely, difference, parts) if worth else explained
         # the residual of the best explanation is noise: it judges all of them
-        likely = self._likelihood([apart, *(rest for _, rest, _ in refined.values())])
-        well = likely.of(apart)
+        likely = self._likelihood([difference, *(rest for _, rest, _ in refined.values())])
+        well = likely.of(difference)
         named = []
         for k, (values, rest, slopes) in refined.items():
-            cause, at, parts = constants.causes[k]
+            cause, joint, parts = constants.causes[k]
             evidence = likely.cause(rest, slopes, values, constants.faulty[parts]) - well
-            named.append(NamedCause(cause, at, evidence, constants.reported(cause, values)))
-        named.sort(key=lambda one: -one.evidence)
-        return Diagnosis(tuple(named), *_residuals(self._goals, apart))
+            named.append(NamedCause(cause, joint, evidence, constants.reported(cause, values)))
+        named.sort(key=lambda named_cause: -named_cause.evidence)
+        return Diagnosis(tuple(named), *_residuals(self._goals, difference))
 
     def _likelihood(self, rests: Sequence[Floats]) -> "_Likelihood":
         """Likelihood with the noise that the best of some explanations leaves."""
         effects = self._effects
         spare = max(effects.shape[0] - effects.shape[1], 1)
         left = [rest - effects @ np.linalg.lstsq(effects, rest)[0] for rest in rests]
-        noise = max(_LEAST_NOISE, min(float(one @ one) / spare for one in left))
+        noise = max(_LEAST_NOISE, min(float(residual @ residual) / spare for residual in left))
         return _Likelihood(effects, self._healthy, _CORRELATED * noise)
 
     def _linear(
-        self, likely: "_Likelihood", apart: Floats, parts: list[int]
+        self, likely: "_Likelihood", difference: Floats, parts: list[int]
     ) -> tuple[float, tuple[Floats, Floats, Floats]]:
         """Log evidence of a cause with proportional effects; values, residuals, slopes."""
         constants = self._constants
         slopes = self._effects[:, parts]
-        values = self._allowed(likely.best(apart, slopes, constants.faulty[parts]), parts)
-        rest = apart - slopes @ values
+        values = self._allowed(likely.best(difference, slopes, constants.faulty[parts]), parts)
+        rest = difference - slopes @ values
         return likely.cause(rest, slopes, values, constants.faulty[parts]), (values, rest, slopes)
 
     def _refined(
-        self, likely: "_Likelihood", apart: Floats, parts: list[int]
+        self, likely: "_Likelihood", difference: Floats, parts: list[int]
     ) -> tuple[Floats, Floats, Floats]:
         """Values of a cause, their residuals and slopes, found on the simulator.
 
@@ -427,10 +427,10 @@ class Signatures:
         slopes = self._effects[:, parts]
         faulty = constants.faulty[parts]
         values = np.zeros(len(parts))
-        changed = np.zeros(len(apart))
-        best = (-math.inf, values, apart, slopes)
+        changed = np.zeros(len(difference))
+        best = (-math.inf, values, difference, slopes)
         for _ in range(_REFINEMENTS):
-            target = apart - changed + slopes @ values
+            target = difference - changed + slopes @ values
             step = self._allowed(likely.best(target, slopes, faulty), parts) - values
             if np.abs(step / faulty).max() < _LEAST_STEP:
                 break
@@ -438,7 +438,7 @@ class Signatures:
             before = changed
             changed = self._changed(parts, values)
             slopes = slopes + np.outer(changed - before - slopes @ step, step) / (step @ step)
-            rest = apart - changed
+            rest = difference - changed
             evidence = likely.cause(rest, slopes, values, faulty)
             if evidence > best[0]:
                 best = (evidence, values, rest, slopes)
@@ -468,9 +468,9 @@ def features(goals: Goals, values: Floats) -> Floats:
     return np.ascontiguousarray(means.transpose(1, 0, 2)).ravel()
 
 
-def _residuals(goals: Goals, apart: Floats) -> tuple[Floats, Floats]:
+def _residuals(goals: Goals, difference: Floats) -> tuple[Floats, Floats]:
     """Root mean squares (J,) in A and rad of a difference of features."""
-    rms = np.sqrt((apart.reshape(-1, 2, goals.robot.joint_count) ** 2).mean(axis=0))
+    rms = np.sqrt((difference.reshape(-1, 2, goals.robot.joint_count) ** 2).mean(axis=0))
     return rms[0] * _CURRENT_STEP_A, rms[1] * _ANGLE_STEP_RAD
 
 

@@ -92,12 +92,14 @@ class ShadowAlarm:
             return ()
         apart_a, apart_rad = np.sqrt(self._square)
         over = (np.sqrt(self._square) / self.limits()).max(axis=0)
-        found = [int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named]
-        self.named.update(found)
+        joints_over = [
+            int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named
+        ]
+        self.named.update(joints_over)
         return tuple(
             f"{self.robot.joint_label(j)} differs from its shadow: its current by "
             f"{apart_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
-            for j in found
+            for j in joints_over
         )
 
     def _late_s(self, state: JointState) -> float:
@@ -203,14 +205,16 @@ class RunShadow:
         if not self._rows:
             return
         due_s, sent_rad, current_a, measured_rad = (
-            np.array(each) for each in zip(*self._rows, strict=True)
+            np.array(column) for column in zip(*self._rows, strict=True)
         )
         goals, measured = last_part(run, robot, world, due_s, sent_rad, current_a, measured_rad)
         if len(goals.since_start_s) < LEAST_S * run.cycle_hz:
             return
-        found = diagnose(goals, measured)
-        self._log.event(time_s, "shadow", found.text(robot), "warning" if found.named else "info")
-        self._on_event("shadow", found.text(robot))
+        diagnosis = diagnose(goals, measured)
+        self._log.event(
+            time_s, "shadow", diagnosis.text(robot), "warning" if diagnosis.named else "info"
+        )
+        self._on_event("shadow", diagnosis.text(robot))
 
     def _pose(self, joint_rad: Floats) -> InitialPose:
         """Return the pose with joints at angles (J,), heading along the run's start."""

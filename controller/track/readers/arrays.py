@@ -56,7 +56,7 @@ def save_track(path: Path, track: Track) -> None:
         source=track.source,
         licence=track.licence,
         rate_assumed=track.rate_assumed,
-        verdict=np.array([str(one) for one in verdict]),
+        verdict=np.array([str(frame_verdict) for frame_verdict in verdict]),
         **more,
         places_recorded=track.places_recorded,
         head_sure=np.nan if track.head_sure is None else track.head_sure,
@@ -66,10 +66,10 @@ def save_track(path: Path, track: Track) -> None:
 def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
     """Load an .npz with ``track_from_arrays``; see ``load.load_file``."""
     try:
-        held, others = read_arrays(file, ARRAYS)
+        arrays, others = read_arrays(file, ARRAYS)
     except (ValueError, OSError) as error:
         raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
-    return track_from_arrays(file, held, rate_hz, least_score, others)
+    return track_from_arrays(file, arrays, rate_hz, least_score, others)
 
 
 def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
@@ -79,30 +79,32 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
     try:
         said = 8 * sum(math.prod(shape) for _, shape, _ in scipy.io.whosmat(file))
         check_expansion(file, size, said)  # also for cells and structs
-        held = scipy.io.loadmat(file)
+        mat_arrays = scipy.io.loadmat(file)
     except InputError:
         raise
     except Exception as error:
         raise InputError(
             f"{file}: is no MAT file that can be read: {first_line(error)}; known: {KNOWN}"
         ) from None
-    arrays = {name: np.asarray(data) for name, data in held.items() if not name.startswith("__")}
+    arrays = {
+        name: np.asarray(data) for name, data in mat_arrays.items() if not name.startswith("__")
+    }
     return track_from_arrays(file, arrays, rate_hz, least_score)
 
 
 def _unpacked_mat(data: bytes) -> int:
     """Size in bytes of a MATLAB file's unpacked content; each variable is packed separately."""
     order = "<" if data[126:128] == b"IM" else ">"
-    at = _MAT_HEAD
+    position = _MAT_HEAD
     size = 0
-    while at + 8 <= len(data):
-        kind, length = struct.unpack_from(f"{order}II", data, at)
-        at += 8
+    while position + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, position)
+        position += 8
         if kind == _MAT_PACKED:
-            size += _unpacked(memoryview(data)[at : at + length])
+            size += _unpacked(memoryview(data)[position : position + length])
         else:
             size += length
-        at += length
+        position += length
     return size
 
 
@@ -122,7 +124,7 @@ def _unpacked(packed: memoryview) -> int:
 
 def track_from_arrays(
     file: Path,
-    held: dict[str, NDArray[np.generic]],
+    arrays: dict[str, NDArray[np.generic]],
     rate_hz: float | None,
     least_score: float | None = None,
     others: Sequence[str] = (),
@@ -134,99 +136,99 @@ def track_from_arrays(
     body's length. ``rate_hz``, or ``time_s`` or ``t`` in seconds, state the times. ``score`` (T, P)
     is the tracker's confidence. ``skeletons`` are pixels, rows downwards.
     """
-    time_s = None if rate_hz is not None else _times(file, held)
+    time_s = None if rate_hz is not None else _times(file, arrays)
     given = rate_hz
-    if given is None and "rate_hz" in held:
-        given = _scalar(file, "rate_hz", held["rate_hz"])
+    if given is None and "rate_hz" in arrays:
+        given = _scalar(file, "rate_hz", arrays["rate_hz"])
     if given is None and time_s is not None:
         given = float(1.0 / np.median(np.diff(time_s)))
-    bodies = held.keys() & {"points", "angles_rad"} or {"x", "y"} <= held.keys()
+    bodies = arrays.keys() & {"points", "angles_rad"} or {"x", "y"} <= arrays.keys()
     if bodies and given is not None:
-        length_m = _scalar(file, "length_m", held.get("length_m", np.array(np.nan)))
-        points = _bodies(file, held, length_m if np.isfinite(length_m) else 1.0)
+        length_m = _scalar(file, "length_m", arrays.get("length_m", np.array(np.nan)))
+        points = _bodies(file, arrays, length_m if np.isfinite(length_m) else 1.0)
         track = track_from_points(
-            _text(held, "name", file.stem),
-            _without_unsure(file, points, held, least_score),
+            _text(arrays, "name", file.stem),
+            _without_unsure(file, points, arrays, least_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
             time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
-            rate_assumed=rate_hz is None and _flag(held, "rate_assumed", default=False),
-            status=_status(held, len(points)),
+            rate_assumed=rate_hz is None and _flag(arrays, "rate_assumed", default=False),
+            status=_status(arrays, len(points)),
         )
-        sure = _scalar(file, "head_sure", held.get("head_sure", np.array(np.nan)))
+        sure = _scalar(file, "head_sure", arrays.get("head_sure", np.array(np.nan)))
         return replace(
             track,
-            source=_text(held, "source", "not stated"),
-            licence=_text(held, "licence", "not stated"),
-            notes=tuple(str(line) for line in held.get("notes", np.array([])).reshape(-1)),
-            places_recorded=_flag(held, "places_recorded", default=True),
+            source=_text(arrays, "source", "not stated"),
+            licence=_text(arrays, "licence", "not stated"),
+            notes=tuple(str(line) for line in arrays.get("notes", np.array([])).reshape(-1)),
+            places_recorded=_flag(arrays, "places_recorded", default=True),
             head_sure=sure if np.isfinite(sure) else None,
         )
-    if "skeletons" in held:
-        points = _floats(file, "skeletons", held["skeletons"])
+    if "skeletons" in arrays:
+        points = _floats(file, "skeletons", arrays["skeletons"])
         if points.ndim == 3:
             points = points * [1.0, -1.0]
-        points = _without_unsure(file, points, held, least_score)
+        points = _without_unsure(file, points, arrays, least_score)
         rate = SKELETON_RATE_HZ if given is None else given
         return track_from_points(file.stem, points, rate, rate_assumed=given is None)
-    names = ", ".join(sorted([*held, *others])[:12]) or "none"
+    names = ", ".join(sorted([*arrays, *others])[:12]) or "none"
     raise InputError(
         f"{file}: expected the arrays points or angles_rad (or x and y), and rate_hz or t (and "
         f"length_m); or skeletons; found {names}"
     )
 
 
-def _flag(held: dict[str, NDArray[np.generic]], name: str, *, default: bool) -> bool:
-    if name not in held or not held[name].size:
+def _flag(arrays: dict[str, NDArray[np.generic]], name: str, *, default: bool) -> bool:
+    if name not in arrays or not arrays[name].size:
         return default
-    return bool(held[name].reshape(-1)[:1].astype(bool).all())
+    return bool(arrays[name].reshape(-1)[:1].astype(bool).all())
 
 
-def _status(held: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:
+def _status(arrays: dict[str, NDArray[np.generic]], frames: int) -> list[FrameStatus]:
     """The frames' verdicts, if all are of ``FrameStatus``."""
-    words = [str(one) for one in held.get("verdict", np.array([])).reshape(-1)]
-    known = {str(one) for one in FrameStatus}
-    return list(map(FrameStatus, words)) if len(words) == frames and known >= set(words) else []
+    words = [str(word) for word in arrays.get("verdict", np.array([])).reshape(-1)]
+    verdicts = {str(frame_status) for frame_status in FrameStatus}
+    return list(map(FrameStatus, words)) if len(words) == frames and verdicts >= set(words) else []
 
 
-def _times(file: Path, held: dict[str, NDArray[np.generic]]) -> Floats | None:
+def _times(file: Path, arrays: dict[str, NDArray[np.generic]]) -> Floats | None:
     """Times of the frames, s; None if the file has none."""
-    key = next((name for name in ("time_s", "t") if name in held), None)
+    key = next((name for name in ("time_s", "t") if name in arrays), None)
     if key is None:
         return None
-    time_s = _floats(file, key, held[key]).ravel()
+    time_s = _floats(file, key, arrays[key]).ravel()
     step = np.diff(time_s)
     if len(step) == 0 or not (step > 0.0).all():
         raise InputError(f"{file}: {key} must increase from frame to frame, in seconds")
     return time_s
 
 
-def _bodies(file: Path, held: dict[str, NDArray[np.generic]], length: float) -> Floats:
+def _bodies(file: Path, arrays: dict[str, NDArray[np.generic]], length: float) -> Floats:
     """Points (T, P, 2) from ``points``, ``angles_rad``, or ``x`` and ``y``."""
-    if "points" in held:
-        return _floats(file, "points", held["points"])
-    if "angles_rad" in held:
-        angles = _floats(file, "angles_rad", held["angles_rad"])
+    if "points" in arrays:
+        return _floats(file, "points", arrays["points"])
+    if "angles_rad" in arrays:
+        angles = _floats(file, "angles_rad", arrays["angles_rad"])
         if angles.ndim != 2 or angles.shape[1] < 4:
             raise InputError(
                 f"{file}: angles_rad must be (frames, 4 or more), {_not_shape(angles)}"
             )
         return body_points(angles, length)
-    x, y = _floats(file, "x", held["x"]), _floats(file, "y", held["y"])
+    x, y = _floats(file, "x", arrays["x"]), _floats(file, "y", arrays["y"])
     if x.shape != y.shape or x.ndim != 2:
         raise InputError(f"{file}: x and y must both be (frames, points), not {x.shape}, {y.shape}")
     return np.stack([x, y], axis=-1)
 
 
 def _without_unsure(
-    file: Path, points: Floats, held: dict[str, NDArray[np.generic]], least_score: float | None
+    file: Path, points: Floats, arrays: dict[str, NDArray[np.generic]], least_score: float | None
 ) -> Floats:
     """Points; NaN where the tracker's score is below the least one."""
     if not least_score:
         return points
-    if "score" not in held:
+    if "score" not in arrays:
         raise InputError(f"{file}: holds no scores to compare with a least score of {least_score}")
-    score = _floats(file, "score", held["score"])
+    score = _floats(file, "score", arrays["score"])
     if score.shape != points.shape[:2]:
         raise InputError(f"{file}: score must be (frames, points), {_not_shape(score)}")
     return np.where((score < least_score)[..., None], np.nan, points)
@@ -239,10 +241,10 @@ def load_npy(file: Path, rate_hz: float | None) -> Track:
     is at the origin and the mean heading is x.
     """
     try:
-        held = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than the file has
+        values = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than the file has
     except (ValueError, OSError, EOFError) as error:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
-    joints = _floats(file, "joint angles", np.asarray(held))
+    joints = _floats(file, "joint angles", np.asarray(values))
     if joints.ndim != 2 or joints.shape[1] < 3:
         raise InputError(
             f"{file}: expected joint angles (frames, 3 or more joints), {_not_shape(joints)}"
@@ -266,10 +268,10 @@ def _scalar(file: Path, what: str, value: NDArray[np.generic]) -> float:
     return float(number.reshape(()))
 
 
-def _text(held: dict[str, NDArray[np.generic]], name: str, default: str) -> str:
-    if name not in held or held[name].size != 1:
+def _text(arrays: dict[str, NDArray[np.generic]], name: str, default: str) -> str:
+    if name not in arrays or arrays[name].size != 1:
         return default
-    return str(held[name].reshape(-1)[0])
+    return str(arrays[name].reshape(-1)[0])
 
 
 def _not_shape(values: Floats) -> str:

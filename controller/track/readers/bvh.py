@@ -52,51 +52,60 @@ def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     longest = _longest(joints)
     notes = []
     if choice.keypoints is None and len(longest) < len(joints):
-        beside = [joints[k].name for k in range(len(joints)) if k not in longest]
+        side_joints = [joints[k].name for k in range(len(joints)) if k not in longest]
         notes.append(
-            f"{len(beside)} joints outside the longest chain are left out: "
-            f"{', '.join(beside)}; --keypoints uses them"
+            f"{len(side_joints)} joints outside the longest chain are left out: "
+            f"{', '.join(side_joints)}; --keypoints uses them"
         )
     kept = longest if choice.keypoints is None else list(range(len(joints)))
     notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")
     rate = rate_hz if rate_hz is not None else 1.0 / step_s
     names = [joints[k].name for k in kept]
-    found = projected(file, names, places[:, kept] + 1e-12, 1.0, rate, choice)
+    keypoints = projected(file, names, places[:, kept] + 1e-12, 1.0, rate, choice)
     return Keypoints(
-        file, found.nodes, found.places, None, rate_hz=rate, notes=(*notes, *found.notes)
+        file,
+        keypoints.nodes,
+        keypoints.places,
+        None,
+        rate_hz=rate,
+        notes=(*notes, *keypoints.notes),
     )
 
 
 def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
     joints: list[_Joint] = []
     above: list[int] = []
-    at = 0
+    index = 0
     try:
-        while at < len(words):
-            word = words[at].upper()
+        while index < len(words):
+            word = words[index].upper()
             if word in {"ROOT", "JOINT", "END"}:
                 if word == "END":
                     joints.append(_Joint(f"{joints[above[-1]].name}_end", above[-1]))
                 else:
-                    joints.append(_Joint(words[at + 1], above[-1] if above else -1))
-                at += 2
+                    joints.append(_Joint(words[index + 1], above[-1] if above else -1))
+                index += 2
             elif word == "{":
                 above.append(len(joints) - 1)
-                at += 1
+                index += 1
             elif word == "}":
                 above.pop()
-                at += 1
+                index += 1
             elif word == "OFFSET":
-                joints[above[-1]].offset = np.array([float(one) for one in words[at + 1 : at + 4]])
-                at += 4
+                joints[above[-1]].offset = np.array(
+                    [float(number) for number in words[index + 1 : index + 4]]
+                )
+                index += 4
             elif word == "CHANNELS":
-                count = int(words[at + 1])
-                joints[above[-1]].channels = [one.upper() for one in words[at + 2 : at + 2 + count]]
-                at += 2 + count
+                count = int(words[index + 1])
+                joints[above[-1]].channels = [
+                    channel_name.upper() for channel_name in words[index + 2 : index + 2 + count]
+                ]
+                index += 2 + count
             else:
-                raise InputError(f"{file}: unknown word {words[at][:20]!r} in its HIERARCHY")
+                raise InputError(f"{file}: unknown word {words[index][:20]!r} in its HIERARCHY")
     except (IndexError, ValueError):
-        raise InputError(f"{file}: its HIERARCHY is damaged near word {at + 1}") from None
+        raise InputError(f"{file}: its HIERARCHY is damaged near word {index + 1}") from None
     if not joints or above:
         raise InputError(f"{file}: its HIERARCHY is cut")
     _check_joints(file, joints)
@@ -108,8 +117,8 @@ def _check_joints(file: Path, joints: list[_Joint]) -> None:
         raise InputError(f"{file}: has two skeletons; export one")
     if len(joints) > _MOST_JOINTS:
         raise InputError(f"{file}: has more than {_MOST_JOINTS} joints")
-    known = {f"{axis}{kind}" for axis in _AXES for kind in ("POSITION", "ROTATION")}
-    odd = [each for joint in joints for each in joint.channels if each not in known]
+    channels = {f"{axis}{kind}" for axis in _AXES for kind in ("POSITION", "ROTATION")}
+    odd = [channel for joint in joints for channel in joint.channels if channel not in channels]
     if odd:
         raise InputError(f"{file}: its HIERARCHY has a channel {odd[0]}")
 
@@ -165,11 +174,11 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
 
 def _about(axis: int, angle: Floats) -> Floats:
     turn = np.zeros((len(angle), 3, 3))
-    one = (axis + 1) % 3
+    next_axis = (axis + 1) % 3
     two = (axis + 2) % 3
     turn[:, axis, axis] = 1.0
-    turn[:, one, one] = turn[:, two, two] = np.cos(angle)
-    turn[:, two, one], turn[:, one, two] = np.sin(angle), -np.sin(angle)
+    turn[:, next_axis, next_axis] = turn[:, two, two] = np.cos(angle)
+    turn[:, two, next_axis], turn[:, next_axis, two] = np.sin(angle), -np.sin(angle)
     return turn
 
 

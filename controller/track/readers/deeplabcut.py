@@ -76,8 +76,8 @@ def _frames(file: Path, names: list[str]) -> Ints | None:
         InputError: the numbers do not rise, as in a table of several films.
 
     """
-    found = [_NUMBER.search(name) for name in names]
-    numbers = [float(one[1]) for one in found if one]
+    matches = [_NUMBER.search(name) for name in names]
+    numbers = [float(number_match[1]) for number_match in matches if number_match]
     if len(numbers) < len(names):
         return None
     if not np.all(np.diff(numbers) > 0.0):
@@ -136,19 +136,31 @@ def _track(
     least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
-    at = {column: k for k, column in enumerate(columns)}
+    index_by_column = {column: k for k, column in enumerate(columns)}
     names = list(dict.fromkeys(who for who, _, _ in columns))
     animals = [who for who in names if who != _OF_NONE] or names
-    seen = {column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()}
-    whose = choice.animal(file, animals, [who for who in animals if who in seen] or animals[:1])
+    animals_with_points = {
+        column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()
+    }
+    whose = choice.animal(
+        file, animals, [who for who in animals if who in animals_with_points] or animals[:1]
+    )
     parts = list(dict.fromkeys(part for who, part, _ in columns if who == whose))
-    missing = [p for p in parts if not {(whose, p, "x"), (whose, p, "y")} <= at.keys()]
+    missing = [p for p in parts if not {(whose, p, "x"), (whose, p, "y")} <= index_by_column.keys()]
     if missing or not parts:
         raise InputError(f"{file}: expected x and y of each body part; {missing[:3]} lacks one")
     pixels = np.stack(
-        [values[:, [at[whose, part, "x"], at[whose, part, "y"]]] for part in parts], axis=1
+        [
+            values[:, [index_by_column[whose, part, "x"], index_by_column[whose, part, "y"]]]
+            for part in parts
+        ],
+        axis=1,
     )
-    sure = [at[whose, p, "likelihood"] for p in parts if (whose, p, "likelihood") in at]
+    sure = [
+        index_by_column[whose, p, "likelihood"]
+        for p in parts
+        if (whose, p, "likelihood") in index_by_column
+    ]
     scores = values[:, sure] if len(sure) == len(parts) else None
     default = 0.0 if scores is None else PCUTOFF
     return Keypoints(

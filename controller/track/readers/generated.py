@@ -26,10 +26,10 @@ def generate(figures: RecordingConfig) -> Track:
     seconds = sum(e.cycles for e in figures.episodes) / figures.frequency_hz
     time = np.arange(round(seconds * figures.rate_hz) + 1) / figures.rate_hz
     tau = time[:, None] - s / pulse
-    at, gain, phase, heading = _script(figures, -1.0 / pulse, seconds)
+    knots_s, gain, phase, heading = _script(figures, -1.0 / pulse, seconds)
     stations = np.linspace(0.0, 1.0, len(figures.envelope_rad))
-    swing = np.interp(s, stations, figures.envelope_rad) * np.interp(tau, at, gain)
-    angles = swing * np.sin(np.interp(tau, at, phase)) + np.interp(tau, at, heading)
+    swing = np.interp(s, stations, figures.envelope_rad) * np.interp(tau, knots_s, gain)
+    angles = swing * np.sin(np.interp(tau, knots_s, phase)) + np.interp(tau, knots_s, heading)
     front = angles[:, 0]
     step = np.stack([np.cos(front), np.sin(front)], axis=-1)
     travel = np.cumsum(step, axis=0) * (figures.travel * pulse / figures.rate_hz)
@@ -61,7 +61,7 @@ def _script(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, gain, phase and heading of the head from ``start_s`` to ``stop_s``."""
     count = int((stop_s - start_s) * figures.frequency_hz * _FINE) + 2
-    at = np.linspace(start_s, stop_s, count)
+    knots_s = np.linspace(start_s, stop_s, count)
     gain = np.full(count, figures.episodes[0].gain)
     waves = np.full(count, figures.episodes[0].waves or figures.waves)
     heading = np.zeros(count)
@@ -70,7 +70,7 @@ def _script(
     last_waves = float(waves[0])
     for episode in figures.episodes:
         span_s = episode.cycles / figures.frequency_hz
-        u = np.clip((at - begin_s) / span_s, 0.0, 1.0)
+        u = np.clip((knots_s - begin_s) / span_s, 0.0, 1.0)
         ease = cubic(u)
         next_waves = episode.waves or figures.waves
         gain += (episode.gain - last_gain) * ease
@@ -80,5 +80,5 @@ def _script(
         last_gain = episode.gain
         last_waves = next_waves
     rate = 2.0 * np.pi * figures.frequency_hz * waves / figures.waves
-    phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(at))])
-    return at, gain, phase, heading
+    phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(knots_s))])
+    return knots_s, gain, phase, heading

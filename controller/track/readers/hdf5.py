@@ -21,25 +21,25 @@ def load_hdf5(
 ) -> Track | Keypoints:
     """Load any of these kinds; see ``load.load_file``."""
     try:
-        with h5py.File(file, "r") as held:
+        with h5py.File(file, "r") as h5_file:
             sizes: list[int] = []
-            elsewhere = held.visititems_links(_linked_file) or held.visititems(_other_file)
+            elsewhere = h5_file.visititems_links(_linked_file) or h5_file.visititems(_other_file)
             if elsewhere is not None:
                 raise InputError(f"{file}: {elsewhere}; copy it into this one")
-            held.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
+            h5_file.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
             check_expansion(file, file.stat().st_size, sum(sizes))
-            if "tracks" in held and "track_occupancy" in held:
-                return load_analysis(file, held, rate_hz, least_score, choice)
-            if "metadata" in held and "instances" in held:
-                return load_project(file, held, rate_hz, least_score, choice)
-            tables = [g for g in held.values() if _holds_table(g)]
+            if "tracks" in h5_file and "track_occupancy" in h5_file:
+                return load_analysis(file, h5_file, rate_hz, least_score, choice)
+            if "metadata" in h5_file and "instances" in h5_file:
+                return load_project(file, h5_file, rate_hz, least_score, choice)
+            tables = [g for g in h5_file.values() if _holds_table(g)]
             if tables:
                 return load_group(file, tables[0], rate_hz, least_score, choice)
-            if any(isinstance(g, h5py.Group) and "block0_values" in g for g in held.values()):
+            if any(isinstance(g, h5py.Group) and "block0_values" in g for g in h5_file.values()):
                 raise InputError(f"{file}: contains hand labels; use DeepLabCut's CSV of them")
             arrays = {
                 name: _from_matlab(data)
-                for name, data in held.items()
+                for name, data in h5_file.items()
                 if isinstance(data, h5py.Dataset)
             }
     except (OSError, RuntimeError, TypeError) as error:  # TypeError: an unknown kind of link

@@ -44,14 +44,14 @@ class Choice:
             InputError: an option that is not ``allowed`` is given.
 
         """
-        held = {"individual": "names no animals", "keypoints": "names no keypoints"}
-        held["plane"] = "is flat already"
-        for name, reason in held.items():
+        refusals = {"individual": "names no animals", "keypoints": "names no keypoints"}
+        refusals["plane"] = "is flat already"
+        for name, reason in refusals.items():
             if getattr(self, name) is not None and name not in allowed:
                 raise InputError(f"{file}: --{name}: {kind} {reason}; leave it out")
 
-    def animal(self, file: Path, names: Sequence[str], seen: Sequence[str]) -> str:
-        """Name of the selected animal; ``seen`` are those of ``names`` with any point.
+    def animal(self, file: Path, names: Sequence[str], present: Sequence[str]) -> str:
+        """Name of the selected animal; ``present`` are those of ``names`` with any point.
 
         Raises:
             InputError: the name is unknown, or there are several animals and no choice.
@@ -64,13 +64,14 @@ class Choice:
             raise InputError(
                 f"{file}: --individual {self.individual}: no such animal; in it are {listed}"
             )
-        if len(seen) > 1:
+        if len(present) > 1:
             raise InputError(
-                f"{file}: {len(seen)} animals in it ({', '.join(seen)}): say --individual NAME"
+                f"{file}: {len(present)} animals in it ({', '.join(present)}): "
+                "say --individual NAME"
             )
-        if not seen:
+        if not present:
             raise InputError(f"{file}: 0 animals in it: no point of {listed or 'any'} was seen")
-        return seen[0]
+        return present[0]
 
     def order(self, file: Path, nodes: Sequence[str]) -> list[int]:
         """Indices of the keypoints along the midline.
@@ -107,7 +108,7 @@ def choice_of(individual: str | None, keypoints: str | None, plane: str | None) 
     """
     if plane is not None and plane not in PLANES:
         raise InputError(f"--plane {plane}: expected one of {', '.join(PLANES)}")
-    names = None if keypoints is None else tuple(one.strip() for one in keypoints.split(","))
+    names = None if keypoints is None else tuple(part.strip() for part in keypoints.split(","))
     return Choice(individual, names, plane)
 
 
@@ -161,8 +162,8 @@ class Keypoints:
                     "with --keypoints"
                 )
             places = np.where(unsure[..., None], np.nan, places)
-        seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
-        never = [self.nodes[k] for k, there in zip(order, seen, strict=True) if not there]
+        is_visible = np.asarray(np.isfinite(places).any(axis=(0, 2)))
+        never = [self.nodes[k] for k, there in zip(order, is_visible, strict=True) if not there]
         if never and len(never) < len(order):
             raise InputError(
                 f"{file}: {', '.join(never)} is never seen: say --keypoints without it"
@@ -184,10 +185,12 @@ class Keypoints:
             )
         bridged, which = bridge(places)
         number = np.arange(len(places)) if self.frame is None else self.frame
-        whole = np.asarray(np.isfinite(bridged).all(axis=(1, 2)))
+        is_complete = np.asarray(np.isfinite(bridged).all(axis=(1, 2)))
         bridged = bridged.copy()
-        bridged[whole], exchanged = with_ends_in_place(bridged[whole], number[whole])
-        status = [FrameStatus.BRIDGED if one else FrameStatus.GOOD for one in which]
+        bridged[is_complete], exchanged = with_ends_in_place(
+            bridged[is_complete], number[is_complete]
+        )
+        status = [FrameStatus.BRIDGED if is_bridged else FrameStatus.GOOD for is_bridged in which]
         track = track_from_points(
             self.file.stem,
             bridged,
@@ -202,11 +205,11 @@ class Keypoints:
 
 def zigzag(places: Floats) -> float:
     """Length of the polyline through (T, K, 2) over that of the shortest tree; 1 along a body."""
-    apart = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
-    seen = np.isfinite(apart).any(axis=0)
-    if not seen.all():
+    distance = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
+    is_visible = np.isfinite(distance).any(axis=0)
+    if not is_visible.all():
         return 1.0
-    usual = np.nanmedian(apart, axis=0)
+    usual = np.nanmedian(distance, axis=0)
     least = float(minimum_spanning_tree(usual).sum())
     return float(usual.diagonal(1).sum()) / least if least > 0.0 else 1.0
 
@@ -227,15 +230,15 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
     most = min(max(1, int(_MISSING * count)), count - FEWEST)
     able = lost.any(axis=1) & (lost.sum(axis=1) <= most) & ~(lost[:, 1:] & lost[:, :-1]).any(axis=1)
     step = np.hypot(*np.diff(places, axis=1).transpose(2, 0, 1))
-    known = np.isfinite(step).any(axis=0)
-    if not (able.any() and known.all()):
+    is_known = np.isfinite(step).any(axis=0)
+    if not (able.any() and is_known.all()):
         return places, np.zeros(len(places), dtype=bool)
     usual = np.nanmedian(step, axis=0)
     along = np.concatenate([[0.0], np.cumsum(usual)])
     out = places.copy()
     for k in np.flatnonzero(able):
-        seen = ~lost[k]
-        curve = scipy.interpolate.CubicSpline(along[seen], places[k, seen])
+        is_visible = ~lost[k]
+        curve = scipy.interpolate.CubicSpline(along[is_visible], places[k, is_visible])
         out[k, lost[k]] = curve(along[lost[k]])
         if lost[k, 0]:
             out[k, 0] = _beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
@@ -248,5 +251,5 @@ def _beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats
     """The point beyond an end: half of the last turn continues."""
     heading = np.arctan2(*(last - second)[::-1])
     turn = np.angle(np.exp(1j * (heading - np.arctan2(*(second - third)[::-1]))))
-    way = heading + _TURN_ON * turn
-    return np.asarray(last + reach * np.array([np.cos(way), np.sin(way)]))
+    heading_rad = heading + _TURN_ON * turn
+    return np.asarray(last + reach * np.array([np.cos(heading_rad), np.sin(heading_rad)]))

@@ -56,14 +56,14 @@ def load_track(
 
     """
     path = Path(name_or_path)
-    made = name_or_path in EMBEDDED or path.suffix == ".toml"
-    if made and rate_hz is not None:
+    is_track_file = name_or_path in EMBEDDED or path.suffix == ".toml"
+    if is_track_file and rate_hz is not None:
         raise InputError(f"{name_or_path}: its figures hold the frame rate; give one for files")
-    if made and least_score:
+    if is_track_file and least_score:
         raise InputError(
             f"{name_or_path}: is made from figures and has no scores; give one for files"
         )
-    if made:
+    if is_track_file:
         choice.only(path, "a shipped recording")
     if name_or_path in EMBEDDED:
         return embedded(name_or_path)
@@ -95,8 +95,8 @@ def load_file(
         InputError: no such file, an unknown format, or a fault inside it.
 
     """
-    found = _loaded(Path(path), rate_hz, least_score, choice)
-    return found.track(choice) if isinstance(found, Keypoints) else found
+    loaded = _loaded(Path(path), rate_hz, least_score, choice)
+    return loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
 
 
 def load_keypoints(
@@ -111,13 +111,13 @@ def load_keypoints(
         InputError: as ``load_file``, or the file holds midlines.
 
     """
-    found = _loaded(Path(path), rate_hz, least_score, choice)
-    if not isinstance(found, Keypoints):
+    loaded = _loaded(Path(path), rate_hz, least_score, choice)
+    if not isinstance(loaded, Keypoints):
         raise InputError(
             f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
             "or C3D"
         )
-    return found
+    return loaded
 
 
 def _loaded(

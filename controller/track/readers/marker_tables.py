@@ -51,10 +51,10 @@ def load_vicon(
     if not names:
         raise InputError(f"{file}: line {block[1][0]}: expected the names of markers")
     if len(units) != 1 or not units <= UNITS.keys():
-        found = ", ".join(sorted(units)) or "none"
+        units_text = ", ".join(sorted(units)) or "none"
         raise InputError(
             f"{file}: line {block[3][0]}: expected one unit of {', '.join(UNITS)} for all markers, "
-            f"found {found}"
+            f"found {units_text}"
         )
     data = []
     for line, row in block[4:]:
@@ -98,9 +98,9 @@ def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
     if not stated and rate_hz is None:
         raise InputError(f"{file}: states no DataRate; say --rate with frames a second")
-    found = projected(file, names, places, UNITS[unit], rate_hz or stated, choice, frame)
+    keypoints = projected(file, names, places, UNITS[unit], rate_hz or stated, choice, frame)
     _check_count(file, "NumFrames", about, len(data))
-    return found
+    return keypoints
 
 
 def _check_count(file: Path, key: str, about: dict[str, str], rows: int) -> None:

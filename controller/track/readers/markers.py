@@ -55,7 +55,7 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     before = 0
     if lines and not any(number_or_none(cell) for cell in lines[0]):
         titles = [cell.strip().lower() for cell in lines.pop(0)[:2]]  # of the columns
-        before = len([one for one in titles if one in {"frame", "time"}])
+        before = len([title for title in titles if title in {"frame", "time"}])
     if not lines or min(map(len, lines)) < before + 3:
         raise InputError(f"{file}: expected rows of x, y, z of {len(names)} markers, in mm")
     places = marker_places(file, [row[before:] for row in lines], len(names), first_line=None)
@@ -70,12 +70,12 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     import ezc3d  # noqa: PLC0415  an extra
 
     try:
-        held = ezc3d.c3d(str(file))
-        about = held["parameters"]["POINT"]
+        c3d = ezc3d.c3d(str(file))
+        about = c3d["parameters"]["POINT"]
         names = [str(name) for name in about["LABELS"]["value"]]
         unit = str((about["UNITS"]["value"] or ["mm"])[0]).strip()
         stated = float(about["RATE"]["value"][0])
-        places = np.asarray(held["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
+        places = np.asarray(c3d["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
     except Exception as error:
         raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
     if unit not in UNITS:
@@ -154,8 +154,8 @@ def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int
     every = range(len(names))
     without = [k for k in every if is_unlabelled(names[k])]
     rest = [k for k in every if k not in without]
-    seen = [k for k in rest if np.isfinite(places[:, k]).any()]
-    still = _still(places, seen)
+    labelled = [k for k in rest if np.isfinite(places[:, k]).any()]
+    still = _still(places, labelled)
     notes = []
     for left, why in ((without, "without a label"), (still, "that do not move")):
         if left:
@@ -164,26 +164,26 @@ def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int
     return [k for k in rest if k not in still], notes
 
 
-def _still(places: Floats, seen: Sequence[int]) -> list[int]:
+def _still(places: Floats, candidates: Sequence[int]) -> list[int]:
     """Markers that neither move nor keep a distance to a moving one.
 
     A body's head may be held in place; the marker next to it then keeps its distance.
     """
-    if len(seen) < FEWEST:
+    if len(candidates) < FEWEST:
         return []
     extent = np.nanmax(places, axis=0) - np.nanmin(places, axis=0)
-    way = np.linalg.norm(extent, axis=1)
-    usual = float(np.median(way[list(seen)]))
-    moving = [k for k in seen if way[k] >= _STILL * usual]
+    extent_m = np.linalg.norm(extent, axis=1)
+    usual = float(np.median(extent_m[list(candidates)]))
+    moving = [k for k in candidates if extent_m[k] >= _STILL * usual]
     spacing = float(np.nanmedian(np.linalg.norm(np.diff(places[:, moving], axis=1), axis=2)))
-    found = []
-    for k in seen:
+    still_points = []
+    for k in candidates:
         if k not in moving:
             gap = np.linalg.norm(places[:, moving] - places[:, k, None], axis=2)
             near = np.nanmean(gap, axis=0) < _NEAR * spacing
             if not (near & (np.nanstd(gap, axis=0) < _JOINED * spacing)).any():
-                found.append(k)
-    return found
+                still_points.append(k)
+    return still_points
 
 
 def is_unlabelled(name: str) -> bool:

@@ -90,38 +90,40 @@ def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
 
 def load_analysis(
     file: Path,
-    held: Any,
+    h5_file: Any,
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
-    """Load the open analysis HDF5 ``held``; see ``load.load_file``."""
-    tracks = _in_order(held["tracks"], ("track", "xy", "node", "frame"))
-    nodes = _names(held, "node_names")
+    """Load the open analysis HDF5 ``h5_file``; see ``load.load_file``."""
+    tracks = _in_order(h5_file["tracks"], ("track", "xy", "node", "frame"))
+    nodes = _names(h5_file, "node_names")
     if tracks.ndim != 4 or tracks.shape[1] != 2 or len(nodes) not in (0, tracks.shape[2]):
         raise InputError(
             f"{file}: tracks: expected (tracks, 2, nodes, frames) as SLEAP writes it, not an array "
             f"of shape {tracks.shape}" + (f" of {len(nodes)} nodes" if nodes else "")
         )
-    names = _names(held, "track_names")
+    names = _names(h5_file, "track_names")
     if len(names) != len(tracks):
         names = [f"track_{k}" for k in range(len(tracks))]
-    seen = [names[k] for k in np.flatnonzero(np.isfinite(tracks).any(axis=(1, 2, 3)))]
-    one = names.index(choice.animal(file, names, seen))
+    animals_with_points = [
+        names[k] for k in np.flatnonzero(np.isfinite(tracks).any(axis=(1, 2, 3)))
+    ]
+    animal_index = names.index(choice.animal(file, names, animals_with_points))
     scores = None
-    if "point_scores" in held:
-        stored = _in_order(held["point_scores"], ("track", "node", "frame"))
+    if "point_scores" in h5_file:
+        stored = _in_order(h5_file["point_scores"], ("track", "node", "frame"))
         if stored.shape != (tracks.shape[0], *tracks.shape[2:]):
             raise InputError(
                 f"{file}: point_scores: expected (tracks, nodes, frames), not {stored.shape}"
             )
-        scores = stored[one].T
+        scores = stored[animal_index].T
     return Keypoints(
         file,
         nodes or [f"node_{k}" for k in range(tracks.shape[2])],
-        tracks[one].transpose(2, 1, 0) * _DOWNWARDS,
+        tracks[animal_index].transpose(2, 1, 0) * _DOWNWARDS,
         scores,
-        rate_hz=_stated_rate(held) if rate_hz is None else rate_hz,
+        rate_hz=_stated_rate(h5_file) if rate_hz is None else rate_hz,
         least_score=0.0 if least_score is None else least_score,
     )
 
@@ -134,40 +136,40 @@ def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
     return np.asarray(values.transpose([named.index(axis) for axis in axes]))
 
 
-def _stated_rate(held: Any) -> float | None:
-    about = _stated(held, "video_backend_metadata")
+def _stated_rate(h5_file: Any) -> float | None:
+    about = _stated(h5_file, "video_backend_metadata")
     rate = about.get("fps") if isinstance(about, dict) else None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
 
 
-def _stated(held: Any, name: str) -> Any:
+def _stated(h5_file: Any, name: str) -> Any:
     """Content of a JSON attribute; None if it is missing or invalid."""
     try:
-        return parse_json(_text(held.attrs[name]))
+        return parse_json(_text(h5_file.attrs[name]))
     except (KeyError, ValueError):
         return None
 
 
 def load_project(
     file: Path,
-    held: Any,
+    h5_file: Any,
     rate_hz: float | None,
     least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
-    """Load the open project ``held`` (.slp); see ``load.load_file``."""
+    """Load the open project ``h5_file`` (.slp); see ``load.load_file``."""
     try:
-        about = parse_json(_text(held["metadata"].attrs["json"]))
-        version = float(held["metadata"].attrs.get("format_id", 1.0))
+        about = parse_json(_text(h5_file["metadata"].attrs["json"]))
+        version = float(h5_file["metadata"].attrs.get("format_id", 1.0))
         skeletons = [
-            [str(about["nodes"][int(node["id"])]["name"]) for node in one["nodes"]]
-            for one in about["skeletons"]
+            [str(about["nodes"][int(node["id"])]["name"]) for node in skeleton["nodes"]]
+            for skeleton in about["skeletons"]
         ]
-        tracks = [str(parse_json(_text(one))[1]) for one in held["tracks_json"][:]]
-        frames = held["frames"][:]
-        instances = held["instances"][:]
-        tables = {False: held["points"][:], True: held["pred_points"][:]}
-        stated = _rate(held)
+        tracks = [str(parse_json(_text(track_json))[1]) for track_json in h5_file["tracks_json"][:]]
+        frames = h5_file["frames"][:]
+        instances = h5_file["instances"][:]
+        tables = {False: h5_file["points"][:], True: h5_file["pred_points"][:]}
+        stated = _rate(h5_file)
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         raise InputError(f"{file}: is no SLEAP project that can be read: {error}") from None
     if len({int(v) for v in frames["video"]}) > 1:
@@ -176,10 +178,10 @@ def load_project(
         raise InputError(f"{file}: expected one skeleton, found {len(skeletons)}")
     nodes = skeletons[int(instances["skeleton"][0])]
     names = [*tracks, _NO_TRACK]
-    number = {int(one["frame_id"]): int(one["frame_idx"]) for one in frames}
+    number = {int(frame["frame_id"]): int(frame["frame_idx"]) for frame in frames}
     whose = [names[int(k)] if 0 <= k < len(tracks) else _NO_TRACK for k in instances["track"]]
-    seen = list(dict.fromkeys(whose))
-    mine = choice.animal(file, seen, seen)
+    animals = list(dict.fromkeys(whose))
+    mine = choice.animal(file, animals, animals)
     last = max(number.values(), default=-1)
     if not 0 <= last < MOST_FRAMES:
         raise InputError(f"{file}: a frame's number is {last}; at most {MOST_FRAMES} are read")
@@ -188,27 +190,28 @@ def load_project(
     by_hand = np.zeros(last + 1, dtype=bool)
     taken = np.zeros(last + 1, dtype=bool)
     shift = 0.0 if version >= _CENTRED else -0.5
-    for one, name in zip(instances, whose, strict=True):
+    for instance, name in zip(instances, whose, strict=True):
         if name != mine:
             continue
-        at = number.get(int(one["frame_id"]), -1)
-        predicted = int(one["instance_type"]) == _PREDICTED
-        rows = tables[predicted][int(one["point_id_start"]) : int(one["point_id_end"])]
-        if at < 0 or len(rows) != len(nodes):
+        row_index = number.get(int(instance["frame_id"]), -1)
+        predicted = int(instance["instance_type"]) == _PREDICTED
+        rows = tables[predicted][int(instance["point_id_start"]) : int(instance["point_id_end"])]
+        if row_index < 0 or len(rows) != len(nodes):
             raise InputError(f"{file}: an instance has {len(rows)} points of {len(nodes)}")
-        if taken[at] and by_hand[at] == (not predicted):
+        if taken[row_index] and by_hand[row_index] == (not predicted):
             raise InputError(
-                f"{file}: two animals without a track in frame {at}: track them first in SLEAP"
+                f"{file}: two animals without a track in frame {row_index}: "
+                "track them first in SLEAP"
                 if mine == _NO_TRACK
-                else f"{file}: {mine} is twice in frame {at}; correct it in SLEAP"
+                else f"{file}: {mine} is twice in frame {row_index}; correct it in SLEAP"
             )
-        if taken[at] and predicted:
+        if taken[row_index] and predicted:
             continue  # a row set by hand replaces the prediction
-        taken[at], by_hand[at] = True, not predicted
+        taken[row_index], by_hand[row_index] = True, not predicted
         hidden = ~np.asarray(rows["visible"], dtype=bool)
-        places[at] = np.column_stack([rows["x"], rows["y"]]) + shift
-        places[at, hidden] = np.nan
-        scores[at] = rows["score"] if predicted else np.nan
+        places[row_index] = np.column_stack([rows["x"], rows["y"]]) + shift
+        places[row_index, hidden] = np.nan
+        scores[row_index] = rows["score"] if predicted else np.nan
     return Keypoints(
         file,
         nodes,
@@ -219,16 +222,16 @@ def load_project(
     )
 
 
-def _rate(held: Any) -> float | None:
-    for one in held["videos_json"][:] if "videos_json" in held else []:
-        rate = parse_json(_text(one)).get("backend", {}).get("fps")
+def _rate(h5_file: Any) -> float | None:
+    for video_json in h5_file["videos_json"][:] if "videos_json" in h5_file else []:
+        rate = parse_json(_text(video_json)).get("backend", {}).get("fps")
         if rate:
             return float(rate)
     return None
 
 
-def _names(held: Any, what: str) -> list[str]:
-    return [_text(name) for name in held[what][:]] if what in held else []
+def _names(h5_file: Any, what: str) -> list[str]:
+    return [_text(name) for name in h5_file[what][:]] if what in h5_file else []
 
 
 def _text(value: bytes | str | NDArray[np.generic]) -> str:

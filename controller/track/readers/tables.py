@@ -69,12 +69,12 @@ def load_csv(
 def _of_animal(
     file: Path, rows: list[list[str]], column: dict[str, int], choice: Choice
 ) -> list[list[str]]:
-    at = column.get("animal")
-    if at is None:
+    animals = column.get("animal")
+    if animals is None:
         choice.only(file, "a CSV of midlines")
         return rows
     choice.only(file, "a CSV of midlines", "individual")
-    names = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    names = [row[animals].strip() if animals < len(row) else "" for row in rows[1:]]
     listed = list(dict.fromkeys(names))
     mine = choice.animal(file, listed, listed)
     return [rows[0], *(row for row, name in zip(rows[1:], names, strict=True) if name == mine)]
@@ -85,11 +85,11 @@ def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, Fra
     if "status" not in column:
         return {}
     frame = column["frame"]
-    at = column["status"]
-    words = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+    statuses = column["status"]
+    words = [row[statuses].strip() if statuses < len(row) else "" for row in rows[1:]]
     numbers = [float(row[frame]) for row in rows[1:]]
-    found = statuses_named(words)
-    return dict(zip(numbers, found, strict=True)) if found else {}
+    named_statuses = statuses_named(words)
+    return dict(zip(numbers, named_statuses, strict=True)) if named_statuses else {}
 
 
 def _about(file: Path, track: Track, rows: list[list[str]], column: dict[str, int]) -> Track:
@@ -174,7 +174,7 @@ def _midline(
         scale_m=scale_m,
         frame=frame_numbers(str(file), frames),
         time_s=time_s,
-        status=[status[one] for one in frames.tolist()] if status else (),
+        status=[status[frame] for frame in frames.tolist()] if status else (),
     )
 
 
@@ -195,8 +195,8 @@ def _sleap(
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
     whose = [""] * len(table)
     if "track" in column:
-        at = column["track"]
-        whose = [row[at].strip() if at < len(row) else "" for row in rows[1:]]
+        tracks_column = column["track"]
+        whose = [row[tracks_column].strip() if tracks_column < len(row) else "" for row in rows[1:]]
     return load_table(
         file,
         keypoints,

@@ -44,24 +44,24 @@ def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
 def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
-        held = parse_json(text)
+        document = parse_json(text)
     except ValueError as error:
         raise InputError(f"{file}: is no JSON: {error}") from None
-    units = held.get("units") if isinstance(held, dict) else None
-    if not isinstance(units, dict) or "data" not in held:
+    units = document.get("units") if isinstance(document, dict) else None
+    if not isinstance(units, dict) or "data" not in document:
         raise InputError(f"{file}: expected a WCON object with units and data")
     second = _unit(file, units, "t", "s")
     if second is None:
         raise InputError(f"{file}: units: t: expected a time, such as s, not {units['t']!r}")
     choice.only(file, "WCON", "individual")
     metres = _metres(file, units)
-    records = held["data"] if isinstance(held["data"], list) else [held["data"]]
+    records = document["data"] if isinstance(document["data"], list) else [document["data"]]
     animals = sorted({str(r.get("id")) for r in records if isinstance(r, dict)})
     if len(animals) > 1 or choice.individual is not None:
         mine = choice.animal(file, animals, animals)
         records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
     bodies, words = _all_bodies(file, records, metres)
-    time = second * np.array([at for at, _ in bodies])
+    time = second * np.array([moment for moment, _ in bodies])
     step = float(np.median(np.diff(time)))
     if not (np.diff(time) > 0.0).all():
         raise InputError(f"{file}: a time twice: more than one body at a time")
@@ -79,7 +79,7 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         if len(words) == len(time)
         else (),
     )
-    return _about(track, held.get("metadata"), records)
+    return _about(track, document.get("metadata"), records)
 
 
 def _all_bodies(
@@ -99,7 +99,7 @@ def _all_bodies(
             ) from None
     if len(bodies) < 2:
         raise InputError(f"{file}: a recording needs 2 or more times, found {len(bodies)}")
-    lost = sum(not math.isfinite(at) for at, _ in bodies)
+    lost = sum(not math.isfinite(moment) for moment, _ in bodies)
     if lost:
         raise InputError(f"{file}: {lost} of {len(bodies)} times t are not finite numbers")
     bodies.sort(key=lambda body: body[0])
@@ -109,27 +109,29 @@ def _all_bodies(
 def _about(track: Track, about: Any, records: list[Any]) -> Track:
     if isinstance(about, dict):
         stated = [about.get(name) for name in ("source", "licence")]
-        source, licence = (one if isinstance(one, str) else "not stated" for one in stated)
+        source, licence = (
+            statement if isinstance(statement, str) else "not stated" for statement in stated
+        )
         recorded = about.get("places_recorded") is not False
         track = replace(track, source=source, licence=licence, places_recorded=recorded)
-    own = [one for one in records if isinstance(one.get(_OWN), dict)]
-    if len(own) == len(records):
-        sure = [one[_OWN].get("head_sure") for one in own]
-        numbers = [float(one) for one in sure if isinstance(one, (int, float))]
-        source = own[0][_OWN].get("source", track.source)
-        track = replace(track, name=str(own[0].get("id")), source=str(source))
+    our_records = [record for record in records if isinstance(record.get(_OWN), dict)]
+    if len(our_records) == len(records):
+        sure = [our_record[_OWN].get("head_sure") for our_record in our_records]
+        numbers = [float(sure_value) for sure_value in sure if isinstance(sure_value, (int, float))]
+        source = our_records[0][_OWN].get("source", track.source)
+        track = replace(track, name=str(our_records[0].get("id")), source=str(source))
         return replace(track, head_sure=min(numbers, default=None))
     return track
 
 
 def _words(record: dict[str, Any]) -> list[tuple[float, str]]:
     """Times and names of the statuses of a record; empty where they are not stated."""
-    own = record.get(_OWN)
-    words = own.get("status") if isinstance(own, dict) else None
+    our_words = record.get(_OWN)
+    words = our_words.get("status") if isinstance(our_words, dict) else None
     times = record["t"] if isinstance(record["t"], list) else [record["t"]]
     if not isinstance(words, list) or len(words) != len(times):
         return []
-    return [(float(at), str(word)) for at, word in zip(times, words, strict=True)]
+    return [(float(moment), str(word)) for moment, word in zip(times, words, strict=True)]
 
 
 def zipped_text(file: Path) -> str | None:
@@ -154,8 +156,8 @@ def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, F
     if not len(times) == len(xs) == len(ys):
         raise ValueError(f"{len(times)} times, {len(xs)} x, {len(ys)} y")
     from_ = ("ox", "oy") if "ox" in record else ("cx", "cy")
-    found = []
-    for k, (at, x, y) in enumerate(zip(times, xs, ys, strict=True)):
+    bodies = []
+    for k, (moment, x, y) in enumerate(zip(times, xs, ys, strict=True)):
         points = np.stack(
             [_floats(x) * (metres["x"] or 1.0), _floats(y) * (metres["y"] or 1.0)], axis=-1
         )
@@ -163,8 +165,8 @@ def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, F
             float(_at(record.get(name, 0.0), k)) * (metres[name] or 1.0) for name in from_
         ]
         head = _at(record.get("head", "L"), k)
-        found.append((float(at), points[::-1] if head == "R" else points))
-    return found
+        bodies.append((float(moment), points[::-1] if head == "R" else points))
+    return bodies
 
 
 def _at(value: Any, k: int) -> Any:

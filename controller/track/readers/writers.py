@@ -68,7 +68,7 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
     y_m_1, x_m_2`` and so on. Several animals add a column ``animal``. Missing frames have no rows.
     The last columns are ``status``, a word of ``FrameStatus``, and ``head_sure``, where known.
     """
-    if not all(one.places_recorded for one in tracks):
+    if not all(item_track.places_recorded for item_track in tracks):
         raise InputError(
             f"{path.name}: a .csv cannot state that places were not recorded; write an .npz or a "
             ".wcon"
@@ -80,15 +80,17 @@ def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) ->
         heads += [f"{axis}_{unit}_{point + 1}" for point in range(count) for axis in "xy"]
     else:
         heads += ["point", f"x_{unit}", f"y_{unit}"]
-    has_status = any(one.status for one in tracks)
-    has_sure = any(one.head_sure is not None for one in tracks)
+    has_status = any(item_track.status for item_track in tracks)
+    has_sure = any(item_track.head_sure is not None for item_track in tracks)
     heads += [*(["status"] if has_status else []), *(["head_sure"] if has_sure else [])]
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(heads)
         for track in tracks:
             number = np.rint(track.time_s * track.rate_hz).astype(int).tolist()
-            words = [one.name.lower() for one in track.status] or [""] * len(number)
+            words = [frame_status.name.lower() for frame_status in track.status] or [""] * len(
+                number
+            )
             sure = ["" if track.head_sure is None else track.head_sure] if has_sure else []
             bodies = (body.tolist() for body in track.points)
             for frame, body, word in zip(number, bodies, words, strict=True):
@@ -115,27 +117,29 @@ def _write_wcon(path: Path, tracks: Sequence[Track], unit: str) -> None:
         "unit_of_length": unit,
         "rate_hz": first.rate_hz,
         "rate_assumed": first.rate_assumed,
-        "frames_left_out": sum(one.dropped for one in tracks),
-        "frames_missing": sum(one.absent for one in tracks),
-        "notes": list(dict.fromkeys(note for one in tracks for note in one.notes)),
-        "places_recorded": all(one.places_recorded for one in tracks),
+        "frames_left_out": sum(track.dropped for track in tracks),
+        "frames_missing": sum(track.absent for track in tracks),
+        "notes": list(dict.fromkeys(note for track in tracks for note in track.notes)),
+        "places_recorded": all(track.places_recorded for track in tracks),
     }
     units = {"t": "s"} | dict.fromkeys("xy", "m" if unit == "m" else "1")
     with path.open("w", encoding="utf-8") as stream:
         stream.write(f'{{"units": {json.dumps(units)}, "metadata": {json.dumps(about)}, "data": [')
-        for number, one in enumerate(tracks):
-            own = {
-                "status": [status.name.lower() for status in one.status],
-                "head_sure": one.head_sure,
-                "source": one.source,
+        for number, track in enumerate(tracks):
+            facts = {
+                "status": [status.name.lower() for status in track.status],
+                "head_sure": track.head_sure,
+                "source": track.source,
             }
             stream.write(", " if number else "")
-            stream.write(f'{{"id": {json.dumps(one.name)}, "t": {json.dumps(one.time_s.tolist())}')
+            stream.write(
+                f'{{"id": {json.dumps(track.name)}, "t": {json.dumps(track.time_s.tolist())}'
+            )
             for axis, name in enumerate("xy"):
                 stream.write(f', "{name}": [')
-                for frame, body in enumerate(one.points):
+                for frame, body in enumerate(track.points):
                     stream.write(", " if frame else "")
                     stream.write(json.dumps(body[:, axis].tolist()))
                 stream.write("]")
-            stream.write(f', "head": "L", "@snakewalk": {json.dumps(own)}}}')
+            stream.write(f', "head": "L", "@snakewalk": {json.dumps(facts)}}}')
         stream.write("]}")

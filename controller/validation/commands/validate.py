@@ -55,7 +55,9 @@ def validate(
     check_picture(picture)
     require_extra("measurements need", "mujoco")
     loaded = [load_measurement(name) for name in files or shipped("measurements")]
-    with ProgressBar("measurements", sum(len(one.rows) for _, one in loaded)) as bar:
+    with ProgressBar(
+        "measurements", sum(len(measurement.rows) for _, measurement in loaded)
+    ) as bar:
         rows = compare(loaded, bar.advance)
     if picture is not None:
         from snakewalk.controller.validation.plots import draw_ratios  # noqa: PLC0415  an extra
@@ -97,8 +99,8 @@ def _print(loaded: Sequence[tuple[str, PublishedResults]], rows: Sequence[Compar
             pad_edge=False,
             padding=(0, 1, 0, 0),
         )
-        own = [row for row in rows if row.file == name]
-        for row in own:
+        file_rows = [row for row in rows if row.file == name]
+        for row in file_rows:
             quantity, unit, _ = SHOWN[row.quantity]
             grid.add_row(
                 row.row,
@@ -110,7 +112,7 @@ def _print(loaded: Sequence[tuple[str, PublishedResults]], rows: Sequence[Compar
                 row.state,
             )
         console.print(grid)
-        for row in own:
+        for row in file_rows:
             if row.state == "failed":
                 console.print(f"{row.row}: {row.cause}", markup=False)
     ratio, count = median_ratio(rows)

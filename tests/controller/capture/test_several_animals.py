@@ -311,7 +311,7 @@ def test_objects_that_are_too_small_for_an_animal_are_counted() -> None:
     for k, image in enumerate(images):
         cv2.line(image, (20 + 4 * k, 12), (28 + 4 * k, 12), 70, 2)
     detector = detector_of_several(images)
-    found = find_animals(images, images, detector, wanted=None, name="film")
+    found = find_animals(images, images, detector, requested_count=None, name="film")
     assert len(found.identities) == 3
     assert found.smaller == 1
 

@@ -82,7 +82,7 @@ def test_slopes_and_curvatures_are_met_where_they_are_given() -> None:
     rng = np.random.default_rng(3)
     given = rng.normal(size=(6, 20, 3))
     kinds = [0, 1, 2, 0, 1, 2]
-    surface = PdeSurface.through(given, at=[0, 0, 0, 1, 1, 1], slopes=kinds)
+    surface = PdeSurface.through(given, ring_places=[0, 0, 0, 1, 1, 1], slopes=kinds)
     turn = np.arange(20) * TURN / 20
     for k, kind in enumerate(kinds):
         np.testing.assert_allclose(
