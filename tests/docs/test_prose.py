@@ -6,14 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.prose.findings import LONG, count
+from tests.prose.findings import LONG, VAGUE, count
 from tests.prose.patterns import EXAMPLES, PATTERNS
-from tests.prose.texts import KINDS, docstring_paragraphs, page_paragraphs, sentences
+from tests.prose.texts import KINDS, NAMES, docstring_paragraphs, page_paragraphs, sentences
 
 pytestmark = pytest.mark.costs("reads every text of the project")
 
 MOST = json.loads((Path(__file__).parent / "most_findings.json").read_text(encoding="utf-8"))
 """Findings that are left by kind and pattern. A count that falls is lowered here; none rises."""
+VAGUE_PER_1000 = 1.8
+"""Largest share of bound names that are a word of rule 7 of the style, such as ``found``."""
 LONG_SHARE = 0.02
 """Largest share of long sentences."""
 
@@ -23,6 +25,13 @@ def test_no_pattern_becomes_more_frequent(kind: str) -> None:
     counts = count(kind)
     more = {name: (counts[name], most) for name, most in MOST[kind].items() if counts[name] > most}
     assert not more, f"list them: python -m tests.prose {kind}"
+
+
+def test_few_names_say_nothing_about_their_value() -> None:
+    counts = count(NAMES)
+    assert 1000 * counts[VAGUE] <= VAGUE_PER_1000 * counts["sentences"], (
+        "list them: python -m tests.prose names"
+    )
 
 
 @pytest.mark.parametrize("kind", ["help", "messages", "pages"])

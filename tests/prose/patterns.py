@@ -32,5 +32,12 @@ EXAMPLES: Final = (
     "a room of the code",
 )
 """A sentence for each pattern, in order, which the pattern must find."""
+VAGUE_NAMES: Final = frozenset(
+    {
+        *("apart", "at", "beside", "each", "found", "held", "helped", "here", "known", "made"),
+        *("one", "own", "seen", "spoken", "stands", "told", "wanted", "way", "whole"),
+    }
+)
+"""Words that say nothing about a value if they are its whole name (rule 7 of the style)."""
 LONGEST_WORDS: Final = 35
 """A sentence with more words is long."""

@@ -1,4 +1,4 @@
-"""Sentences of pages, help texts, messages and docstrings."""
+"""Sentences of pages, help texts, messages and docstrings, and names."""
 
 import ast
 import inspect
@@ -14,6 +14,8 @@ from tests.architecture.tokens import TOKEN
 from tests.helpers.library import library
 
 ROOT = Path(__file__).resolve().parents[2]
+NAMES: Final = "names"
+"""The kind of text that has no sentences."""
 NOT_PROSE = ("CHANGELOG.md", "docs/decisions/")
 """Pages whose text is history."""
 
@@ -76,14 +78,21 @@ def docstring_paragraphs(text: str) -> Iterator[str]:
             block.append(line[starts.end() :].strip() if starts else line.strip())
 
 
-def docstrings() -> Iterator[tuple[str, str]]:
-    """Place and paragraph of docstrings, strings below attributes, and comments."""
-    for name, source, _, nodes in library():
+def docstring_texts() -> Iterator[tuple[str, str]]:
+    """Place and text of docstrings and strings below attributes."""
+    for name, _, _, nodes in library():
         for node in nodes:
             value = node.value if isinstance(node, ast.Expr) else None
             if isinstance(value, ast.Constant) and isinstance(value.value, str):
-                for paragraph in docstring_paragraphs(value.value):
-                    yield f"{name}:{value.lineno}", paragraph
+                yield f"{name}:{value.lineno}", value.value
+
+
+def docstrings() -> Iterator[tuple[str, str]]:
+    """Place and paragraph of docstrings, strings below attributes, and comments."""
+    for place, text in docstring_texts():
+        for paragraph in docstring_paragraphs(text):
+            yield place, paragraph
+    for name, source, _, _ in library():
         for token in TOKEN.finditer(source):
             if token.lastgroup == "comment" and "noqa" not in token[0]:
                 line = source.count("\n", 0, token.start()) + 1
@@ -131,6 +140,29 @@ def help_texts() -> Iterator[tuple[str, str]]:
     yield from walk(typer.main.get_command(app), "snakewalk")
 
 
+def names() -> Iterator[tuple[str, str]]:
+    """Place and name of every variable, parameter, function, class and field that is bound."""
+    for module, _, _, nodes in library():
+        for node in nodes:
+            if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+                name = node.id if isinstance(node, ast.Name) else node.attr
+            elif isinstance(node, ast.arg):
+                name = node.arg
+            elif isinstance(
+                node,
+                ast.FunctionDef
+                | ast.AsyncFunctionDef
+                | ast.ClassDef
+                | ast.ExceptHandler
+                | ast.MatchAs,
+            ):
+                name = node.name or ""
+            else:
+                continue
+            if name.strip("_"):
+                yield f"{module}:{node.lineno}", name
+
+
 KINDS: Final[dict[str, Callable[[], Iterator[tuple[str, str]]]]] = {
     "pages": pages,
     "help": help_texts,
@@ -141,5 +173,7 @@ KINDS: Final[dict[str, Callable[[], Iterator[tuple[str, str]]]]] = {
 
 @cache
 def read(kind: str) -> tuple[tuple[str, str], ...]:
-    """Place and sentence of all texts of a kind."""
-    return tuple((place, one) for place, text in KINDS[kind]() for one in sentences(text))
+    """Place and sentence of all texts of a kind; a name is one sentence."""
+    if kind == NAMES:
+        return tuple(names())
+    return tuple((place, sentence) for place, text in KINDS[kind]() for sentence in sentences(text))
