@@ -170,7 +170,7 @@ def measure(ways: dict[str, Way], times: WireTimes, *, stamped: bool) -> dict[st
     """Cost of a cycle of each way: medians of a window, those of the window with the least.
 
     CPU time and wall time are each the least of all windows; what the latter consists of is that of
-    the same window. The port is opened anew in each window, since only one program may hold it;
+    the same window. The port is opened again in each window, since only one program may hold it;
     some cycles first, and those that fail, do not count.
     """
     found: dict[str, list[NDArray[np.float64]]] = {name: [] for name in ways}

@@ -77,7 +77,7 @@ def soak(
     link: SafeLink,
     clock: Clock,
     seconds: float,
-    mend: Callable[[], None],
+    repair: Callable[[], None],
     other: int | None = None,
 ) -> list[Window]:
     """Swing the joints of a link for a time, and enable it again after each trip."""
@@ -102,7 +102,7 @@ def soak(
             except DriverError:
                 trips += 1
                 number = itertools.count()
-                mend()
+                repair()
                 next_s = clock.now_s()
             next_s = max(next_s + PERIOD_S, clock.now_s() - PERIOD_S)
         late = 1e3 * np.array(late_s)
@@ -142,7 +142,7 @@ def simulated(hours: float, seed: int = 1) -> list[Window]:
             faults.append(each)
         player.add(FaultPlan.model_validate({"fault": faults}))
 
-    def mend() -> None:
+    def repair() -> None:
         """Let an operator reboot what has an alarm, and enable the chain again."""
         for _ in range(20):
             line.clock.advance(0.5)
@@ -161,7 +161,7 @@ def simulated(hours: float, seed: int = 1) -> list[Window]:
 
     add(3600.0 * hours)
     try:
-        return soak(bench.link, line.clock, 3600.0 * hours, mend)
+        return soak(bench.link, line.clock, 3600.0 * hours, repair)
     finally:
         with suppress(DriverError):
             bench.link.disable()
@@ -195,7 +195,7 @@ def real(minutes: float) -> list[Window]:
         chain = ServoChain(bus, robot, watchdog_s=safety.watchdog_s)
         link = SafeLink(chain, SafetyLimits.from_config(robot, safety), port.clock)
 
-        def mend() -> None:
+        def repair() -> None:
             for _ in range(20):
                 with suppress(DriverError):
                     link.reset("soak")
@@ -205,8 +205,8 @@ def real(minutes: float) -> list[Window]:
             raise SystemExit("soak: the chain could not be enabled again in 20 tries")
 
         with link:
-            mend()  # a busy machine may serve the first reads too late
-            return soak(link, port.clock, 60.0 * minutes, mend, process)
+            repair()  # a busy machine may serve the first reads too late
+            return soak(link, port.clock, 60.0 * minutes, repair, process)
 
 
 def table(windows: list[Window], unit_s: float, unit: str, *, is_real: bool) -> str:

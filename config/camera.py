@@ -18,24 +18,25 @@ class CameraConfig(Strict):
 
     width_px: int = Field(640, ge=64, le=4096, description="width of the camera's picture")
     height_px: int = Field(480, ge=64, le=4096, description="height of the camera's picture")
-    rate_hz: float = Field(30.0, gt=0.0, le=240.0, description="frames a second")
+    rate_hz: float = Field(30.0, gt=0.0, le=240.0, description="number of frames per second")
     field_width_m: float = Field(
         6.0, gt=0.1, le=100.0, description="width of the floor that an image shows"
     )
-    height_m: float = Field(6.0, gt=0.2, le=100.0, description="lens above the floor")
+    height_m: float = Field(6.0, gt=0.2, le=100.0, description="height of the lens above the floor")
     centre_m: Place | None = Field(
         None,
-        description="floor under the lens, and in the image's middle if no corners are given; "
-        "default in the simulator: the middle of start and waypoints",
+        description="place on the floor below the lens, and in the image's middle "
+        "if no corners are given; default in the simulator: the middle "
+        "of start and waypoints",
     )
     turn_rad: float = Field(
         0.0, ge=-6.3, le=6.3, description="direction on the floor of the image's right"
     )
     corners_px: tuple[Place, Place, Place, Place] | None = Field(
-        None, description="four places of a real image, x to the right, y down"
+        None, description="four corners in a real image in pixels, x to the right, y down"
     )
     corners_m: tuple[Place, Place, Place, Place] | None = Field(
-        None, description="the same on the floor; with them the camera may look aslant"
+        None, description="places on the floor of corners_px; with them the camera may be tilted"
     )
     markers_m: dict[str, Place] | None = Field(
         None,
@@ -46,7 +47,7 @@ class CameraConfig(Strict):
         0.15, gt=0.005, le=2.0, description="side of a printed marker, without its white margin"
     )
     place_m: Metres3 | None = Field(
-        None, description="of the lens in the world, for `--pose tags`; with aim_m"
+        None, description="place of the lens in the world for `--pose tags`, together with aim_m"
     )
     aim_m: Metres3 | None = Field(
         None, description="place in the world that the middle of the picture shows"
@@ -56,13 +57,13 @@ class CameraConfig(Strict):
     )
     fixed_tags: tuple[FixedTag, ...] = Field(
         (),
-        description="tags at known places, by which a camera for `--pose tags` finds its own "
-        "place; in place of place_m",
+        description="tags at known places, from which a camera for `--pose tags` "
+        "estimates its place; instead of place_m",
     )
     lens: str | None = Field(
         None,
-        description="file of `snakewalk pose calibrate`: the distortion of a real camera is "
-        "undone; default: none",
+        description="lens file of `snakewalk pose calibrate`, which removes a real "
+        "camera's distortion; default: no correction",
     )
     shade: float = Field(
         0.5, ge=0.0, le=0.9, description="largest share of the floor's light that a shadow removes"
@@ -75,14 +76,13 @@ class CameraConfig(Strict):
         "that stay there become floor; 0: the floor stays as in its picture",
     )
     device: str | None = Field(
-        None, description="of a real camera: a number, a device or an address that OpenCV opens"
+        None, description="real camera: a number, a device or an address that OpenCV opens"
     )
     latency_s: float = Field(
         0.0,
         ge=0.0,
         le=1.0,
-        description="how long after it was taken a real camera's frame is handed over, as "
-        "`snakewalk pose camera` measures it",
+        description="delay of a real camera's frames, as `snakewalk pose camera` measures it",
     )
     background: str | None = Field(
         None, description="image of the empty floor, needed with a real camera"
@@ -128,23 +128,27 @@ class StereoHeadConfig(Strict):
     simulated device.
     """
 
-    link: int = Field(0, ge=0, description="of the spine, on which the mast stands; 0 is the head")
+    link: int = Field(0, ge=0, description="link of the spine that carries the mast; 0 is the head")
     height_m: float = Field(
-        0.25, ge=0.0, le=1.0, description="of the lenses above the link's middle"
+        0.25, ge=0.0, le=1.0, description="height of the lenses above the link's middle"
     )
-    tilt_rad: float = Field(0.5, ge=-0.5, le=1.5, description="by which they look down")
-    baseline_m: float = Field(0.095, gt=0.01, le=0.5, description="between the lenses")
+    tilt_rad: float = Field(0.5, ge=-0.5, le=1.5, description="downward tilt of the cameras")
+    baseline_m: float = Field(0.095, gt=0.01, le=0.5, description="distance between the lenses")
     width_px: int = Field(
         320, ge=160, le=2048, description="width of the picture of each camera of the head"
     )
     height_px: int = Field(
         240, ge=120, le=2048, description="height of the picture of each camera of the head"
     )
-    focal_px: float = Field(200.0, gt=20.0, le=10_000.0, description="focal length")
-    disparities: int = Field(80, ge=16, le=512, description="that are tried, from infinity on")
-    exposure_s: float = Field(0.005, ge=0.0, le=0.1, description="how long a picture is exposed")
+    focal_px: float = Field(
+        200.0, gt=20.0, le=10_000.0, description="focal length of both cameras in pixels"
+    )
+    disparities: int = Field(
+        80, ge=16, le=512, description="number of disparities to try, beginning at infinity"
+    )
+    exposure_s: float = Field(0.005, ge=0.0, le=0.1, description="exposure time of a picture")
     mass_kg: float = Field(
-        0.055, ge=0.0, le=2.0, description="of cameras and mast; it is added to the link's"
+        0.055, ge=0.0, le=2.0, description="mass of cameras and mast, added to the link's mass"
     )
     position_error_m: float = Field(
         0.002,
@@ -153,7 +157,10 @@ class StereoHeadConfig(Strict):
         description="standard deviation, along each axis, of a picture's measured place",
     )
     angle_error_rad: float = Field(
-        0.005, ge=0.0, le=0.2, description="the same about each axis of its measured attitude"
+        0.005,
+        ge=0.0,
+        le=0.2,
+        description="standard deviation, about each axis, of a picture's measured attitude",
     )
 
     @model_validator(mode="after")
@@ -168,15 +175,21 @@ class StereoHeadConfig(Strict):
 class MappingConfig(Strict):
     """How a run maps the ground by its robot's stereo head, and when it plans again."""
 
-    spacing_m: float = Field(0.04, gt=0.005, le=0.5, description="between the map's samples")
-    period_s: float = Field(0.7, gt=0.01, le=60.0, description="between two pictures")
+    spacing_m: float = Field(
+        0.04, gt=0.005, le=0.5, description="distance between samples of the map"
+    )
+    period_s: float = Field(
+        0.7, gt=0.01, le=60.0, description="time between two pictures of the stereo head"
+    )
     latency_s: float = Field(
-        0.3, ge=0.0, le=10.0, description="from a picture to its ground in the map"
+        0.3, ge=0.0, le=10.0, description="time from a picture to the update of the map"
     )
     error_m: float = Field(
         0.05, gt=0.001, le=0.5, description="expected error beyond which a point is left out"
     )
-    far_m: float = Field(2.0, gt=0.1, le=20.0, description="points farther from the lens are, too")
+    far_m: float = Field(
+        2.0, gt=0.1, le=20.0, description="distance from the lens beyond which a point is left out"
+    )
     source: str = Field(
         "stereo",
         pattern=r"^[a-z][a-z0-9_-]*$",

@@ -13,16 +13,27 @@ class ComplianceConfig(Strict):
     At rest a joint that draws the current I beyond the dead band yields by ``I / stiffness_a_rad``.
     """
 
-    joints: Literal["yaw", "pitch", "all"] = Field("pitch", description="those that yield")
-    stiffness_a_rad: float = Field(0.3, gt=0.0, le=100.0, description="current per radian yielded")
+    joints: Literal["yaw", "pitch", "all"] = Field(
+        "pitch", description="joints that yield to measured current"
+    )
+    stiffness_a_rad: float = Field(
+        0.3, gt=0.0, le=100.0, description="current per radian that a joint yields"
+    )
     damping_a_s_rad: float = Field(
-        0.5, gt=0.0, le=100.0, description="current per rad/s of yielding"
+        0.5, gt=0.0, le=100.0, description="current per rad/s at which a joint yields"
     )
     deadband_a: float = Field(
-        0.0, ge=0.0, le=10.0, description="current that nothing yields to: the load of plain ground"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="current to which no joint yields, such as the load of plain ground",
     )
-    yield_limit_rad: float = Field(0.5, gt=0.0, le=3.0, description="of a joint")
-    yield_rate_rad_s: float = Field(1.0, gt=0.0, le=10.0, description="of a joint")
+    yield_limit_rad: float = Field(
+        0.5, gt=0.0, le=3.0, description="largest angle by which a joint yields"
+    )
+    yield_rate_rad_s: float = Field(
+        1.0, gt=0.0, le=10.0, description="largest speed at which a joint yields"
+    )
     windows: int | None = Field(
         None,
         ge=1,

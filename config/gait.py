@@ -14,21 +14,25 @@ Parameters = dict[str, bool | int | float]
 class GaitChange(Strict):
     """Another gait at a time."""
 
-    at_s: float = Field(gt=0.0, description="since the beginning")
+    at_s: float = Field(gt=0.0, description="time of the change since the beginning of the run")
     name: str = Field(description="gait that the robot changes to; `snakewalk gait list` shows all")
-    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
+    parameters: Parameters = Field(
+        {}, description="values of gait parameters by name; the others keep their defaults"
+    )
 
 
 class AshoreConfig(Strict):
     """The gait that follows one that swims along waypoints, once the body has met the ground."""
 
-    name: str = Field(description="one that walks along waypoints: trot or lateral-walk")
-    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
+    name: str = Field(description="gait on land, which walks along waypoints: trot or lateral-walk")
+    parameters: Parameters = Field(
+        {}, description="values of gait parameters by name; the others keep their defaults"
+    )
     headway: float = Field(
         0.5,
         gt=0.0,
         lt=1.0,
-        description="share of its best way in a cycle: a body that makes less has met the ground",
+        description="share of the best distance per cycle below which the body has met the ground",
     )
 
 
@@ -36,12 +40,19 @@ class GaitConfig(Strict):
     """A gait in place of a walk; its parameters and their ranges: `snakewalk gait show NAME`."""
 
     name: str = Field(description="one of `snakewalk gait list`")
-    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
-    duration_s: float = Field(MOTION_S, gt=0.0, le=3600.0, description="then it comes to rest")
+    parameters: Parameters = Field(
+        {}, description="values of gait parameters by name; the others keep their defaults"
+    )
+    duration_s: float = Field(
+        MOTION_S,
+        gt=0.0,
+        le=3600.0,
+        description="duration of the motion, after which the robot comes to rest",
+    )
     look_heading_rad: float | None = Field(None, description="world heading that the head keeps")
     look_at_m: tuple[float, float] | None = Field(None, description="point that the head looks at")
     then: tuple[GaitChange, ...] = Field(
-        (), description="other gaits at rising times: tables of `at_s`, `name`, `parameters`"
+        (), description="later gaits at rising times: tables of `at_s`, `name`, `parameters`"
     )
     ashore: AshoreConfig | None = Field(
         None, description="along waypoints: how it goes on where it cannot swim; default: it swims"
@@ -65,7 +76,9 @@ class GaitSetConfig(Strict):
     )
     robot: str = Field(description="shipped robot that the parameters are for")
     world: str | None = Field(None, description="default: the gait's own")
-    parameters: Parameters = Field({}, description="by name; the rest keep their defaults")
+    parameters: Parameters = Field(
+        {}, description="values of gait parameters by name; the others keep their defaults"
+    )
     compliance: ComplianceConfig | None = Field(
         None, description="joint goals that yield to measured current; default: they do not"
     )

@@ -16,7 +16,8 @@ GaitChangeMethod = Annotated[
 ]
 BLEND: Final = "blend"
 LengthUnit = Annotated[
-    Literal["m", "cm", "mm", "km", "ft"], Field(description="unit of the calibration's T")
+    Literal["m", "cm", "mm", "km", "ft"],
+    Field(description="unit of the calibration's translation T"),
 ]
 METRE: Final = "m"
 Disparities = Annotated[

@@ -13,16 +13,23 @@ class MotorConfig(Strict):
     """
 
     torque_constant_n_m_a: float | None = Field(
-        None, gt=0.001, le=100.0, description="at the output shaft; default: the model's"
+        None,
+        gt=0.001,
+        le=100.0,
+        description="torque per ampere at the output shaft; default: the model's",
     )
     back_emf_v_s: float | None = Field(
         None,
         gt=0.001,
         le=100.0,
-        description="at the output shaft; default: torque_constant_n_m_a, else the model's",
+        description="back-EMF constant at the output shaft; default: "
+        "torque_constant_n_m_a, else the model's",
     )
     resistance_ohm: float | None = Field(
-        None, gt=0.01, le=1000.0, description="of winding and bridge; default: the model's"
+        None,
+        gt=0.01,
+        le=1000.0,
+        description="resistance of winding and bridge; default: the model's",
     )
     p_unit_per_rad: float | None = Field(
         None,
@@ -33,23 +40,43 @@ class MotorConfig(Strict):
     )
     dry_n_m: float = Field(0.0, ge=0.0, le=10.0, description="friction without load")
     stribeck_n_m: float = Field(
-        0.0, ge=0.0, le=10.0, description="that much more while the shaft is slow"
+        0.0, ge=0.0, le=10.0, description="additional friction of a slow shaft"
     )
-    stribeck_rad_s: float = Field(0.3, gt=0.0, le=100.0, description="up to which it is slow")
-    stribeck_exponent: float = Field(2.0, gt=0.0, le=20.0, description="how sharply that ends")
-    by_motor: float = Field(0.0, ge=0.0, lt=1.0, description="share of the motor's torque")
-    by_load: float = Field(0.0, ge=0.0, lt=1.0, description="share of the load's torque")
+    stribeck_rad_s: float = Field(
+        0.3, gt=0.0, le=100.0, description="speed up to which the shaft is slow"
+    )
+    stribeck_exponent: float = Field(
+        2.0, gt=0.0, le=20.0, description="exponent of the fading of a slow shaft's friction"
+    )
+    by_motor: float = Field(
+        0.0, ge=0.0, lt=1.0, description="friction as a share of the motor's torque"
+    )
+    by_load: float = Field(
+        0.0, ge=0.0, lt=1.0, description="friction as a share of the load's torque"
+    )
     by_motor_slow: float = Field(
-        0.0, ge=0.0, lt=1.0, description="share of the motor's more while the shaft is slow"
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="additional share of the motor's torque while the shaft is slow",
     )
     by_load_slow: float = Field(
-        0.0, ge=0.0, lt=1.0, description="share of the load's more while the shaft is slow"
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="additional share of the load's torque while the shaft is slow",
     )
     by_motor_square: float = Field(
-        0.0, ge=0.0, le=10.0, description="a N m: of its square, while the load is the stronger"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="friction per square of the motor's torque while the load is stronger, per N m",
     )
     by_load_square: float = Field(
-        0.0, ge=0.0, le=10.0, description="a N m: of its square, while the motor is the stronger"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="friction per square of the load's torque while the motor is stronger, per N m",
     )
     backlash_rad: float = Field(
         0.0,

@@ -24,13 +24,15 @@ class PoseConfig(Strict):
     Angles are roll, pitch and yaw, turned about fixed axes in this order.
     """
 
-    link: int = Field(0, ge=0, description="of the spine, that carries the body; 0 is the head")
+    link: int = Field(
+        0, ge=0, description="link of the spine that carries the tracked body; 0 is the head"
+    )
     offset_m: Metres3 = Field(
         (0.0, 0.0, 0.0),
-        description="origin of the body from the link's centre: forward, left, up",
+        description="origin of the tracked body from the link's centre: forward, left, up",
     )
     offset_deg: Degrees3 = Field(
-        (0.0, 0.0, 0.0), description="roll, pitch and yaw of the body's axes in the link's"
+        (0.0, 0.0, 0.0), description="roll, pitch and yaw of the tracked body's axes in the link's"
     )
     world_m: Metres3 = Field(
         (0.0, 0.0, 0.0), description="origin of the source's frame in the world of the run"

@@ -20,6 +20,7 @@ class RosConfig(Strict):
     )
     tf: Literal["head", "links", "none"] = Field(
         "head",
-        description="transforms on /tf: of the head alone, since robot_state_publisher makes those "
-        "of the links; of every link; or none",
+        description="transforms to publish on /tf: of the head alone, as "
+        "robot_state_publisher makes those of the links; of every "
+        "link; or none",
     )

@@ -51,22 +51,32 @@ class StatesConfig(Strict):
         le=100_000,
         description="number of random body shapes in addition to the recorded ones",
     )
-    gain_limit: float = Field(0.6, ge=0.0, le=1.0, description="least quasi-static eta_q kept")
+    gain_limit: float = Field(
+        0.6, ge=0.0, le=1.0, description="least quasi-static efficiency eta_q of a body shape"
+    )
     turn_limit_rad: float = Field(
-        1.5, gt=0.0, description="largest angle kept between a shape's tail and its mean"
+        1.5,
+        gt=0.0,
+        description="largest angle between the tail of a body shape and its mean direction",
     )
 
 
 class PitchConfig(Strict):
     """How the servos of the pitch joints are set up in a walk; by default as the robot says."""
 
-    p_gain: int | None = Field(None, ge=0, le=16383, description="register 84")
-    current_limit_a: float | None = Field(
-        None, gt=0.0, description="goal current: at least 0.3 A carry a body that rolls"
+    p_gain: int | None = Field(
+        None, ge=0, le=16383, description="Position P Gain of the pitch joints (register 84)"
     )
-    lead_s: float | None = Field(None, ge=0.0, le=2.0, description="how early goals are sent")
+    current_limit_a: float | None = Field(
+        None,
+        gt=0.0,
+        description="Goal Current of the pitch joints; a body that rolls needs at least 0.3 A",
+    )
+    lead_s: float | None = Field(
+        None, ge=0.0, le=2.0, description="time by which goals of the pitch joints are sent early"
+    )
     fit_gain: float = Field(
-        1.0, gt=0.0, le=2.0, description="goals over those that fit the body to the ground"
+        1.0, gt=0.0, le=2.0, description="factor on the goals that fit the body to the ground"
     )
 
     def set_up(self, robot: RobotConfig) -> RobotConfig:
@@ -83,32 +93,44 @@ class PitchConfig(Strict):
 class WalkConfig(Strict):
     """How states follow each other and how the measured pose steers (docs/method.md)."""
 
-    decision_fraction: float = Field(1.0, gt=0.05, le=1.0, description="of a state that is walked")
+    decision_fraction: float = Field(
+        1.0,
+        gt=0.05,
+        le=1.0,
+        description="share of a state that the body walks before the next decision",
+    )
     proposals: int = Field(
         120,
         ge=1,
         le=1000,
-        description="first states in the order of W, from which the candidates come",
+        description="number of states, the first in the order of W, from which "
+        "candidates are drawn",
     )
     candidates: int = Field(
-        6, ge=1, le=50, description="number of candidates to simulate: the smoothest"
+        6, ge=1, le=50, description="number of candidates to simulate, the smoothest first"
     )
     climb_progress: float = Field(
-        0.65, ge=0.0, le=1.0, description="under this predicted progress states ride on wide waves"
+        0.65, ge=0.0, le=1.0, description="predicted progress below which states ride on wide waves"
     )
-    climb_share: float = Field(0.2, ge=0.0, le=1.0, description="of a state on a wide wave")
+    climb_share: float = Field(
+        0.2, ge=0.0, le=1.0, description="share of a state that rides on a wide wave"
+    )
     bend_limit_rad: float = Field(
-        2.4, ge=0.0, description="turn of the mean line over a body length, at most"
+        2.4, ge=0.0, description="largest turn of the mean line over a body length"
     )
-    carrot_m: float = Field(0.6, gt=0.05, description="ahead on the path: where states aim")
+    carrot_m: float = Field(
+        0.6, gt=0.05, description="distance ahead on the path at which states aim"
+    )
     heading_tolerance_rad: float = Field(
         0.5,
         gt=0.0,
-        description="largest angle between a body shape and the wanted direction",
+        description="largest angle between a body shape and the requested direction",
     )
-    nearest_count: int = Field(12, ge=1, description="taken when no state is within tolerance")
+    nearest_count: int = Field(
+        12, ge=1, description="number of nearest states to try if no state is within the tolerance"
+    )
     ramp_limit_rad: float = Field(
-        0.8, ge=0.0, description="walk-blind: heading error that a ramp cancels on a piece"
+        0.8, ge=0.0, description="heading error that a ramp cancels on a piece; for walk-blind only"
     )
     rolls: bool = Field(
         True,
@@ -119,8 +141,9 @@ class WalkConfig(Strict):
         8,
         ge=0,
         le=50,
-        description="in simulation, on slopes over 8 degrees: pieces of a decision that a second "
-        "simulated body tries where the best one fails there; 0: none, and rolls are on paper",
+        description="number of pieces that a second simulated body tries if the "
+        "best one fails, in simulation on slopes over 8 degrees; 0: "
+        "none, and rolls are on paper",
     )
     finds_friction: bool = Field(
         True,
@@ -129,7 +152,9 @@ class WalkConfig(Strict):
     )
     pitch: PitchConfig = PitchConfig()
     fallback: bool = Field(
-        True, description="a serpenoid from the second miss of a waypoint on until it is reached"
+        True,
+        description="follow a serpenoid after the second miss of a waypoint until "
+        "the body reaches it",
     )
 
 
@@ -142,13 +167,15 @@ class BehaviourConfig(Strict):
         le=3.0,
         description="speed of the walk: body lengths that the wave travels in a second",
     )
-    sliding: float = Field(0.0, ge=0.0, lt=1.0, description="w_d")
+    sliding: float = Field(
+        0.0, ge=0.0, lt=1.0, description="share of the pulse speed that is lost by sliding (w_d)"
+    )
     curvature: float | None = Field(
         None,
         gt=0.0,
         le=2.0,
-        description="scales every shape's bends; by default 1, and more where the ground's "
-        "friction leaves narrow bends no hold",
+        description="factor on the bends of every shape; default: 1, and more if "
+        "the ground's friction is too low for narrow bends",
     )
 
 
@@ -158,51 +185,75 @@ class SafetyConfig(Strict):
     goal_rate_rad_s: float = Field(
         4.0, gt=0.0, description="largest speed at which a joint's goal may move"
     )
-    goal_lead_rad: float = Field(0.8, gt=0.0, description="goal minus measured")
+    goal_lead_rad: float = Field(
+        0.8, gt=0.0, description="largest difference between a joint's goal and its measured angle"
+    )
     following_limit_rad: float = Field(
         0.4,
         gt=0.0,
-        description="a joint that is farther from its goal does not follow; wider "
-        "where a low P gain needs it, and within 0.9 of goal_lead_rad",
+        description="distance from its goal beyond which a joint does not follow; "
+        "at most 0.9 of goal_lead_rad, larger for a low P gain",
     )
-    following_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
+    following_time_s: float = Field(
+        0.5, ge=0.0, description="time for which a joint may exceed following_limit_rad"
+    )
     current_limit_a: float | None = Field(
-        None, gt=0.0, description="default: the robot's servo.over_current_a"
+        None,
+        gt=0.0,
+        description="servo current at which torque goes off; default: the robot's "
+        "servo.over_current_a",
     )
-    current_time_s: float = Field(0.5, ge=0.0, description="how long it may be exceeded")
+    current_time_s: float = Field(
+        0.5, ge=0.0, description="time for which a servo may exceed current_limit_a"
+    )
     temperature_limit_c: float = Field(
         70.0, gt=0.0, description="temperature of a servo's housing at which torque goes off"
     )
     winding_limit_c: float = Field(
         125.0,
         gt=0.0,
-        description="estimated temperature of a motor's winding: that of the housing, and the heat "
-        "of its current",
+        description="largest estimated temperature of a motor's winding, from the "
+        "housing's temperature and the current's heat",
     )
     voltage_min_v: float | None = Field(
-        None, gt=0.0, description="default: the robot's servo.supply_min_v"
+        None,
+        gt=0.0,
+        description="supply voltage below which torque goes off; default: the "
+        "robot's servo.supply_min_v",
     )
     voltage_max_v: float | None = Field(
-        None, gt=0.0, description="default: the robot's servo.supply_max_v"
+        None,
+        gt=0.0,
+        description="supply voltage above which torque goes off; default: the "
+        "robot's servo.supply_max_v",
     )
     voltage_time_s: float = Field(
-        0.3, ge=0.0, description="how long the supply may be too low, but not at the start"
+        0.3,
+        ge=0.0,
+        description="time for which the supply voltage may be too low, except at the start",
     )
     stale_limit_s: float = Field(
-        0.1, gt=0.0, description="how old a measured position, velocity or current may be"
+        0.1, gt=0.0, description="largest age of a measured position, velocity or current"
     )
     slow_stale_limit_s: float = Field(
-        3.0, gt=1.0, description="the same for temperature and voltage; overdue after 1 s"
+        3.0,
+        gt=1.0,
+        description="largest age of a measured temperature or voltage; overdue after 1 s",
     )
     on_trip: Literal["off", "hold"] = Field(
         "off",
-        description="of a lifted or climbing body, after a joint that does not follow or the "
-        "operator's Ctrl-C: torque off, or hold_s with a low current first; all other trips switch "
-        "torque off at once",
+        description="reaction of a lifted or climbing body to a joint that does "
+        "not follow or to Ctrl-C: torque off, or hold_s with a low "
+        "current first; all other trips switch torque off at once",
     )
-    hold_s: float = Field(5.0, gt=0.0, le=60.0, description="how long on_trip = hold holds")
+    hold_s: float = Field(
+        5.0, gt=0.0, le=60.0, description="time for which on_trip = hold holds the joints"
+    )
     hold_current_a: float | None = Field(
-        None, gt=0.0, description="of each joint while it holds; default: 0.2 of its stall current"
+        None,
+        gt=0.0,
+        description="current of each joint while on_trip = hold holds it; default: "
+        "0.2 of its stall current",
     )
     stop_output: str | None = Field(
         None,
@@ -211,23 +262,37 @@ class SafetyConfig(Strict):
         "of a serial port, -rts:PORT or -dtr:PORT clears it, command:/PROGRAM ARGUMENT starts a "
         "program; a simulated run opens the simulated supply",
     )
-    advance_fraction: float = Field(0.5, ge=0.0, lt=1.0, description="alarm below this share")
-    watchdog_s: float = Field(0.2, ge=0.02, le=2.54, description="register 98, 20 ms steps")
+    advance_fraction: float = Field(
+        0.5,
+        ge=0.0,
+        lt=1.0,
+        description="share of the expected advance below which the run raises an alarm",
+    )
+    watchdog_s: float = Field(
+        0.2,
+        ge=0.02,
+        le=2.54,
+        description="time without instructions after which servos stop by "
+        "themselves (register 98, in steps of 20 ms)",
+    )
     recovery: Literal["stop", "confirm", "resume"] = Field(
-        "stop", description="after a vanished port or a rebooted servo: torque off, ask, or go on"
+        "stop",
+        description="reaction to a vanished port or a rebooted servo: torque off, ask, or go on",
     )
     lost_observer: Literal["stop", "warn"] = Field(
         "stop",
-        description="when the page, the ROS node or the gamepad, each with an E-STOP, ends or does "
-        "not respond during a run: torque off, or a warning",
+        description="reaction if a page, ROS node or gamepad with an E-STOP ends "
+        "or does not respond: torque off, or a warning",
     )
-    recovery_time_s: float = Field(10.0, gt=0.0, description="how long it is waited for")
+    recovery_time_s: float = Field(
+        10.0, gt=0.0, description="time to wait for a vanished port or a rebooted servo"
+    )
     overload_reboots: int = Field(
         0,
         ge=0,
         le=10,
-        description="how often in a run a servo that an overload has shut down is rebooted, set up "
-        "again and moved on slowly; 0: torque off",
+        description="number of times per run that a servo in overload shutdown is "
+        "rebooted and moved on slowly; 0: torque off",
     )
 
     def following_limits_rad(self, robot: RobotConfig) -> tuple[float, ...]:
@@ -262,17 +327,23 @@ class DeviationConfig(Strict):
     """Differences of a simulated robot and its ground from the values that plan and motion use."""
 
     friction_along: float = Field(
-        1.0, gt=0.0, le=10.0, description="along the body over the world's, forward and backward"
+        1.0,
+        gt=0.0,
+        le=10.0,
+        description="factor on the world's friction along the body, forward and backward",
     )
     friction_across: float = Field(
-        1.0, gt=0.0, le=10.0, description="across the body over the world's"
+        1.0, gt=0.0, le=10.0, description="factor on the world's friction across the body"
     )
     friction_law: LawName | None = Field(
         None, description="law of friction of the ground; default: the world's"
     )
-    mass: float = Field(1.0, gt=0.0, le=10.0, description="of every link over the robot's")
+    mass: float = Field(1.0, gt=0.0, le=10.0, description="factor on the mass of every link")
     torque: float = Field(
-        1.0, gt=0.0, le=10.0, description="of every servo for a current, over its model's"
+        1.0,
+        gt=0.0,
+        le=10.0,
+        description="factor on the torque that every servo gives for a current",
     )
     drawn: bool = Field(
         False,
@@ -295,11 +366,13 @@ class RunConfig(Strict):
     waypoints_m: tuple[tuple[Place, Place], ...] = Field(
         (),
         max_length=1000,
-        description="in order; playback and source need none; with them a gait of legs is steered "
-        "along its path",
+        description="waypoints in their order; playback and source need no "
+        "waypoints; a gait of legs follows the path through them",
     )
-    start_m: tuple[Place, Place] = Field((0.0, 0.0), description="where the head starts")
-    start_heading_rad: float | None = Field(None, description="default: towards the path")
+    start_m: tuple[Place, Place] = Field((0.0, 0.0), description="place of the head at the start")
+    start_heading_rad: float | None = Field(
+        None, description="heading of the body at the start; default: towards the path"
+    )
     waypoint_radius_m: float = Field(
         0.3, gt=0.0, description="distance from a waypoint at which it counts as reached"
     )

@@ -15,9 +15,13 @@ class ScheduleConfig(Strict):
     Below the half of the slowest action's speed the body rests, below nought it goes back.
     """
 
-    speed_m_s: Annotated[Curve, Knots] = Field(0.4, description="wanted")
-    turn_rad_s: Annotated[Curve, Knots] = Field(0.0, description="wanted, positive to the left")
-    duration_s: float = Field(MOTION_S, gt=0.0, description="then it comes to rest")
+    speed_m_s: Annotated[Curve, Knots] = Field(0.4, description="requested speed along the body")
+    turn_rad_s: Annotated[Curve, Knots] = Field(
+        0.0, description="requested turn rate, positive to the left"
+    )
+    duration_s: float = Field(
+        MOTION_S, gt=0.0, description="duration of the motion, after which the robot comes to rest"
+    )
 
 
 class RepertoireConfig(ScheduleConfig):
@@ -27,6 +31,6 @@ class RepertoireConfig(ScheduleConfig):
     patience: int | None = Field(
         None,
         ge=1,
-        description="cycles of an action after which another one of its kind follows; "
-        "default: it stays",
+        description="number of cycles after which another action of the same kind "
+        "follows; default: no change",
     )

@@ -198,8 +198,8 @@ class UnitsRow(Strict):
 class MotorRow(Strict):
     """Motor and gears at the output shaft, at the recommended voltage."""
 
-    nominal_v: float = Field(gt=0.0, le=60.0, description="recommended supply")
-    voltage_v: tuple[float, float] = Field(description="lowest and highest supply")
+    nominal_v: float = Field(gt=0.0, le=60.0, description="recommended supply voltage")
+    voltage_v: tuple[float, float] = Field(description="lowest and highest supply voltage")
     stall_torque_n_m: float = Field(
         gt=0.0, le=1000.0, description="torque at which the servo does not turn"
     )
@@ -218,7 +218,9 @@ class MotorRow(Strict):
     winding_k_per_w: float = Field(
         gt=0.0, description="heating of the temperature sensor for each watt of loss"
     )
-    thermal_time_s: float = Field(gt=0.0, description="time constant of that heating")
+    thermal_time_s: float = Field(
+        gt=0.0, description="time constant of the heating of the temperature sensor"
+    )
 
     @model_validator(mode="after")
     def _voltages_are_in_order(self) -> Self:
@@ -238,9 +240,15 @@ class FrictionRow(Strict):
     dry_n_m: float = Field(0.0, ge=0.0, description="friction without load")
     viscous_n_m_s: float = Field(0.0, ge=0.0, description="friction torque per rad/s of speed")
     stribeck_n_m: float = Field(0.0, ge=0.0, description="additional friction of a slow shaft")
-    stribeck_rad_s: float = Field(0.3, gt=0.0, description="speed at which that has faded")
-    by_motor: float = Field(0.0, ge=0.0, lt=1.0, description="share of the motor's torque")
-    by_load: float = Field(0.0, ge=0.0, lt=1.0, description="share of the load's torque")
+    stribeck_rad_s: float = Field(
+        0.3, gt=0.0, description="speed at which the additional friction of a slow shaft has faded"
+    )
+    by_motor: float = Field(
+        0.0, ge=0.0, lt=1.0, description="friction as a share of the motor's torque"
+    )
+    by_load: float = Field(
+        0.0, ge=0.0, lt=1.0, description="friction as a share of the load's torque"
+    )
     by_load_slow: float = Field(
         0.0, ge=0.0, lt=1.0, description="additional share of the load's torque of a slow shaft"
     )
@@ -250,19 +258,21 @@ class ServoModel(Strict):
     """Control table, units and motor of one model."""
 
     model: ModelName = Field(description="name as printed on the servo, in capitals")
-    model_number: int = Field(ge=0, le=0xFFFF, description="register 0")
+    model_number: int = Field(ge=0, le=0xFFFF, description="model number (register 0)")
     like: str | None = Field(
         None,
-        description="name, or file, of a model whose keys and registers hold where this file gives "
-        "none; source and [friction] are not taken over",
+        description="name or file of a model whose keys and registers this file "
+        "adopts if it does not set them, except source and [friction]",
     )
     without: tuple[str, ...] = Field(
-        (), description="registers of that model that this model lacks"
+        (), description="registers of the model `like` that this model lacks"
     )
     protocol: Literal[1, 2, "feetech"] = Field(
-        2, description='DYNAMIXEL Protocol 1.0 or 2.0, or "feetech"'
+        2, description='protocol of the servo: DYNAMIXEL 1.0 or 2.0, or "feetech"'
     )
-    byte_order: Literal["little", "big"] = Field("little", description="of registers of 2 bytes")
+    byte_order: Literal["little", "big"] = Field(
+        "little", description="byte order of registers of 2 bytes"
+    )
     sync_read: bool = Field(True, description="whether a Feetech servo has sync read")
     source: str = Field(
         min_length=1, description="documents with these figures; mark your own with (ours)"
@@ -290,7 +300,7 @@ class ServoModel(Strict):
         None, description="a table [friction]; default: not measured"
     )
     registers: dict[str, RegisterRow] = Field(
-        min_length=2, description="a table [registers]: a row by the name of each register"
+        min_length=2, description="table of the registers: a row by the name of each register"
     )
 
     @model_validator(mode="after")

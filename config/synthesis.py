@@ -69,9 +69,15 @@ class WavesConfig(Strict):
     All 0: the states are those of the recording, and random ones like them.
     """
 
-    long: float = Field(0.0, ge=0.0, description="part with coefficients 1-2: Fig. 13 (a)")
-    medium: float = Field(0.0, ge=0.0, description="part with coefficients 3-4: (b)")
-    short: float = Field(0.0, ge=0.0, description="part with coefficients 5-7: (c)")
+    long: float = Field(
+        0.0, ge=0.0, description="part of the long waves, coefficients 1-2: Fig. 13 (a)"
+    )
+    medium: float = Field(
+        0.0, ge=0.0, description="part of the medium waves, coefficients 3-4: Fig. 13 (b)"
+    )
+    short: float = Field(
+        0.0, ge=0.0, description="part of the short waves, coefficients 5-7: Fig. 13 (c)"
+    )
     energy_share: float = Field(
         0.9, gt=0.0, le=1.0, description="least share of a state's energy in its coefficients"
     )
@@ -99,11 +105,14 @@ class SynthesisConfig(Strict):
     The constants of the speed law are those of [PT] 2.6.3, in a unit of length that is declared.
     """
 
-    rate_hz: float = Field(25.0, ge=5.0, le=1000.0, description="frames a second")
-    coefficients: int = Field(7, ge=1, le=20, description="of a state")
+    rate_hz: float = Field(25.0, ge=5.0, le=1000.0, description="number of frames per second")
+    coefficients: int = Field(
+        7, ge=1, le=20, description="number of principal components of a state"
+    )
     for_robot: bool = Field(
         True,
-        description="states that the robot can make and that push; else all but self-contact",
+        description="use only states that the robot can make and that push; "
+        "otherwise all without self-contact",
     )
     state_share: float | None = Field(
         None,
@@ -118,33 +127,49 @@ class SynthesisConfig(Strict):
         "place in the plane and get the ground's height, which stretches segments on slopes",
     )
     target_spacing_m: float = Field(
-        0.6, gt=0.05, description="between targets on the path, in addition to the waypoints"
+        0.6,
+        gt=0.05,
+        description="distance between targets on the path, in addition to the waypoints",
     )
-    length_unit_m: float = Field(0.1, gt=0.0, description="in which the four constants are")
-    viscous: float = Field(1.0, gt=0.0, description="c1")
-    coulomb: float = Field(0.5, ge=0.0, description="c2")
-    bend: float = Field(6.0, ge=0.0, description="c3, per radian of the bends' deviation K")
-    turn: float = Field(1.0, ge=0.0, lt=2.0, description="c4, per rad/s of turning")
-    sliding: _Share = Field(0.0, description="w_d: share of the pulse lost; at 1 the body glides")
+    length_unit_m: float = Field(
+        0.1, gt=0.0, description="unit of length of the constants c1 to c4"
+    )
+    viscous: float = Field(1.0, gt=0.0, description="viscous friction c1 of the speed law")
+    coulomb: float = Field(0.5, ge=0.0, description="Coulomb friction c2 of the speed law")
+    bend: float = Field(
+        6.0, ge=0.0, description="loss c3 of the speed law per radian of the bends' deviation K"
+    )
+    turn: float = Field(
+        1.0, ge=0.0, lt=2.0, description="loss c4 of the speed law per rad/s of turning"
+    )
+    sliding: _Share = Field(
+        0.0, description="share w_d of the pulse that is lost by sliding; at 1 the body glides"
+    )
     sliding_along: Annotated[Along, _Along] = Field(
-        (1.0,), description="factors of w_d, head to tail"
+        (1.0,), description="factors on w_d from head to tail"
     )
     pulse_m_s: Annotated[Curve, Knots, _within(-10.0, 10.0)] = Field(
-        0.0, description="g: pulse in addition to the body's speed"
+        0.0, description="speed g of the pulse in addition to the body's speed"
     )
-    pulse_along: Annotated[Along, _Along] = Field((1.0,), description="factors of g, head to tail")
+    pulse_along: Annotated[Along, _Along] = Field(
+        (1.0,), description="factors on g from head to tail"
+    )
     pulse_spread_m_s: float = Field(
         0.0, ge=0.0, le=10.0, description="bound of a random g, constant on parts of the body"
     )
-    pulse_parts: int = Field(5, ge=1, le=100, description="of the body, for the random g")
+    pulse_parts: int = Field(
+        5, ge=1, le=100, description="number of parts of the body with a random g each"
+    )
     pulse_step_m_s: float = Field(
-        0.005, gt=0.0, description="bound of its change from part to part and frame to frame"
+        0.005, gt=0.0, description="largest change of a random g between parts and between frames"
     )
     waves: WavesConfig = WavesConfig()
-    head_held: _Share = Field(0.0, description="how far the head points where the body heads")
-    calm_tail: _Share = Field(0.0, description="how far the tail's bends are flattened")
+    head_held: _Share = Field(
+        0.0, description="share by which the head points along the body's heading"
+    )
+    calm_tail: _Share = Field(0.0, description="share by which the bends of the tail are flattened")
     tongue_speed: Annotated[Curve, Knots, _within(0.4, 2.5)] = Field(
-        1.0, description="b_st: how fast the tongue flicks"
+        1.0, description="speed factor b_st of the tongue's flicks"
     )
 
     @model_validator(mode="after")

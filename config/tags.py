@@ -15,7 +15,7 @@ class TagMount(Strict):
     """
 
     id: int = Field(ge=0, le=10_000, description="number of the tag in its dictionary")
-    link: int = Field(ge=0, description="of the spine, that carries the tag; 0 is the head")
+    link: int = Field(ge=0, description="link of the spine that carries the tag; 0 is the head")
     offset_m: Metres3 = Field(
         description="middle of the tag from the link's centre: forward, left, up"
     )
@@ -32,15 +32,18 @@ class TagsConfig(Strict):
     dictionary: str = Field(
         "APRILTAG_36h11",
         pattern=r"^[A-Za-z0-9_]+$",
-        description="of OpenCV, without the prefix DICT_; for example 4X4_50 or APRILTAG_36h11",
+        description="tag dictionary of OpenCV without the prefix DICT_, for "
+        "example 4X4_50 or APRILTAG_36h11",
     )
     side_m: float = Field(
         0.04, gt=0.002, le=1.0, description="side of a tag: its black border, without the margin"
     )
     noise_px: float = Field(
-        0.5, gt=0.01, le=20.0, description="standard deviation of a corner in the picture"
+        0.5, gt=0.01, le=20.0, description="standard deviation of a tag's corner in the picture"
     )
-    on: tuple[TagMount, ...] = Field(min_length=1, description="one for each tag")
+    on: tuple[TagMount, ...] = Field(
+        min_length=1, description="tables of the tags on the robot, one for each tag"
+    )
 
     @model_validator(mode="after")
     def _each_once(self) -> Self:
@@ -62,5 +65,8 @@ class FixedTag(Strict):
         "print's right points along x",
     )
     side_m: float | None = Field(
-        None, gt=0.002, le=5.0, description="side of the tag; default: that of the robot's tags"
+        None,
+        gt=0.002,
+        le=5.0,
+        description="side length of the tag; default: that of the robot's tags",
     )

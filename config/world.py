@@ -12,16 +12,20 @@ from snakewalk.config.friction_law import LAWS, LawName
 class FrictionConfig(Strict):
     """Friction of the belly: along the body, forward and back, and across it; and its law."""
 
-    along: float = Field(0.1, gt=0.0, le=5.0, description="sliding forward")
+    along: float = Field(0.1, gt=0.0, le=5.0, description="friction coefficient of sliding forward")
     across: float = Field(0.7, gt=0.0, le=5.0, description="friction coefficient across the body")
     back: float | None = Field(
-        None, gt=0.0, le=5.0, description="sliding backward, as scales resist; default: as forward"
+        None,
+        gt=0.0,
+        le=5.0,
+        description="friction coefficient of sliding backward, which scales "
+        "resist; default: as forward",
     )
 
     law: LawName | None = Field(
         None,
-        description="how both coefficients act on a link that slides obliquely (docs/physics.md);"
-        " default: the ellipse, reported as assumed",
+        description="friction law of a link that slides obliquely "
+        "(docs/physics.md); default: the ellipse, reported as assumed",
     )
 
     @property
@@ -79,7 +83,7 @@ class MapGround(Strict):
 
     kind: Literal["map"] = "map"
     source: str = Field(description="an .npz with z_m, known, spacing_m, x0_m, y0_m")
-    vertical_scale: float = Field(1.0, gt=0.0, le=100.0, description="of the file's heights")
+    vertical_scale: float = Field(1.0, gt=0.0, le=100.0, description="factor on the file's heights")
 
     def with_relief(self, factor: float) -> Self:
         """Return the ground with its heights times ``factor``."""
@@ -91,9 +95,16 @@ class RampGround(Strict):
 
     kind: Literal["ramp"] = "ramp"
     slope_rad: float = Field(gt=0.0, le=1.0, description="angle of the ramp from the horizontal")
-    length_m: float = Field(4.0, gt=0.0, le=50.0, description="of the slope, measured level")
-    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of the run-in, and of the top")
-    width_m: float = Field(8.0, gt=0.5, le=50.0, description="across, along y")
+    length_m: float = Field(
+        4.0, gt=0.0, le=50.0, description="length of the slope, measured horizontally"
+    )
+    level_m: float = Field(
+        2.0,
+        ge=0.1,
+        le=50.0,
+        description="length of the level ground before the slope, and of the top",
+    )
+    width_m: float = Field(8.0, gt=0.5, le=50.0, description="width of the ground along y")
     spacing_m: float = Field(0.1, ge=0.005, le=0.5, description="distance between samples")
 
     def with_relief(self, factor: float) -> Self:
@@ -110,12 +121,14 @@ class RandomGround(Strict):
     """
 
     kind: Literal["random"] = "random"
-    rms_slope_rad: float = Field(gt=0.0, le=1.0, description="arctan of the RMS gradient")
-    correlation_m: float = Field(
-        gt=0.0, le=10.0, description="where the heights' autocorrelation is 1/e"
+    rms_slope_rad: float = Field(
+        gt=0.0, le=1.0, description="RMS slope of the ground: arctan of the RMS gradient"
     )
-    seed: int = Field(0, ge=0, description="of the ground, not of the run")
-    size_m: float = Field(8.0, gt=0.5, le=50.0, description="edge of the square")
+    correlation_m: float = Field(
+        gt=0.0, le=10.0, description="distance at which the autocorrelation of the heights is 1/e"
+    )
+    seed: int = Field(0, ge=0, description="seed of the ground, independent of the run's")
+    size_m: float = Field(8.0, gt=0.5, le=50.0, description="edge length of the square ground")
     spacing_m: float = Field(0.03, ge=0.005, le=0.5, description="distance between samples")
 
     @model_validator(mode="after")
@@ -138,14 +151,17 @@ class StepsGround(Strict):
     """
 
     kind: Literal["steps"] = "steps"
-    height_m: float = Field(gt=0.0, le=1.0, description="of each riser")
-    tread_m: float = Field(gt=0.0, le=10.0, description="riser to riser")
-    count: int = Field(ge=1, le=100, description="number of risers")
+    height_m: float = Field(gt=0.0, le=1.0, description="height of each step")
+    tread_m: float = Field(gt=0.0, le=10.0, description="distance from step to step")
+    count: int = Field(ge=1, le=100, description="number of steps")
     pattern: Literal["up", "up-down"] = Field(
-        "up-down", description="a staircase, or one step up and one down in turn"
+        "up-down",
+        description="arrangement of the steps: a staircase, or one up and one down in turn",
     )
-    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of each level end")
-    width_m: float = Field(3.0, gt=0.5, le=50.0, description="across, along y")
+    level_m: float = Field(
+        2.0, ge=0.1, le=50.0, description="length of the level ground at each end"
+    )
+    width_m: float = Field(3.0, gt=0.5, le=50.0, description="width of the ground along y")
     spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
 
     @model_validator(mode="after")
@@ -167,12 +183,16 @@ class GapsGround(Strict):
     """
 
     kind: Literal["gaps"] = "gaps"
-    width_m: float = Field(gt=0.0, le=2.0, description="of each trench, edge to edge")
+    width_m: float = Field(gt=0.0, le=2.0, description="width of each trench, edge to edge")
     depth_m: float = Field(gt=0.0, le=2.0, description="depth of a trench")
-    distance_m: float = Field(gt=0.0, le=10.0, description="from a trench's middle to the next")
+    distance_m: float = Field(
+        gt=0.0, le=10.0, description="distance between the middles of neighbouring trenches"
+    )
     count: int = Field(ge=1, le=100, description="number of trenches")
-    level_m: float = Field(2.0, ge=0.1, le=50.0, description="of each level end")
-    across_m: float = Field(3.0, gt=0.5, le=50.0, description="extent along y")
+    level_m: float = Field(
+        2.0, ge=0.1, le=50.0, description="length of the level ground at each end"
+    )
+    across_m: float = Field(3.0, gt=0.5, le=50.0, description="extent of the ground along y")
     spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
 
     @model_validator(mode="after")
@@ -195,18 +215,31 @@ class Water(Strict):
     Modeling of underwater snake robots, ICRA 2014.
     """
 
-    depth_m: float = Field(0.6, gt=0.1, description="of the water, where it is deepest")
+    depth_m: float = Field(0.6, gt=0.1, description="largest depth of the water")
     density_kg_m3: float = Field(1000.0, gt=0.0, le=3000.0, description="density of the water")
-    drag_across: float = Field(2.0, ge=0.0, le=5.0, description="coefficient of the cross-flow")
-    drag_along: float = Field(0.03, ge=0.0, le=1.0, description="coefficient of the skin")
+    drag_across: float = Field(
+        2.0, ge=0.0, le=5.0, description="drag coefficient of flow across the body"
+    )
+    drag_along: float = Field(
+        0.03, ge=0.0, le=1.0, description="drag coefficient of flow along the body"
+    )
     linear_across_m_s: float = Field(
-        0.0, ge=0.0, le=10.0, description="speed across below which the linear drag is larger"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="speed across the body below which the linear drag is larger",
     )
     linear_along_m_s: float = Field(
-        0.0, ge=0.0, le=10.0, description="speed along below which the linear drag is larger"
+        0.0,
+        ge=0.0,
+        le=10.0,
+        description="speed along the body below which the linear drag is larger",
     )
     buoyancy: float = Field(
-        1.0, ge=0.0, le=5.0, description="of a link under water over its weight; 1: trimmed neutral"
+        1.0,
+        ge=0.0,
+        le=5.0,
+        description="buoyancy of a link under water divided by its weight; 1: neutral",
     )
 
 
@@ -221,11 +254,15 @@ class ShoreGround(Water):
     """A pool whose bottom rises along x to level land; the waterline is x = 0."""
 
     kind: Literal["shore"] = "shore"
-    slope_rad: float = Field(gt=0.0, le=1.0, description="of the beach, under water and above")
-    pool_m: float = Field(2.0, ge=0.1, le=50.0, description="of the pool's level bottom, along x")
-    land_m: float = Field(2.0, ge=0.1, le=50.0, description="of the level land, along x")
-    rise_m: float = Field(0.05, ge=0.0, le=5.0, description="of the land over the water")
-    width_m: float = Field(6.0, gt=0.5, le=50.0, description="across, along y")
+    slope_rad: float = Field(
+        gt=0.0, le=1.0, description="slope of the beach, below and above the water"
+    )
+    pool_m: float = Field(
+        2.0, ge=0.1, le=50.0, description="length of the pool's level bottom along x"
+    )
+    land_m: float = Field(2.0, ge=0.1, le=50.0, description="length of the level land along x")
+    rise_m: float = Field(0.05, ge=0.0, le=5.0, description="height of the land above the water")
+    width_m: float = Field(6.0, gt=0.5, le=50.0, description="width of the ground along y")
     spacing_m: float = Field(0.05, ge=0.005, le=0.5, description="distance between samples")
 
     def with_relief(self, factor: float) -> Self:
@@ -241,9 +278,17 @@ class PoleObstacle(Strict):
     kind: Literal["pole"] = "pole"
     radius_m: float = Field(gt=0.005, le=1.0, description="radius of the pole")
     length_m: float = Field(3.0, gt=0.1, le=50.0, description="length of the pole")
-    upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
-    at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of its middle")
-    friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
+    upright: bool = Field(
+        True,
+        description="whether it rises from the floor; otherwise it lies along x above the floor",
+    )
+    at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of the obstacle's middle")
+    friction: float = Field(
+        0.8,
+        gt=0.0,
+        le=5.0,
+        description="friction coefficient of the obstacle, equal in all directions",
+    )
 
     def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether no body can be at this place of the floor."""
@@ -254,11 +299,19 @@ class PipeObstacle(Strict):
     """A round pipe to climb or creep through inside; the body starts in its middle."""
 
     kind: Literal["pipe"] = "pipe"
-    radius_m: float = Field(gt=0.02, le=1.0, description="inner")
+    radius_m: float = Field(gt=0.02, le=1.0, description="inner radius of the pipe")
     length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the pipe")
-    upright: bool = Field(True, description="from the floor up; otherwise along x, off the floor")
-    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
-    friction: float = Field(0.8, gt=0.0, le=5.0, description="the same in all directions")
+    upright: bool = Field(
+        True,
+        description="whether it rises from the floor; otherwise it lies along x above the floor",
+    )
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
+    friction: float = Field(
+        0.8,
+        gt=0.0,
+        le=5.0,
+        description="friction coefficient of the obstacle, equal in all directions",
+    )
 
     def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether this place is unreachable: nothing enters the pipe from outside."""
@@ -269,16 +322,25 @@ class PegsObstacle(Strict):
     """A board of upright pegs to push off: rows across x, as far apart as pegs in a row."""
 
     kind: Literal["pegs"] = "pegs"
-    radius_m: float = Field(0.03, gt=0.002, le=1.0, description="of a peg")
-    height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
-    spacing_m: float = Field(gt=0.0, le=10.0, description="from peg to peg in a row, along y")
-    rows: int = Field(ge=1, le=100, description="number of rows, along x")
-    row_pegs: int = Field(ge=1, le=100, description="pegs in a row")
+    radius_m: float = Field(0.03, gt=0.002, le=1.0, description="radius of a peg")
+    height_m: float = Field(0.15, gt=0.01, le=5.0, description="height above z = 0")
+    spacing_m: float = Field(
+        gt=0.0, le=10.0, description="distance from peg to peg in a row along y"
+    )
+    rows: int = Field(ge=1, le=100, description="number of rows of pegs along x")
+    row_pegs: int = Field(ge=1, le=100, description="number of pegs in a row")
     pattern: Literal["square", "hexagonal"] = Field(
-        "hexagonal", description="hexagonal: every other row is shifted by half a spacing"
+        "hexagonal",
+        description="arrangement of the pegs; hexagonal: every other row is "
+        "shifted by half a spacing",
     )
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the board's middle")
-    friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
+    friction: float = Field(
+        0.3,
+        ge=0.0,
+        le=5.0,
+        description="friction coefficient of the obstacle, equal in all directions",
+    )
 
     @model_validator(mode="after")
     def _pegs_are_apart(self) -> Self:
@@ -312,11 +374,16 @@ class CorridorObstacle(Strict):
     """Two upright walls along x with a way between them."""
 
     kind: Literal["corridor"] = "corridor"
-    width_m: float = Field(gt=0.01, le=50.0, description="between the walls")
+    width_m: float = Field(gt=0.01, le=50.0, description="distance between the walls")
     length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the walls")
-    height_m: float = Field(0.15, gt=0.01, le=5.0, description="over z = 0")
-    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of its middle")
-    friction: float = Field(0.3, ge=0.0, le=5.0, description="the same in all directions")
+    height_m: float = Field(0.15, gt=0.01, le=5.0, description="height above z = 0")
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
+    friction: float = Field(
+        0.3,
+        ge=0.0,
+        le=5.0,
+        description="friction coefficient of the obstacle, equal in all directions",
+    )
 
     def is_blocked_at(self, x_m: float, y_m: float) -> bool:
         """Whether a wall is at this place of the floor."""
@@ -329,7 +396,10 @@ class PlannerConfig(Strict):
     """Where a path may go ([PT] 2.6.1)."""
 
     variance_window_m: float = Field(
-        0.3, gt=0.0, le=10.0, description="radius of the elevation variance"
+        0.3,
+        gt=0.0,
+        le=10.0,
+        description="radius of the disc in which the variance of height is measured",
     )
     variance_limit_m2: float = Field(
         4e-4, gt=0.0, description="largest variance of height on a path"
@@ -338,7 +408,9 @@ class PlannerConfig(Strict):
         0.1, gt=0.0, le=10.0, description="radius of the plane fitted for slope"
     )
     slope_limit_rad: float = Field(0.35, gt=0.0, lt=1.5, description="steepest slope on a path")
-    length_weight: float = Field(3e-3, gt=0.0, description="metres of path against variance")
+    length_weight: float = Field(
+        3e-3, gt=0.0, description="weight of the path's length against the variance of height"
+    )
     footprint_m: float = Field(
         0.6,
         gt=0.0,
@@ -349,22 +421,36 @@ class PlannerConfig(Strict):
         0.2, gt=0.0, lt=1.5, description="steepest slope under the footprint that the body climbs"
     )
     climb_weight: float = Field(
-        1.0, ge=0.0, description="metres of level path that a metre up at the limit costs more"
+        1.0,
+        ge=0.0,
+        description="additional cost of a metre uphill at climb_limit_rad, in metres of level path",
     )
-    side_weight: float = Field(1.0, ge=0.0, description="the same for a side slope at that limit")
+    side_weight: float = Field(
+        1.0,
+        ge=0.0,
+        description="additional cost of a metre on a side slope at "
+        "climb_limit_rad, in metres of level path",
+    )
     clearance_m: float = Field(
-        0.6, ge=0.0, description="wanted to ground that cannot be climbed: half a body"
+        0.6,
+        ge=0.0,
+        description="requested distance from ground that the body cannot climb, about half a body",
     )
     clearance_weight: float = Field(
-        1.0, ge=0.0, description="metres of level path that a metre at such ground costs more"
+        1.0,
+        ge=0.0,
+        description="additional cost of a metre next to ground that the body "
+        "cannot climb, in metres of level path",
     )
     node_spacing_m: float = Field(
         0.15, ge=0.02, description="distance between places that a path may join"
     )
     bend_radius_m: float = Field(
-        0.4, ge=0.0, le=100.0, description="wanted of every bend, where possible"
+        0.4, ge=0.0, le=100.0, description="requested radius of every bend, where possible"
     )
-    edge_margin_m: float = Field(0.3, ge=0.0, description="kept free along the border")
+    edge_margin_m: float = Field(
+        0.3, ge=0.0, description="width of the border of the ground that the path avoids"
+    )
 
 
 ReliefGround = (

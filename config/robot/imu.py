@@ -18,19 +18,22 @@ class ImuConfig(Strict):
     The noise and the bias are those of the simulated device; on servos they are what they are.
     """
 
-    model: ImuModel = Field("imu_to_dxl", description="which of the two public tables it has")
-    id: int = Field(200, ge=0, le=LAST_ID, description="its ID on the bus")
-    link: int = Field(0, ge=0, description="of the spine, in which it sits; 0 is the head")
+    model: ImuModel = Field(
+        "imu_to_dxl", description="model of the IMU, which selects one of two public control tables"
+    )
+    id: int = Field(200, ge=0, le=LAST_ID, description="ID of the IMU on the bus")
+    link: int = Field(0, ge=0, description="link of the spine that contains the IMU; 0 is the head")
     mounting_deg: Degrees3 = Field(
         (0.0, 0.0, 0.0),
-        description="roll, pitch and yaw of its axes in the link's (forward, left, up), turned "
-        "about the link's axes in this order",
+        description="roll, pitch and yaw of the IMU's axes in the link's (forward, "
+        "left, up), turned about the link's axes in this order",
     )
     gyro_range_dps: float | None = Field(
         None,
         gt=0.0,
         le=4000.0,
-        description="rate of 32768 counts; required for FFW-G40-IMU, whose table leaves it open",
+        description="turn rate of 32768 counts; required for FFW-G40-IMU, whose "
+        "control table does not state it",
     )
     acceleration_range_g: float | None = Field(
         None,
@@ -39,13 +42,22 @@ class ImuConfig(Strict):
         description="acceleration of 32768 counts; required for FFW-G40-IMU",
     )
     gyro_bias_dps: float = Field(
-        0.1, ge=0.0, le=10.0, description="standard deviation of a constant error, in simulation"
+        0.1,
+        ge=0.0,
+        le=10.0,
+        description="standard deviation of the gyroscope's constant error, in simulation",
     )
     gyro_noise_dps: float = Field(
-        0.05, ge=0.0, le=10.0, description="standard deviation of a reading, in simulation"
+        0.05,
+        ge=0.0,
+        le=10.0,
+        description="standard deviation of a reading of the gyroscope, in simulation",
     )
     acceleration_noise_m_s2: float = Field(
-        0.05, ge=0.0, le=10.0, description="standard deviation of a reading, in simulation"
+        0.05,
+        ge=0.0,
+        le=10.0,
+        description="standard deviation of a reading of the accelerometer, in simulation",
     )
 
     @model_validator(mode="after")

@@ -17,44 +17,74 @@ class JointConfig(Strict):
         None,
         max_length=60,
         pattern=JOINT_NAME_PATTERN,
-        description="in messages, tables and ROS: letters, digits and _; default: axis and place "
-        "from the head, such as yaw_03",
+        description="name of the joint in messages, tables and ROS: letters, "
+        "digits and _; default: axis and place from the head, such as "
+        "yaw_03",
     )
     axis: Literal["y", "p"] | None = Field(
-        None, description="y = yaw, p = pitch; required for every joint unless joint_axes is given"
+        None,
+        description="axis of the joint: y = yaw, p = pitch; required unless joint_axes is given",
     )
     id: int | None = Field(
-        None, ge=0, le=LAST_ID, description="ID of its servo; default: counted from servo.first_id"
+        None,
+        ge=0,
+        le=LAST_ID,
+        description="ID of the joint's servo; default: counted from servo.first_id",
     )
-    model: str | None = Field(None, description="default: servo.model")
-    sign: Literal[1, -1] = Field(1, description="-1 if its servo is mounted the other way round")
+    model: str | None = Field(None, description="model of the joint's servo; default: servo.model")
+    sign: Literal[1, -1] = Field(
+        1,
+        description="direction of the joint's servo: 1, or -1 if it is mounted the other way round",
+    )
     zero_rad: float = Field(
         0.0,
         ge=-math.pi,
         le=math.pi,
-        description="angle of its servo, from the servo's zero, when the joint is straight; "
-        "rounded to the nearest position of the servo",
+        description="angle of the joint's servo, from the servo's zero, if the "
+        "joint is straight; rounded to the nearest position",
     )
     limit_rad: float | None = Field(
-        None, gt=0.05, le=3.1, description="default: yaw_limit_rad or pitch_limit_rad"
+        None,
+        gt=0.05,
+        le=3.1,
+        description="largest angle of the joint to each side; default: "
+        "yaw_limit_rad or pitch_limit_rad",
     )
     position_p_gain: int | None = Field(
-        None, ge=0, le=16383, description="default: servo.position_p_gain or servo.pitch_p_gain"
+        None,
+        ge=0,
+        le=16383,
+        description="Position P Gain of the joint; default: servo.position_p_gain "
+        "or servo.pitch_p_gain",
     )
     position_i_gain: int | None = Field(
-        None, ge=0, le=16383, description="default: servo.position_i_gain"
+        None,
+        ge=0,
+        le=16383,
+        description="Position I Gain of the joint; default: servo.position_i_gain",
     )
     position_d_gain: int | None = Field(
-        None, ge=0, le=16383, description="default: servo.position_d_gain"
+        None,
+        ge=0,
+        le=16383,
+        description="Position D Gain of the joint; default: servo.position_d_gain",
     )
     current_limit_a: float | None = Field(
-        None, gt=0.0, description="for a pitch joint; default: servo.pitch_current_limit_a"
+        None,
+        gt=0.0,
+        description="Goal Current of a pitch joint; default: servo.pitch_current_limit_a",
     )
     armature_kg_m2: float | None = Field(
-        None, ge=0.0, le=1.0, description="default: servo.armature_kg_m2"
+        None,
+        ge=0.0,
+        le=1.0,
+        description="inertia of the joint's rotor and gears; default: servo.armature_kg_m2",
     )
     gear_drag_n_m_s: float | None = Field(
-        None, ge=0.0, le=10.0, description="default: servo.gear_drag_n_m_s"
+        None,
+        ge=0.0,
+        le=10.0,
+        description="viscous loss of the joint's gears; default: servo.gear_drag_n_m_s",
     )
 
     @model_serializer(mode="wrap")

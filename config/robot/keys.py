@@ -31,16 +31,21 @@ class RobotKeys(Strict):
     joint_axes: str = Field(
         "",
         pattern=r"^[yp]*$",
-        description="required, unless every joint of `[[joints]]` has its axis: one letter a joint "
-        "from the head, y = yaw, p = pitch",
+        description="axes of the joints from the head, one letter each: y = yaw, p "
+        "= pitch; required unless every joint of `[[joints]]` has its "
+        "axis",
     )
     joints: tuple[JointConfig, ...] = Field(
-        (), description="one for each joint, or none: then all are alike"
+        (), description="tables of the joints, one for each joint; default: all joints are equal"
     )
     links: tuple[LinkConfig, ...] = Field(
-        (), description="one for each link of the spine, or none: then all are alike"
+        (),
+        description="tables of the links of the spine, one for each link; default: "
+        "all links are equal",
     )
-    link_length_m: float = Field(0.07, gt=0.005, le=1.0, description="joint axis to joint axis")
+    link_length_m: float = Field(
+        0.07, gt=0.005, le=1.0, description="distance from joint axis to joint axis"
+    )
     body_radius_m: float = Field(
         0.03, gt=0.002, le=0.5, description="radius of the body, from its axis to the ground"
     )
@@ -52,15 +57,19 @@ class RobotKeys(Strict):
         "0.05 and at most 1; for the look and the ground step (snakewalk animal body measures it)",
     )
     belly: BellyConfig = BellyConfig()
-    link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="of each link")
+    link_mass_kg: float = Field(0.11, gt=0.0001, le=20.0, description="mass of each link")
     yaw_limit_rad: float = Field(
         1.5, gt=0.05, le=3.1, description="largest angle of a yaw joint to each side"
     )
     pitch_limit_rad: float = Field(
         1.2, gt=0.05, le=3.1, description="largest angle of a pitch joint up and down"
     )
-    joint_speed_limit_rad_s: float = Field(2.0, gt=0.0, description="limit of a plan")
-    joint_acceleration_limit_rad_s2: float = Field(25.0, gt=0.0, description="limit of a plan")
+    joint_speed_limit_rad_s: float = Field(
+        2.0, gt=0.0, description="largest speed of a joint in a plan"
+    )
+    joint_acceleration_limit_rad_s2: float = Field(
+        25.0, gt=0.0, description="largest acceleration of a joint in a plan"
+    )
     torque_limit_n_m: float = Field(2.0, gt=0.0, description="torque limit of a joint in a plan")
     limbs: tuple[LimbsConfig, ...] = Field(
         (), description="pairs of legs, from the tail to the head: tables [[limbs]]"
@@ -93,8 +102,9 @@ class RobotKeys(Strict):
     )
     ports: tuple[PortConfig, ...] = Field(
         (),
-        description="tables [[ports]], where segments of the chain are on adapters of their own, "
-        "for --port robot; default: all servos are on the one port of --port",
+        description="tables [[ports]] of segments of the chain with separate "
+        "adapters, for --port robot; default: all servos are on the "
+        "port of --port",
     )
 
 

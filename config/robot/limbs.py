@@ -18,13 +18,16 @@ class LimbsConfig(Strict):
     joint_axes: str = Field(
         "yr",
         pattern=r"^[yr]{1,4}$",
-        description="one letter a servo from the hip: y = yaw (swings), r = roll (lifts)",
+        description="axes of a leg's servos from the hip, one letter each: y = yaw "
+        "(swings), r = roll (lifts)",
     )
     hip_m: float = Field(
         0.03, ge=0.0, le=1.0, description="distance of the first joint from the spine's axis"
     )
     segments_m: tuple[float, ...] = Field(
-        (0.035, 0.09), description="lengths from joint to joint, the last to the middle of the foot"
+        (0.035, 0.09),
+        description="lengths of a leg's segments from joint to joint, the last to "
+        "the middle of the foot",
     )
     segment_mass_kg: float = Field(
         0.09, gt=0.001, le=20.0, description="mass of each segment of a leg"

@@ -38,11 +38,16 @@ class LinkConfig(Strict):
         None,
         ge=0.0,
         le=1.0,
-        description="joint axis to joint axis, for head and tail to the tip; 0 between the two "
-        "axes of a two-axis module; default: link_length_m",
+        description="length of the link between joint axes, for head and tail to "
+        "the tip; 0 between the axes of a two-axis module; default: "
+        "link_length_m",
     )
-    mass_kg: float | None = Field(None, gt=0.0001, le=20.0, description="default: link_mass_kg")
-    radius_m: float | None = Field(None, gt=0.002, le=0.5, description="default: body_radius_m")
+    mass_kg: float | None = Field(
+        None, gt=0.0001, le=20.0, description="mass of the link; default: link_mass_kg"
+    )
+    radius_m: float | None = Field(
+        None, gt=0.002, le=0.5, description="radius of the link; default: body_radius_m"
+    )
     shape: LinkShape | None = Field(
         None,
         description="shape that meets the ground; default: belly.shape, or none if length_m is 0",

@@ -40,5 +40,5 @@ class PortConfig(Strict):
         "these servos are simulated, and the others are real",
     )
     ids: tuple[int, ...] = Field(
-        min_length=1, description="of all servos on it, and of the IMU where it is on it"
+        min_length=1, description="IDs of all servos on the port, and of the IMU if it is there"
     )

@@ -11,20 +11,23 @@ class PowerConfig(Strict):
     """Cables between servos, leads of the supply, and its fuse (docs/how-to/chain-voltage.md)."""
 
     inject_ids: tuple[int, ...] = Field(
-        (), description="servos at which a lead of the supply ends; default: the first of the chain"
+        (),
+        description="IDs of the servos to which a lead of the supply goes; "
+        "default: the first of the chain",
     )
     cable_ohm: float = Field(
         0.055,
         gt=0.0,
         le=100.0,
-        description="of a cable between neighbours, both conductors and all four contacts: 180 mm "
-        "of AWG 21, and contacts of 10 milliohm, the most that new ones have",
+        description="resistance of a cable between neighbours with both conductors "
+        "and four contacts; default: 180 mm of AWG 21, and contacts of "
+        "10 milliohm",
     )
     cables_ohm: tuple[float, ...] = Field(
-        (), description="of each cable from the head, where they differ"
+        (), description="resistances of the cables from the head, if they differ"
     )
     lead_ohm: float = Field(
-        0.02, gt=0.0, le=100.0, description="of a lead from the supply, there and back"
+        0.02, gt=0.0, le=100.0, description="resistance of a lead from the supply, both conductors"
     )
 
     fuse_a: float | None = Field(

@@ -24,30 +24,36 @@ class ServoConfig(Strict):
     baud: Baud = Field(DEFAULT_BAUD, description="baud rate of the bus")
     supply_v: float = Field(12.0, ge=3.0, le=26.0, description="voltage of the servos' supply")
     supply_min_v: float | None = Field(
-        None, gt=0.0, description="a run stops below this; default: 10/12 of supply_v"
+        None,
+        gt=0.0,
+        description="supply voltage below which a run stops; default: 10/12 of supply_v",
     )
     supply_max_v: float | None = Field(
-        None, gt=0.0, description="a run stops above this; default: 14.8/12 of supply_v"
+        None,
+        gt=0.0,
+        description="supply voltage above which a run stops; default: 14.8/12 of supply_v",
     )
     over_current_a: float | None = Field(
         None,
         gt=0.0,
-        description="a run stops above this; default: 20/23 of the model's stall current",
+        description="servo current above which a run stops; default: 20/23 of the "
+        "model's stall current",
     )
-    position_p_gain: int = Field(800, ge=0, le=16383, description="register 84")
-    position_i_gain: int = Field(0, ge=0, le=16383, description="register 82")
-    position_d_gain: int = Field(0, ge=0, le=16383, description="register 80")
+    position_p_gain: int = Field(800, ge=0, le=16383, description="Position P Gain (register 84)")
+    position_i_gain: int = Field(0, ge=0, le=16383, description="Position I Gain (register 82)")
+    position_d_gain: int = Field(0, ge=0, le=16383, description="Position D Gain (register 80)")
     pitch_p_gain: int = Field(
         400,
         ge=0,
         le=16383,
-        description="register 84 of the pitch joints; a lower gain follows the ground",
+        description="Position P Gain of the pitch joints (register 84); a lower "
+        "gain follows the ground",
     )
     pitch_lead_s: float = Field(
         0.25, ge=0.0, le=2.0, description="lead of pitch goals, for filter and servo lag"
     )
     pitch_current_limit_a: float = Field(
-        0.1, gt=0.0, description="goal current of the pitch joints: current-based position mode"
+        0.1, gt=0.0, description="Goal Current of the pitch joints in current-based position mode"
     )
     armature_kg_m2: float = Field(
         0.045, ge=0.0, le=1.0, description="inertia of rotor and gears at the shaft, in simulation"

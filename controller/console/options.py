@@ -39,7 +39,7 @@ Assume = Annotated[
     typer.Option(help="KEY=VALUE: a value that the file does not state; may be repeated"),
 ]
 Workers = Annotated[int, typer.Option(min=1, help="number of processes")]
-Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row")]
+Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row of the table")]
 RunSeconds = Annotated[
     float, typer.Option(min=4.0, max=3600.0, help="duration of each run in seconds")
 ]

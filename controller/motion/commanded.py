@@ -299,7 +299,7 @@ class Commanded:
 
     def _copy_of_driven(self) -> VelocityGait:
         assert self._driven is not None
-        return self._driven.anew()
+        return self._driven.restarted()
 
     def _join(self, make: Callable[[], MotionSource], view: BodyView) -> None:
         """Join a source if every joint stays in its range; else move towards its first pose."""

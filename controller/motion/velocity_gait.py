@@ -110,7 +110,7 @@ class VelocityGait:
         if speed > 0.0:
             self._bend_rad = turn_rad_s * length_m / forward_m_s
 
-    def anew(self) -> "VelocityGait":
+    def restarted(self) -> "VelocityGait":
         """Return a copy at rest with the same commanded velocity."""
         fresh = copy(self)
         fresh._bend = RateLimiter(np.zeros(1), TURN_RATE_PER_S, TURN_PER_S2)

@@ -131,7 +131,7 @@ class ChangeWatch:
         self.reports.append(line)
 
     def restart(self) -> None:
-        """Begin anew: the chain has been set up."""
+        """Begin again: the chain has been set up."""
         self._cycles.clear()
         self._pending.clear()
         self._cold.clear()
@@ -265,7 +265,7 @@ class Rig:
         return state
 
     def restart(self) -> None:
-        """Forget what was held: the chain has been enabled anew."""
+        """Forget what was held: the chain has been enabled again."""
         self._seen, self._sent, self._steady = None, None, False
         self.changes.restart()
 

@@ -48,7 +48,7 @@ CONTEXT = PROGRAM.make_context("snakewalk", [], resilient_parsing=True)
 
 @cache
 def subcommand(group: Any, name: str) -> Any:
-    """Return a command of a group, which typer makes anew in each call."""
+    """Return a command of a group, which typer makes again in each call."""
     return group.get_command(CONTEXT, name)
 
 

@@ -65,15 +65,17 @@ def people(
         float, typer.Option(min=0.7, max=1.3, help="factor on the widths of the body")
     ] = 1.0,
     step_height: Annotated[
-        float, typer.Option(min=0.0, max=3.0, help="factor on H of Eq. 10, the height of a step")
+        float,
+        typer.Option(min=0.0, max=3.0, help="factor on the height of a step (H of [GC] Eq. 10)"),
     ] = 1.0,
     step_length: Annotated[
-        float, typer.Option(min=0.1, max=1.3, help="factor on L of Eq. 10, the length of a step")
+        float,
+        typer.Option(min=0.1, max=1.3, help="factor on the length of a step (L of [GC] Eq. 10)"),
     ] = 1.0,
     cycle: Annotated[
         float | None, typer.Option(min=0.2, max=10.0, help="duration of a cycle in seconds")
     ] = None,
-    cycles: Annotated[int, typer.Option(min=1, max=100, help="cycles in the film")] = 4,
+    cycles: Annotated[int, typer.Option(min=1, max=100, help="number of cycles in the film")] = 4,
     mesh: Annotated[
         Path | None,
         typer.Option(help="mesh of a person that gets the same motion (.obj, .glb)"),

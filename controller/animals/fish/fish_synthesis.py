@@ -137,7 +137,7 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         composed = compose(pieces, sequence, options.blend_s, around.start)
     motion = replace(
         composed,
-        name=f"{source.name}, put together anew",
+        name=f"{source.name}, recombined",
         source=source.source,
         licence=source.licence,
     )

@@ -107,7 +107,7 @@ def piece_graph(
 
     """
     if not segments:
-        raise InputError(f"{postures.name}: no segment to put together")
+        raise InputError(f"{postures.name}: contains no segment to join; match a longer film")
     rise = _rise(postures)
     pieces = [_piece(postures, segment, rise) for segment in segments]
     if mirror:

@@ -313,7 +313,7 @@ def _found(
     *,
     sweep: bool,
 ) -> ChainCalibration:
-    """Put together the robot and the notes.
+    """Compose the robot and the notes.
 
     Raises:
         InputError: a joint has no range to speak of, or its servo's turn ends within it.

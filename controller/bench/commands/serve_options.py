@@ -37,8 +37,8 @@ Tracker = Annotated[
     list[str] | None,
     typer.Option(
         metavar="KEY=VALUE",
-        help="errors of these poses: noise_m, noise_deg, delay_s, dropout_every_s, ...; may "
-        "be repeated",
+        help="errors of the published poses: noise_m, noise_deg, delay_s, dropout_every_s, ...; "
+        "may be repeated",
     ),
 ]
 TruthFile = Annotated[

@@ -18,7 +18,7 @@ Pattern = Annotated[
     str, typer.Option(help="pattern: charuco, which may be seen in part, or chessboard")
 ]
 Squares = Annotated[
-    str, typer.Option(help="number of squares across x down, also for a chessboard", metavar="NxM")
+    str, typer.Option(help="number of squares across and down, for both patterns", metavar="NxM")
 ]
 SquareMm = Annotated[float, typer.Option(help="side of a square in mm, as measured on the print")]
 DOTS = 300.0

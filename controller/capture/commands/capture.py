@@ -49,7 +49,7 @@ Review = Annotated[
 Corrections = Annotated[
     Path | None,
     typer.Option(
-        help="apply the corrections that the review page of TRACK.npz saved, and write -o",
+        help="apply the corrections that the review page saved, and write the track to --output",
         metavar="JSON",
     ),
 ]

@@ -110,10 +110,10 @@ def parse(path: Path, name: str = "", text: str | None = None) -> tuple[LineElem
         parser.Parse(raw, True)
         root = builder.close()
     except (expat.ExpatError, LookupError, AssertionError) as error:
-        mended = None if text is not None else _other_letters(raw)
-        if mended is None:
+        decoded = None if text is not None else _other_letters(raw)
+        if decoded is None:
             raise InputError(f"{path}: is no XML: {error}") from None
-        return parse(path, name, mended)[0], mended.count("\ufffd")
+        return parse(path, name, decoded)[0], decoded.count("\ufffd")
     assert isinstance(root, LineElement)
     return root, 0
 

@@ -61,10 +61,11 @@ HeightUnit = Annotated[
     ),
 ]
 Cell = Annotated[
-    float | None, typer.Option(help="distance between samples of a PNG, CSV or NPZ, in the unit")
+    float | None,
+    typer.Option(help="distance between samples of a PNG, CSV or NPZ, in the file's unit"),
 ]
 HeightStep = Annotated[
-    float | None, typer.Option(help="height of one step of the file's values, in the unit")
+    float | None, typer.Option(help="height per step of the file's values, in the file's unit")
 ]
 NoData = Annotated[float | None, typer.Option(help="value of empty cells, such as -9999 or nan")]
 PointOf = Annotated[

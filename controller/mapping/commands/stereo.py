@@ -41,10 +41,10 @@ Height = Annotated[
     typer.Option(help="height of the left camera above the ground in metres; default: fitted"),
 ]
 Tilt = Annotated[
-    float | None, typer.Option(help="downward tilt of its axis in degrees; default: fitted")
+    float | None, typer.Option(help="downward tilt of the left camera in degrees; default: fitted")
 ]
 Roll = Annotated[
-    float, typer.Option(help="rotation about its axis in degrees; positive: right side down")
+    float, typer.Option(help="roll of the left camera in degrees; positive: right side down")
 ]
 LevelGround = Annotated[
     bool,

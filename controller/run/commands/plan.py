@@ -58,19 +58,23 @@ def plan(
     beam: Annotated[
         int | None,
         typer.Option(
-            min=1, max=100_000, help="number of sequences to keep per round; default: 400"
+            min=1,
+            max=100_000,
+            help="number of action sequences that the search keeps per round; default: 400",
         ),
     ] = None,
     physics: Annotated[
         int,
         typer.Option(
-            min=0, help="number of candidates to simulate, to compare the computing times"
+            min=0, help="number of candidate plans to simulate, to compare computing times"
         ),
     ] = 0,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="write the sequence here as JSON")
+        Path | None, typer.Option("-o", "--out", help="write the planned actions here as JSON")
     ] = None,
-    carry: Annotated[bool, typer.Option("--run", help="run the sequence in the simulator")] = False,
+    carry: Annotated[
+        bool, typer.Option("--run", help="run the planned actions in the simulator")
+    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

@@ -1,6 +1,6 @@
 """Defects of dynamixel-sdk 4.1 that the drivers guard against: each shown, and us immune.
 
-The first half of each test fails on the day when the SDK is mended; then the guard may go.
+The first half of each test fails on the day when the SDK is repaired; then the guard may go.
 """
 
 import itertools
