@@ -32,7 +32,8 @@ from snakewalk.sim.servo.motor import gears_of, make_drive, motors_of, p_gain_pe
 
 RISE_S: Final = 1.0
 """Time in which the amplitudes of a wave rise from 0 (ours)."""
-_CYCLE_HZ: Final = 50.0
+_CYCLE_HZ: Final = 100.0
+"""Goals per second: steps of 20 ms would shake a stiff body, and water resists by the square."""
 _PENDULUM_S: Final = 6.0
 """Duration of BAM's trajectories."""
 _SETTLED_S: Final = 1.0

@@ -39,9 +39,10 @@ _LIMITS: Final = """
   measured friction, so no row decides which law of friction holds.
 - Each source has one robot or one animal.
 - No row has joint angles that a DYNAMIXEL snake measured. The repository VanguardDream/snake_RL
-  (GitHub) has logs of a robot with 14 servos, which is shipped as `horcrux14`. A row needs from
-  them: time, goals or angles of the joints, position of the body, and the friction of the floor.
-- In water, neither added mass nor the wake of a link is simulated.
+  (GitHub) has logs of a robot with 14 servos, which is shipped as `horcrux14`. A row needs these
+  columns: time (s), angle or goal of each joint (rad), x and y of the head or the centre (m). It
+  needs once: supply (V), P gain, and the friction of the floor along and across, with its law.
+- In water, neither added mass nor the wake of a link is simulated ([swimming](swimming.md)).
 """
 
 
