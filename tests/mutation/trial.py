@@ -1,6 +1,5 @@
 """Run the tests on mutants of a module: one collection, then a forked process for each mutant."""
 
-import ast
 import gc
 import json
 import math
@@ -8,13 +7,15 @@ import os
 import resource
 import signal
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import pytest
 
+from snakewalk.drivers import compiling
+from tests.architecture.imports import module_imports, sources
 from tests.mutation.mutants import Mutant
 from tests.tiers.costs import cpu_s
 
@@ -30,7 +31,7 @@ TIMES_WALL: Final = 20.0
 TEST_S: Final = 4.0
 """CPU time of the most expensive test that is run on each mutant."""
 WORDS: Final = ("-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
-_COMPILED: Final = {"compiled", "njit", "inlined", "vectorize", "guvectorize"}
+_DECORATORS: Final = "from snakewalk.drivers.compiling import"
 
 
 class Trial(NamedTuple):
@@ -51,14 +52,44 @@ def path_of(module: str) -> Path:
     return ROOT / (module.replace(".", "/") + ".py")
 
 
-def _has_compiled_loops(tree: ast.AST) -> bool:
+def _has_compiled_loops(module: str) -> bool:
     """Return whether numba would load the loops from its cache, without a mutant."""
-    return any(
-        ast.unparse(decorator).split("(")[0].rpartition(".")[2] in _COMPILED
-        for function in ast.walk(tree)
-        if isinstance(function, ast.FunctionDef)
-        for decorator in function.decorator_list
-    )
+    file = path_of(module)
+    return file.is_file() and _DECORATORS in file.read_text(encoding="utf-8")
+
+
+def _with_callers(module: str) -> set[str]:
+    """Return a module with loops and the modules that compile its loops into theirs."""
+    importers = module_imports(sources()).reverse(copy=False)
+    found: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in found and _has_compiled_loops(name):
+            found.add(name)
+            waiting += [f"snakewalk.{each}" for each in importers[name.partition(".")[2]]]
+    return found
+
+
+def _leave_as_python(modules: set[str]) -> None:
+    """Have the loops of some modules not compiled when these are imported, and all others be.
+
+    Loops that only run compiled, as the steps of a body, go on if no module of these is below them.
+    """
+
+    def kept(decorate: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        def decorated(function: Any) -> Any:
+            if function.__module__ not in modules:
+                return decorate(function)
+            function.py_func = function
+            return function
+
+        return decorated
+
+    compiled = compiling.compiled
+    compiling.compiled = lambda *words, **options: kept(compiled(*words, **options))
+    compiling.inlined = kept(compiling.inlined)
+    compiling.compiled_when_called = kept(compiling.compiled_when_called)
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
@@ -184,8 +215,7 @@ def try_mutants(
         if not os.environ.get("MUTATION_LOUD"):
             os.dup2(silent, 1)
             os.dup2(silent, 2)
-        if _has_compiled_loops(ast.parse(path_of(module).read_text(encoding="utf-8"))):
-            os.environ["NUMBA_DISABLE_JIT"] = "1"
+        _leave_as_python(_with_callers(module))
         forks = _Forks(path_of(module), mutants, budget_s)
         code = pytest.main([*WORDS, "--continue-on-collection-errors", *files], plugins=[forks])
         if not forks.is_child and forks.trial is not None:

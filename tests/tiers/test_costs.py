@@ -82,6 +82,7 @@ def test_a_test_that_compiled_a_loop_at_first_does_not_fail() -> None:
     assert exit_status(costs) == 0
 
 
+@pytest.mark.slow
 def test_a_test_is_measured_again_alone() -> None:
     burning = "tests/tiers/test_costs.py::test_a_child_counts_while_it_lives_and_after_its_end"
     assert 0.05 < measure_again(burning) < 3.0

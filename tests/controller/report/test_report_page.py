@@ -18,7 +18,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.figures.path import body_outline_m
 from snakewalk.controller.figures.style import thin
-from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.metrics.summary import SummarizedFriction, summary
 from snakewalk.controller.report import artifacts
 from snakewalk.controller.report import page as page_module
 from snakewalk.controller.report.artifacts import build_report
@@ -291,6 +291,28 @@ def test_a_page_contains_no_folder_of_the_user_unless_it_is_asked_for(record: Ru
     assert "secret" not in html
     assert "/home" not in html
     assert secret in page(record, numbers, drawings, folders=True)
+
+
+@pytest.mark.parametrize(("backend", "bus"), [("sim", "simulation"), ("/dev/x", "/dev/x")])
+def test_the_facts_name_the_bus(record: RunRecord, backend: str, bus: str) -> None:
+    html = page(record, replace(summary(record), backend=backend), Drawings([]))
+    assert f"<b>bus</b> {bus}</span>" in html
+
+
+def test_the_tiles_are_those_that_the_run_has_numbers_for(record: RunRecord) -> None:
+    numbers = replace(summary(record), carrier_share=None, friction_found=None)
+    usual = page(record, numbers, Drawings([]))
+    assert "Path error" in usual
+    assert "On wide waves" not in usual
+    assert "Friction found" not in usual
+    found = SummarizedFriction(0.1, 0.3, 0.15, 0.25, (0.12, 0.18), (0.2, 0.3))
+    more = page(record, replace(numbers, carrier_share=0.25, friction_found=found), Drawings([]))
+    assert "On wide waves" in more
+    assert "0.15 along, 0.25 across" in more
+    assert "0.12 to 0.18, 0.20 to 0.30" in more
+    no_path = page(record, replace(numbers, waypoints=0), Drawings([]))
+    assert "Path error" not in no_path
+    assert "Travelled" in no_path
 
 
 def test_thinning_keeps_the_peaks_and_the_mean() -> None:
