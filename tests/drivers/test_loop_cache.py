@@ -1,7 +1,6 @@
 """Accounts without a writable folder run, and use the loops that another account has stored."""
 
 import importlib
-import linecache
 import os
 import subprocess
 import sys
@@ -102,12 +101,11 @@ def result(folder: Path) -> tuple[float, int]:
     for stale in (folder / "__pycache__").glob("*.pyc"):  # as old and as large as the next one
         stale.unlink()
     importlib.invalidate_caches()
-    linecache.clearcache()
     loop = importlib.import_module("loops").loop
     return loop(2.0), loop.stats.cache_misses.total()
 
 
-@pytest.mark.costs("compiles three loops three times")
+@pytest.mark.costs("an interpreter that imports and compiles")
 def test_a_loop_is_compiled_again_if_a_function_or_number_of_another_file_changes(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -119,6 +117,7 @@ def test_a_loop_is_compiled_again_if_a_function_or_number_of_another_file_change
         '@compiled("float64(float64)")\n'
         "def loop(value):\n"
         "    return FACTOR * part(value)\n"
+        "print(loop(2.0), loop.stats.cache_misses.total())\n"
     )
     part = "from snakewalk.drivers.compiling import compiled\nfrom inner import inner\n"
     part += '@compiled("float64(float64)")\ndef part(value):\n    return inner(value)\n'
@@ -126,10 +125,10 @@ def test_a_loop_is_compiled_again_if_a_function_or_number_of_another_file_change
     (folder / "numbers_of_it.py").write_text("FACTOR = 2.0\n")
     (folder / "parts.py").write_text(part)
     (folder / "inner.py").write_text(inner.format("1.0"))
-    assert result(folder) == (6.0, 1)
-    assert result(folder) == (6.0, 0)
-    (folder / "numbers_of_it.py").write_text("FACTOR = 3.0\n")
-    assert result(folder) == (9.0, 1)
+    assert start(folder) == ["6.0 1"]
     (folder / "inner.py").write_text(inner.format("10.0"))
+    assert result(folder) == (24.0, 1)
+    assert result(folder) == (24.0, 0)
+    (folder / "numbers_of_it.py").write_text("FACTOR = 3.0\n")
     assert result(folder) == (36.0, 1)
     assert result(folder) == (36.0, 0)
