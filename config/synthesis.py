@@ -17,10 +17,6 @@ Along = tuple[float, ...]
 """Factors at even places from head to tail, linear between them; one holds for the whole body."""
 
 
-def _values(curve: Curve) -> tuple[float, ...]:
-    return (float(curve),) if isinstance(curve, float | int) else tuple(v for _, v in curve)
-
-
 def _knots(curve: Curve) -> Curve:
     if not isinstance(curve, float | int):
         times = [t for t, _ in curve]
@@ -56,6 +52,10 @@ def curve_at(curve: Curve, time_s: ArrayLike) -> Floats:
         return np.full(np.shape(time_s), float(curve))
     times, values = zip(*curve, strict=True)
     return np.asarray(np.interp(np.asarray(time_s, float), times, values))
+
+
+def _values(curve: Curve) -> tuple[float, ...]:
+    return (float(curve),) if isinstance(curve, float | int) else tuple(v for _, v in curve)
 
 
 def along_body(factors: Along, points: int) -> Floats:

@@ -39,10 +39,6 @@ _DUPLICATE_REMEDY = (
 )
 
 
-def _subject(servos: Sequence[ServoReport], verb: str) -> str:
-    return shown_subject([servo.servo_id for servo in servos], verb)
-
-
 def presence(
     expected: Sequence[int],
     present_ids: Sequence[int],
@@ -95,6 +91,10 @@ def presence(
     elif not refusing:
         findings.append(Finding("servo IDs", "ok", f"{len(present_ids)} of {len(expected)} answer"))
     return findings
+
+
+def _subject(servos: Sequence[ServoReport], verb: str) -> str:
+    return shown_subject([servo.servo_id for servo in servos], verb)
 
 
 def _missing_remedy(

@@ -38,7 +38,7 @@ from snakewalk.controller.images.video import read_image
 from snakewalk.drivers.clock import Clock
 
 PATIENCE_S = 5.0
-"""How long the first frame is waited for."""
+"""Time to wait for the first frame."""
 ANSWER_S = 0.1
 """Longest time until the loop states the expected place of the body."""
 

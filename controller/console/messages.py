@@ -34,6 +34,16 @@ FAULT: Final = "fault"
 """Attribute of a record whose text is printed by the caller that ends the command."""
 
 
+def stderr_console() -> "Console":
+    """Standard error for bars; silent if ``info`` is not shown."""
+    from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415  a program starts without it
+
+    screens = [handler for handler in LOGGER.handlers if isinstance(handler, _Screen)]
+    return PlainConsole(
+        stderr=True, emoji=False, quiet=any(screen.level > logging.INFO for screen in screens)
+    )
+
+
 class _Screen(logging.Handler):
     """Current standard error; a progress bar redirects it."""
 
@@ -110,16 +120,6 @@ def _print_warning(text: str) -> None:
 class _OneLine(logging.Formatter):
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802  logging's name
         return plain(super().formatMessage(record))
-
-
-def stderr_console() -> "Console":
-    """Standard error for bars; silent if ``info`` is not shown."""
-    from snakewalk.controller.console.plain_console import PlainConsole  # noqa: PLC0415  a program starts without it
-
-    screens = [handler for handler in LOGGER.handlers if isinstance(handler, _Screen)]
-    return PlainConsole(
-        stderr=True, emoji=False, quiet=any(screen.level > logging.INFO for screen in screens)
-    )
 
 
 @contextmanager

@@ -48,18 +48,6 @@ _FRONT = 95.0  # percentile of the pixels ahead of the place: the front of a wid
 
 
 @dataclass(frozen=True, slots=True)
-class _WideEnd:
-    """An end with two halves, such as eyes; working px."""
-
-    place: Floats
-    """(2,) where the axis enters one half."""
-    deep: float
-    """Distance of that place from the boundary."""
-    length: float
-    """From that place to the front."""
-
-
-@dataclass(frozen=True, slots=True)
 class Skeleton:
     """A body in one image; pixels of that image, x to the right and y downwards."""
 
@@ -77,6 +65,18 @@ class Skeleton:
         return Skeleton(
             self.points_px[::-1].copy(), self.radius_px[::-1].copy(), self.length_px, self.status
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _WideEnd:
+    """An end with two halves, such as eyes; working px."""
+
+    place: Floats
+    """(2,) where the axis enters one half."""
+    deep: float
+    """Distance of that place from the boundary."""
+    length: float
+    """From that place to the front."""
 
 
 def no_skeleton(status: FrameStatus) -> Skeleton:
@@ -388,7 +388,7 @@ def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
 
 
 def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
-    """Longest path (K, 2) x, y between two ends, and how far another part reaches from it."""
+    """Longest path (K, 2) x, y between two ends, and the distance of the farthest other part from it."""
     rows, columns = np.nonzero(thin)
     if len(rows) < 3:
         return None

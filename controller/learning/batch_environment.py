@@ -23,43 +23,6 @@ from snakewalk.drivers.types import BodyPose
 Actions = NDArray[np.floating[Any]]
 
 
-@dataclass(frozen=True, slots=True)
-class _RowRobot:
-    """A row of a batch as the robot of an environment."""
-
-    chain: BatchRow
-    clock: BatchRow
-    pose: Callable[[], BodyPose]
-    qpos: Callable[[], Floats] | None
-    energy: Callable[[], MotorEnergy]
-
-
-class _RowEnvironment(SnakeEnvironment):
-    """One robot of the batch."""
-
-    def __init__(self, row: int, **options: Any) -> None:
-        super().__init__(**options)
-        self.batch: RobotBatch | None = None
-        self._row = row
-
-    @property
-    def prepared(self) -> Any:
-        return self._prepared
-
-    def _open(self, initial: InitialPose) -> SimulatedRobot:
-        assert self.batch is not None
-        prepared = self._prepared
-        row = self.batch.start(self._row, prepared.robot, prepared.world, initial)
-        return _RowRobot(row, row, row.head_pose, None, row.energy)
-
-    def send(self, action: Actions) -> None:
-        self._send(action)
-
-    def result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Return what ``step`` returns, once the batch was advanced."""
-        return self._result()
-
-
 class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], Any]):  # type: ignore[misc]
     """W snakes on a level floor; action, observation and reward are ``SnakeEnvironment``'s.
 
@@ -170,6 +133,43 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
         for k, info in enumerate(infos):
             joined = self._add_info(joined, info, k)
         return joined
+
+
+@dataclass(frozen=True, slots=True)
+class _RowRobot:
+    """A row of a batch as the robot of an environment."""
+
+    chain: BatchRow
+    clock: BatchRow
+    pose: Callable[[], BodyPose]
+    qpos: Callable[[], Floats] | None
+    energy: Callable[[], MotorEnergy]
+
+
+class _RowEnvironment(SnakeEnvironment):
+    """One robot of the batch."""
+
+    def __init__(self, row: int, **options: Any) -> None:
+        super().__init__(**options)
+        self.batch: RobotBatch | None = None
+        self._row = row
+
+    @property
+    def prepared(self) -> Any:
+        return self._prepared
+
+    def _open(self, initial: InitialPose) -> SimulatedRobot:
+        assert self.batch is not None
+        prepared = self._prepared
+        row = self.batch.start(self._row, prepared.robot, prepared.world, initial)
+        return _RowRobot(row, row, row.head_pose, None, row.energy)
+
+    def send(self, action: Actions) -> None:
+        self._send(action)
+
+    def result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Return what ``step`` returns, once the batch was advanced."""
+        return self._result()
 
 
 def _warp_bodies(device: str | None) -> MakeBodies:

@@ -47,16 +47,6 @@ _DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
 """Largest cell that may be one of degrees: a minute, 1.8 km (ours)."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Cells:
-    """Size of a raster's cells, and what states it."""
-
-    dx_m: float
-    dy_m: float
-    height_unit: str
-    notes: list[str]
-
-
 def read_geo_raster(
     file: Path,
     units: RasterUnits,
@@ -91,6 +81,16 @@ def read_geo_raster(
             return _read(file, opened, units, crop, spacing_of)
     except (rasterio.errors.RasterioError, ValueError) as error:
         raise InputError(f"{file}: cannot be read as {driver}: {error}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Cells:
+    """Size of a raster's cells, and what states it."""
+
+    dx_m: float
+    dy_m: float
+    height_unit: str
+    notes: list[str]
 
 
 def _read(

@@ -56,7 +56,7 @@ class RasterUnits:
     no_data: float | None = None
     """Value of cells that hold nothing, besides those that the file declares."""
     height_unit: str | None = None
-    """Unit of heights: of ``UNITS_M``; None: as the file states, else as ``unit``."""
+    """Unit of heights, a name in ``UNITS_M``; None: the file's, or else ``unit``."""
 
 
 def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Raster:

@@ -32,13 +32,6 @@ _BLUR_PX = 1.0
 _MOST_INSTANTS = 5
 
 
-class _Seen(NamedTuple):
-    arrives_s: float
-    taken_s: float
-    points_m: Floats
-    error_m: Floats
-
-
 class StereoHead:
     """Records a pair of pictures each period, and adds its ground to the map once matched.
 
@@ -179,3 +172,10 @@ class StereoHead:
             hit |= np.hypot(*(close_m - foot_m).T) < reach_m
         near[near] = hit
         return np.asarray(near)
+
+
+class _Seen(NamedTuple):
+    arrives_s: float
+    taken_s: float
+    points_m: Floats
+    error_m: Floats

@@ -39,6 +39,40 @@ COLUMNS = 10
 PATH_STEP_M = 0.01
 
 
+@compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
+def _nearest(path: Floats, start_index: int, x: float, y: float) -> tuple[float, float]:
+    """Index on the path near ``start_index``, and the signed distance, positive to its left."""
+    last = len(path) - 2
+    best = start_index
+    least = np.inf
+    for k in range(max(start_index - _BACK, 0), min(start_index + _FORTH, last) + 1):
+        dx, dy = x - path[k, 0], y - path[k, 1]
+        square = dx * dx + dy * dy
+        if square < least:
+            least = square
+            best = k
+    tx, ty = path[best + 1, 0] - path[best, 0], path[best + 1, 1] - path[best, 1]
+    dx, dy = x - path[best, 0], y - path[best, 1]
+    side = tx * dy - ty * dx
+    return float(best), (1.0 if side >= 0.0 else -1.0) * np.sqrt(least)
+
+
+@compiled(
+    "void(float64[::1], float64[:, ::1], float64[::1], float64, float64, float64)",
+    makes_arrays=False,
+)
+def note_place(
+    state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float
+) -> None:
+    """Record in a state (11,) that its body is at (x, y) after ``dt``."""
+    state[0], state[1] = x, y
+    state[3], state[4] = _nearest(path, int(state[3]), x, y)
+    state[5] += state[4] * state[4]
+    state[6] += dt
+    dx, dy = x - waypoint[0], y - waypoint[1]
+    state[10] = min(state[10], dx * dx + dy * dy)
+
+
 @inlined
 def _sine_cosine(x: float) -> tuple[float, float]:
     """Sine and cosine of x, within 2^-52 for up to 10^5 turns.
@@ -145,40 +179,6 @@ def _stand_there(table: Floats) -> None:
         link = table[g * ROWS : (g + 1) * ROWS]
         for j in range(3 * LANES):
             link[_HERE + j] = link[_NEXT + j]
-
-
-@compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
-def _nearest(path: Floats, start_index: int, x: float, y: float) -> tuple[float, float]:
-    """Index on the path near ``start_index``, and the signed distance, positive to its left."""
-    last = len(path) - 2
-    best = start_index
-    least = np.inf
-    for k in range(max(start_index - _BACK, 0), min(start_index + _FORTH, last) + 1):
-        dx, dy = x - path[k, 0], y - path[k, 1]
-        square = dx * dx + dy * dy
-        if square < least:
-            least = square
-            best = k
-    tx, ty = path[best + 1, 0] - path[best, 0], path[best + 1, 1] - path[best, 1]
-    dx, dy = x - path[best, 0], y - path[best, 1]
-    side = tx * dy - ty * dx
-    return float(best), (1.0 if side >= 0.0 else -1.0) * np.sqrt(least)
-
-
-@compiled(
-    "void(float64[::1], float64[:, ::1], float64[::1], float64, float64, float64)",
-    makes_arrays=False,
-)
-def note_place(
-    state: Floats, path: Floats, waypoint: Floats, x: float, y: float, dt: float
-) -> None:
-    """Record in a state (11,) that its body is at (x, y) after ``dt``."""
-    state[0], state[1] = x, y
-    state[3], state[4] = _nearest(path, int(state[3]), x, y)
-    state[5] += state[4] * state[4]
-    state[6] += dt
-    dx, dy = x - waypoint[0], y - waypoint[1]
-    state[10] = min(state[10], dx * dx + dy * dy)
 
 
 @compiled(

@@ -44,16 +44,6 @@ _TRIED_S: Final = 0.02
 """Steps in which a join is tried before it begins."""
 
 
-class _Mode(Protocol):
-    """Present motion of the joints."""
-
-    def now(self) -> JointsNow: ...
-
-    def step(self, dt_s: float, view: BodyView) -> None:
-        """Advance by ``dt_s``."""
-        ...
-
-
 class _Follow:
     """Joints move to their goals and stay."""
 
@@ -90,38 +80,6 @@ class _Follow:
         if self.left_s is not None:
             self.left_s -= dt_s
         self._limiter.step(dt_s, self.goal_rad)
-
-
-class _Through:
-    """Joints follow a spline in time."""
-
-    def __init__(self, spline: PPoly, end_s: float) -> None:
-        self._spline = spline
-        self._end_s = end_s
-        self._now_s = 0.0
-
-    @property
-    def over(self) -> bool:
-        return self._now_s >= self._end_s
-
-    def now(self) -> JointsNow:
-        return JointsNow(self._spline(self._now_s), self._spline(self._now_s, 1))
-
-    def step(self, dt_s: float, view: BodyView) -> None:
-        self._now_s = min(self._now_s + dt_s, self._end_s)
-
-
-class _BySource:
-    """Joints move by a gait, joined to their earlier motion."""
-
-    def __init__(self, blend: Blend) -> None:
-        self._blend = blend
-
-    def now(self) -> JointsNow:
-        return JointsNow(self._blend.goal_rad(), self._blend.velocity_rad_s())
-
-    def step(self, dt_s: float, view: BodyView) -> None:
-        self._blend.step(dt_s, view)
 
 
 class Commanded:
@@ -186,7 +144,7 @@ class Commanded:
         return self._mode.now().speed_rad_s
 
     def pace(self) -> Pace:
-        """The robot's limits, because later commands are unknown."""
+        """Limits of the robot, since later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
@@ -324,3 +282,45 @@ class Commanded:
         """Join a source to the present motion of the joints."""
         now = self._mode.now()
         return Blend(now.angle_rad, now.speed_rad_s, source, Pace.limit(self._robot))
+
+
+class _Mode(Protocol):
+    """Present motion of the joints."""
+
+    def now(self) -> JointsNow: ...
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        """Advance by ``dt_s``."""
+        ...
+
+
+class _Through:
+    """Joints follow a spline in time."""
+
+    def __init__(self, spline: PPoly, end_s: float) -> None:
+        self._spline = spline
+        self._end_s = end_s
+        self._now_s = 0.0
+
+    @property
+    def over(self) -> bool:
+        return self._now_s >= self._end_s
+
+    def now(self) -> JointsNow:
+        return JointsNow(self._spline(self._now_s), self._spline(self._now_s, 1))
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        self._now_s = min(self._now_s + dt_s, self._end_s)
+
+
+class _BySource:
+    """Joints move by a gait, joined to their earlier motion."""
+
+    def __init__(self, blend: Blend) -> None:
+        self._blend = blend
+
+    def now(self) -> JointsNow:
+        return JointsNow(self._blend.goal_rad(), self._blend.velocity_rad_s())
+
+    def step(self, dt_s: float, view: BodyView) -> None:
+        self._blend.step(dt_s, view)

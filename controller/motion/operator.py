@@ -86,7 +86,7 @@ class Operator(MotionWrapper):
         return self._rate * self.motion.velocity_rad_s()
 
     def pace(self) -> Pace:
-        """The robot's limits, because later commands are unknown."""
+        """Limits of the robot, since later commands are unknown."""
         return Pace.limit(self._robot)
 
     def step(self, dt_s: float, view: BodyView) -> Floats:

@@ -48,7 +48,7 @@ class MotionCheck:
         self.fault: str | None = None
         """How the source contradicts the joints; None while it does not."""
         self.has_agreed = False
-        """Whether turns and directions of the source once agreed with the joints."""
+        """Whether the turns and directions of the source have agreed with the joints before."""
 
     def forget(self) -> None:
         """Begin again after a body moved without its joints; ``has_agreed`` stays."""

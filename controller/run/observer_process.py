@@ -84,7 +84,7 @@ class ObserverProcess:
         self._end.add(topic, row)
 
     def on_picture(self, image: Image, time_s: float) -> None:
-        """Let a picture go by."""
+        """Skip a picture."""
 
     def on_button(self, path: Path) -> None:
         """Store the run's stop button for the observer."""

@@ -46,26 +46,6 @@ RUNS_PER_COLLECTION = 8
 _ended_runs = count(1)
 
 
-@contextmanager
-def _no_long_collections() -> Iterator[None]:
-    """Exclude present objects from Python's garbage collections.
-
-    A collection of all imports and plans needs 0.1 s and more, and the bus watchdog trips at 0.2 s.
-    Cycles of earlier runs then need an explicit collection; otherwise a process grows by 1 MB with
-    each run.
-    """
-    if gc.get_freeze_count() > 0:  # by the caller
-        yield
-        return
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
-        if next(_ended_runs) % RUNS_PER_COLLECTION == 0:
-            gc.collect()
-
-
 PoseSource = Callable[[JointState], BodyPose]
 SETTLE_S = 0.3
 """Time between the ramp and the motion."""
@@ -89,6 +69,26 @@ class Progress(NamedTuple):
     """Whether the motion has come to its end and rests."""
     waypoints: int = 0
     """How many are in force."""
+
+
+@contextmanager
+def _no_long_collections() -> Iterator[None]:
+    """Exclude present objects from Python's garbage collections.
+
+    A collection of all imports and plans needs 0.1 s and more, and the bus watchdog trips at 0.2 s.
+    Cycles of earlier runs then need an explicit collection; otherwise a process grows by 1 MB with
+    each run.
+    """
+    if gc.get_freeze_count() > 0:  # by the caller
+        yield
+        return
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if next(_ended_runs) % RUNS_PER_COLLECTION == 0:
+            gc.collect()
 
 
 OnProgress = Callable[[Progress], None]

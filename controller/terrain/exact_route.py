@@ -22,24 +22,6 @@ SAFE_RISK: Final = 1.0 - 1e-9
 _CHUNK: Final = 200_000
 
 
-class _Cells(NamedTuple):
-    """Lines (w,) and (h,), risk and safety (h, w) of crossings, and the numbers of both ends."""
-
-    x_m: Floats
-    y_m: Floats
-    risk: Floats
-    safe: Bools
-    ends: tuple[int, int]
-
-
-class _Edges(NamedTuple):
-    """Joined nodes (k,) and (k,), and (k,) x of the saddle between them or NaN."""
-
-    a: Indices
-    b: Indices
-    saddle_x_m: Floats
-
-
 def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats) -> Floats | None:
     """(n, 2) corners of the cheapest safe path along cells, both ends included, or None.
 
@@ -82,6 +64,24 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
         corners.append(nodes_m[onward])
         current = onward
     return _distinct(np.array(corners))
+
+
+class _Cells(NamedTuple):
+    """Lines (w,) and (h,), risk and safety (h, w) of crossings, and the numbers of both ends."""
+
+    x_m: Floats
+    y_m: Floats
+    risk: Floats
+    safe: Bools
+    ends: tuple[int, int]
+
+
+class _Edges(NamedTuple):
+    """Joined nodes (k,) and (k,), and (k,) x of the saddle between them or NaN."""
+
+    a: Indices
+    b: Indices
+    saddle_x_m: Floats
 
 
 def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:

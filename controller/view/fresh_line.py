@@ -43,7 +43,7 @@ class Freshness:
         self._since_s = since_s if before_s is None else min(before_s, since_s)
 
     def take(self) -> float:
-        """Earliest beginning of the messages since the last call; now without messages."""
+        """Return the earliest beginning of the messages since the last call, or now."""
         since_s = self._since_s
         self._since_s = None
         return self.now_s() if since_s is None else since_s

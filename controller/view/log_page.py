@@ -24,42 +24,6 @@ _GAP_M: Final = 0.5
 _SPEEDS: Final = ("0.25", "0.5", "1", "2", "5", "10")
 
 
-@dataclass(slots=True)
-class _Shown:
-    """A log in the page."""
-
-    record: RunRecord
-    scene: BodyScene
-    board: Dashboard
-    drawn: tuple[object, ...] = ()
-
-    def draw(self, since_s: float, *, curves: bool, again: bool = False) -> None:
-        record = self.record
-        board = self.board
-        scene = self.scene
-        at_s = min(_begin_s(record) + since_s, float(record.cycle.time_s[-1]))
-        state = (at_s, board.follow.value, board.goals.value, board.joint.value)
-        if state == self.drawn and not again:
-            return
-        self.drawn = state
-        cycle = _row(record.cycle.time_s, at_s)
-        pose = _row(record.pose.time_s, at_s)
-        slow = _row(record.slow.time_s, at_s) if len(record.slow.time_s) else None
-        follow = board.follow.value
-        if not follow:
-            scene.release()
-        scene.show(record, cycle, pose, follow=follow, goals=board.goals.value)
-        board.show_state(record, cycle, pose, record.note)
-        board.show_servos(record, cycle, slow)
-        if curves:
-            scene.show_paths(record.paths, at_s)
-            scene.show_trail(record.pose.centre_m[: pose + 1])
-            board.show_curves(record, cycle)
-            board.show_events(
-                tuple(event for event in record.events if event.time_s <= at_s + 1e-9)
-            )
-
-
 class LogPage:
     """The page of a log, or of two; ``step`` is called over and over.
 
@@ -157,6 +121,42 @@ class LogPage:
         flat = all(shown_log.record.header.ground is None for shown_log in self._shown)
         other.hide_ground(flat or (self._same and not distance_m))
         return True
+
+
+@dataclass(slots=True)
+class _Shown:
+    """A log in the page."""
+
+    record: RunRecord
+    scene: BodyScene
+    board: Dashboard
+    drawn: tuple[object, ...] = ()
+
+    def draw(self, since_s: float, *, curves: bool, again: bool = False) -> None:
+        record = self.record
+        board = self.board
+        scene = self.scene
+        at_s = min(_begin_s(record) + since_s, float(record.cycle.time_s[-1]))
+        state = (at_s, board.follow.value, board.goals.value, board.joint.value)
+        if state == self.drawn and not again:
+            return
+        self.drawn = state
+        cycle = _row(record.cycle.time_s, at_s)
+        pose = _row(record.pose.time_s, at_s)
+        slow = _row(record.slow.time_s, at_s) if len(record.slow.time_s) else None
+        follow = board.follow.value
+        if not follow:
+            scene.release()
+        scene.show(record, cycle, pose, follow=follow, goals=board.goals.value)
+        board.show_state(record, cycle, pose, record.note)
+        board.show_servos(record, cycle, slow)
+        if curves:
+            scene.show_paths(record.paths, at_s)
+            scene.show_trail(record.pose.centre_m[: pose + 1])
+            board.show_curves(record, cycle)
+            board.show_events(
+                tuple(event for event in record.events if event.time_s <= at_s + 1e-9)
+            )
 
 
 def _sides_m(record: RunRecord) -> tuple[float, float]:

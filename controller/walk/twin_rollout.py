@@ -30,7 +30,7 @@ class UsesTwin(Protocol):
 
 
 class TwinRollout:
-    """Rolls out motions of one robot on its twin."""
+    """Predictor that simulates motions of one robot on its twin."""
 
     def __init__(
         self, robot: RobotConfig, make_twin: Callable[[], Twin], friction: FrictionConfig

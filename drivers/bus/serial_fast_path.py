@@ -42,97 +42,6 @@ _ROW = uint8[::1]
 _ROWS = uint8[:, ::1]
 
 
-@compiled(int64(float64[::1], int64, int64))
-def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
-    """Note bytes sent at ``from_ns`` (port's clock); return the time until they have left, ns."""
-    free_s[0] = max(from_ns * 1e-9, free_s[0]) + wire_ns * 1e-9
-    return int(free_s[0] * 1e9) - from_ns
-
-
-@compiled(int64(int32, _ROW, int32[::1], int64[::1], float64[::1]))
-def _send_goals(
-    fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64], free_s: Floats
-) -> int:
-    """Fill ``values`` into the sync write and send it; return the number of bytes sent.
-
-    It is 0 if the frame needs stuffing, or the device is gone or full.
-    """
-    frame = work[: plan[WRITE_BYTES]]
-    if not fill(frame, values):
-        return 0
-    begun_ns = now_ns()
-    sent = max(0, int(_write(fd, frame.ctypes.data, len(frame))))
-    if sent > 0:
-        _reserve_line(free_s, begun_ns - plan[ZERO_NS], plan[WRITE_NS])
-    return sent
-
-
-@compiled(int64(int32, _ROW, int32[::1], int64[::1]))
-def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
-    """Discard the input, send the request, after ``values`` if given.
-
-    Returns the number of bytes sent.
-    """
-    begin = int(plan[WRITE_BYTES])
-    end = begin + int(plan[REQUEST_BYTES])
-    if len(values) > 0:
-        if not fill(work[:begin], values):
-            return 0
-        begin = 0
-    plan[BEGUN_NS] = now_ns()
-    return int(send(fd, work[begin:end]))
-
-
-@compiled(int64(int32, _ROW, _ROWS, boolean, int64[::1], float64[::1]), nogil=True)
-def _receive(
-    fd: int,
-    work: Bytes,
-    data: Bytes,
-    with_goals: bool,
-    plan: NDArray[np.int64],
-    free_s: Floats,
-) -> int:
-    """Wait for the reply and decode it.
-
-    Args:
-        fd: descriptor, non-blocking.
-        work: packets, expected reply, and received bytes, in the order of the plan.
-        data: (N, length) filled, unless irregular.
-        with_goals: whether goals preceded the request.
-        plan: (``PLAN_SIZE``,) the numbers above.
-        free_s: (1,) of the line's ``LineReservation``.
-
-    Returns:
-        Result of the frame reader for a complete reply. ``-1 - n``: ``n`` bytes arrived, too few or
-        one too many; then the line carries more than the reply.
-
-    """
-    begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
-    if with_goals:
-        wire_ns += int(plan[WRITE_NS])
-    least_ns = _reserve_line(free_s, begun_ns - plan[ZERO_NS], wire_ns) + int(plan[REPLY_NS])
-    wait_ns = least_ns + int(plan[LATENCY_NS])
-    request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
-    heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
-    room = work[error_end:]
-    error = work[ids_end:error_end]
-    reply = room[:-1]
-    latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
-    got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
-    if got != len(reply):
-        code = -1 - int(got)
-    elif plan[FAST]:
-        head = work[request_end:heads_end]
-        ids = work[heads_end:ids_end]
-        code = int(read_fast(reply, head, ids, data, error))
-    else:
-        heads = work[request_end:heads_end].reshape(len(data), HEAD)
-        code = int(read_plain(reply, heads, data, error))
-    if code <= 0:
-        plan[REMAINING_NS] = begun_ns + wait_ns - now_ns()
-    return code
-
-
 class SerialFastPath:
     """Group read of servos on ``port``, alone or after their goals."""
 
@@ -238,3 +147,94 @@ class SerialFastPath:
         counts = int(plan[WRITE_BYTES]), int(plan[REQUEST_BYTES]), len(self._room) - 1
         for time, count in zip((WRITE_NS, REQUEST_NS, REPLY_NS), counts, strict=True):
             plan[time] = count * _BYTE_NS_BAUD // baud
+
+
+@compiled(int64(float64[::1], int64, int64))
+def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
+    """Note bytes sent at ``from_ns`` (port's clock); return the time until they have left, ns."""
+    free_s[0] = max(from_ns * 1e-9, free_s[0]) + wire_ns * 1e-9
+    return int(free_s[0] * 1e9) - from_ns
+
+
+@compiled(int64(int32, _ROW, int32[::1], int64[::1], float64[::1]))
+def _send_goals(
+    fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64], free_s: Floats
+) -> int:
+    """Fill ``values`` into the sync write and send it; return the number of bytes sent.
+
+    It is 0 if the frame needs stuffing, or the device is gone or full.
+    """
+    frame = work[: plan[WRITE_BYTES]]
+    if not fill(frame, values):
+        return 0
+    begun_ns = now_ns()
+    sent = max(0, int(_write(fd, frame.ctypes.data, len(frame))))
+    if sent > 0:
+        _reserve_line(free_s, begun_ns - plan[ZERO_NS], plan[WRITE_NS])
+    return sent
+
+
+@compiled(int64(int32, _ROW, int32[::1], int64[::1]))
+def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
+    """Discard the input, send the request, after ``values`` if given.
+
+    Returns the number of bytes sent.
+    """
+    begin = int(plan[WRITE_BYTES])
+    end = begin + int(plan[REQUEST_BYTES])
+    if len(values) > 0:
+        if not fill(work[:begin], values):
+            return 0
+        begin = 0
+    plan[BEGUN_NS] = now_ns()
+    return int(send(fd, work[begin:end]))
+
+
+@compiled(int64(int32, _ROW, _ROWS, boolean, int64[::1], float64[::1]), nogil=True)
+def _receive(
+    fd: int,
+    work: Bytes,
+    data: Bytes,
+    with_goals: bool,
+    plan: NDArray[np.int64],
+    free_s: Floats,
+) -> int:
+    """Wait for the reply and decode it.
+
+    Args:
+        fd: descriptor, non-blocking.
+        work: packets, expected reply, and received bytes, in the order of the plan.
+        data: (N, length) filled, unless irregular.
+        with_goals: whether goals preceded the request.
+        plan: (``PLAN_SIZE``,) the numbers above.
+        free_s: (1,) of the line's ``LineReservation``.
+
+    Returns:
+        Result of the frame reader for a complete reply. ``-1 - n``: ``n`` bytes arrived, too few or
+        one too many; then the line carries more than the reply.
+
+    """
+    begun_ns, wire_ns = int(plan[BEGUN_NS]), int(plan[REQUEST_NS])
+    if with_goals:
+        wire_ns += int(plan[WRITE_NS])
+    least_ns = _reserve_line(free_s, begun_ns - plan[ZERO_NS], wire_ns) + int(plan[REPLY_NS])
+    wait_ns = least_ns + int(plan[LATENCY_NS])
+    request_end = int(plan[WRITE_BYTES] + plan[REQUEST_BYTES])
+    heads_end, ids_end, error_end = plan[HEADS_END], plan[IDS_END], plan[ERROR_END]
+    room = work[error_end:]
+    error = work[ids_end:error_end]
+    reply = room[:-1]
+    latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
+    got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
+    if got != len(reply):
+        code = -1 - int(got)
+    elif plan[FAST]:
+        head = work[request_end:heads_end]
+        ids = work[heads_end:ids_end]
+        code = int(read_fast(reply, head, ids, data, error))
+    else:
+        heads = work[request_end:heads_end].reshape(len(data), HEAD)
+        code = int(read_plain(reply, heads, data, error))
+    if code <= 0:
+        plan[REMAINING_NS] = begun_ns + wait_ns - now_ns()
+    return code

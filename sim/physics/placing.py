@@ -25,27 +25,6 @@ STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
 SETTLE_MIN_S, SETTLE_MAX_S = 0.3, 4.0
 
 
-@dataclass(frozen=True, slots=True)
-class _Balls:
-    """The balls of all bellies of a robot's spine."""
-
-    link: Ints
-    """(P,) link of each."""
-    along_m: Floats
-    """(P, 1) position along the link's axis, from its centre."""
-    aside_m: Floats
-    """(P, 1) position across the link's axis."""
-    radius_m: Floats
-    """(P,) radius."""
-
-    @classmethod
-    def of(cls, robot: RobotConfig) -> Self:
-        rows = [belly_points_m(robot, k).reshape(-1, 3) for k in range(robot.link_count)]
-        link = np.repeat(np.arange(robot.link_count), [len(row) for row in rows])
-        along_m, aside_m, _ = np.concatenate(rows).T[..., None]
-        return cls(link, along_m, aside_m, np.array(robot.link_radii_m)[link])
-
-
 def place(
     m: Mechanics,
     robot: RobotConfig,
@@ -76,6 +55,27 @@ def place(
     m.planes.lay(data)
     mujoco.mj_forward(model, data)
     m.start_at_rest()
+
+
+@dataclass(frozen=True, slots=True)
+class _Balls:
+    """The balls of all bellies of a robot's spine."""
+
+    link: Ints
+    """(P,) link of each."""
+    along_m: Floats
+    """(P, 1) position along the link's axis, from its centre."""
+    aside_m: Floats
+    """(P, 1) position across the link's axis."""
+    radius_m: Floats
+    """(P,) radius."""
+
+    @classmethod
+    def of(cls, robot: RobotConfig) -> Self:
+        rows = [belly_points_m(robot, k).reshape(-1, 3) for k in range(robot.link_count)]
+        link = np.repeat(np.arange(robot.link_count), [len(row) for row in rows])
+        along_m, aside_m, _ = np.concatenate(rows).T[..., None]
+        return cls(link, along_m, aside_m, np.array(robot.link_radii_m)[link])
 
 
 def lay_down(

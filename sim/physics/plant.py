@@ -28,19 +28,6 @@ FIELD_STEP_S = 0.001
 distance at 2 ms, and 0.1 to 2 % at 1 ms (``python -m benchmarks step_length``)."""
 
 
-@compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
-def _pose(place: Floats, pose: Floats) -> None:
-    """Convert place and unit quaternion (7,) to place, then the matrix of axes as columns."""
-    w, x, y, z = place[3], place[4], place[5], place[6]
-    pose[0, 0], pose[0, 1], pose[0, 2] = place[0], place[1], place[2]
-    pose[1, 0] = w * w + x * x - y * y - z * z
-    pose[1, 1], pose[1, 2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    pose[2, 0], pose[2, 1] = 2.0 * (x * y + w * z), w * w - x * x + y * y - z * z
-    pose[2, 2] = 2.0 * (y * z - w * x)
-    pose[3, 0], pose[3, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
-    pose[3, 2] = w * w - x * x - y * y + z * z
-
-
 class MujocoPlant:
     """A chain on its ground; starts straight at the origin, heading along x, at rest.
 
@@ -261,6 +248,19 @@ class MujocoPlant:
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
         mujoco.mj_crb(m, d)
+
+
+@compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
+def _pose(place: Floats, pose: Floats) -> None:
+    """Convert place and unit quaternion (7,) to place, then the matrix of axes as columns."""
+    w, x, y, z = place[3], place[4], place[5], place[6]
+    pose[0, 0], pose[0, 1], pose[0, 2] = place[0], place[1], place[2]
+    pose[1, 0] = w * w + x * x - y * y - z * z
+    pose[1, 1], pose[1, 2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    pose[2, 0], pose[2, 1] = 2.0 * (x * y + w * z), w * w - x * x + y * y - z * z
+    pose[2, 2] = 2.0 * (y * z - w * x)
+    pose[3, 0], pose[3, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    pose[3, 2] = w * w - x * x - y * y + z * z
 
 
 def plant_imu(robot: RobotConfig, plant: MujocoPlant, baud: int, seed: int = 0) -> Imu | None:

@@ -53,6 +53,41 @@ LEAST_FRICTION_N_M = 1e-9
 """MuJoCo leaves out the constraint of a joint without friction, and counts the others again."""
 
 
+def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -> None:
+    """Write the forces of motors, ground and water into ``body.state.force``."""
+    qpos, qvel, qfrc = body.state
+    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = shafts.motors[:9]
+    current, torque, pwm = shafts.motors[9:12]
+    gear = shafts.gears.terms
+    speed = shafts.work[0]
+    ground_n_m = shafts.work[1]
+    rotor = shafts.gears.rotor
+    qfrc[:] = 0.0
+    for j in range(len(speed)):
+        has_play = gear[BACKLASH, j] > 0.0
+        speed[j] = rotor[SPEED, j] if has_play and rotor[SIDE, j] == 0.0 else qvel[6 + j]
+        pwm[j], current[j], torque[j] = shaft_torque(
+            qpos[7 + j],
+            speed[j],
+            on[j],
+            goal[j],
+            gain[j],
+            pwm_limit[j],
+            supply[j],
+            ohm[j],
+            k_t[j],
+            k_e[j],
+            current_limit[j],
+        )
+        qfrc[6 + j] = torque[j] - gear[2, j] * qvel[6 + j]
+        if has_play:
+            qfrc[6 + j] = _through_teeth(shafts, j, qfrc[6 + j], body.law.step_s)
+        ground_n_m[j] = -qfrc[6 + j]
+    _add_friction(body, contacts, lanes)
+    for j in range(len(speed)):
+        ground_n_m[j] += qfrc[6 + j]
+
+
 def _move(body: Body) -> None:
     """Rate of each link's centre in the last step, and its spin, from the head."""
     centre, rotation, _, axis, parents = body.chain
@@ -168,41 +203,6 @@ def _add_friction(body: Body, contacts: Contacts, lanes: Lanes) -> None:
     if water[0, 3] > 0.0:
         totals[0] += add_water(wrench, centre[1:], rotation[1:], v, w, water, step_s)
     _collect(body)
-
-
-def apply_forces(body: Body, shafts: Shafts, contacts: Contacts, lanes: Lanes) -> None:
-    """Write the forces of motors, ground and water into ``body.state.force``."""
-    qpos, qvel, qfrc = body.state
-    on, goal, gain, pwm_limit, supply, ohm, k_t, k_e, current_limit = shafts.motors[:9]
-    current, torque, pwm = shafts.motors[9:12]
-    gear = shafts.gears.terms
-    speed = shafts.work[0]
-    ground_n_m = shafts.work[1]
-    rotor = shafts.gears.rotor
-    qfrc[:] = 0.0
-    for j in range(len(speed)):
-        has_play = gear[BACKLASH, j] > 0.0
-        speed[j] = rotor[SPEED, j] if has_play and rotor[SIDE, j] == 0.0 else qvel[6 + j]
-        pwm[j], current[j], torque[j] = shaft_torque(
-            qpos[7 + j],
-            speed[j],
-            on[j],
-            goal[j],
-            gain[j],
-            pwm_limit[j],
-            supply[j],
-            ohm[j],
-            k_t[j],
-            k_e[j],
-            current_limit[j],
-        )
-        qfrc[6 + j] = torque[j] - gear[2, j] * qvel[6 + j]
-        if has_play:
-            qfrc[6 + j] = _through_teeth(shafts, j, qfrc[6 + j], body.law.step_s)
-        ground_n_m[j] = -qfrc[6 + j]
-    _add_friction(body, contacts, lanes)
-    for j in range(len(speed)):
-        ground_n_m[j] += qfrc[6 + j]
 
 
 def _through_teeth(shafts: Shafts, j: int, pressed_n_m: float, step_s: float) -> float:

@@ -22,23 +22,6 @@ ELEVATION_DEG, AZIMUTH_DEG = -35.0, 90.0
 SIZE_PX = (640, 480)
 
 
-class _Pose:
-    """The drawn model and its pose."""
-
-    def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
-        self.model = dressed_model(Scene(robot, world, ground))
-        self.data = mujoco.MjData(self.model)
-        self.distance_m = DISTANCE_LENGTHS * robot.length_m
-
-    def move(self, qpos: Floats) -> Floats:
-        """Move the body; return its middle, (3,) m."""
-        self.data.qpos[:] = qpos
-        mujoco.mj_kinematics(self.model, self.data)
-        mujoco.mj_comPos(self.model, self.data)
-        mujoco.mj_camlight(self.model, self.data)
-        return np.array(self.data.subtree_com[1])
-
-
 class ChaseView:
     """Draws ``MujocoPlant.qpos`` without a screen; ``close`` it.
 
@@ -71,6 +54,23 @@ class ChaseView:
     def close(self) -> None:
         """Free the frame buffer; safe to call twice."""
         self._screen.close()
+
+
+class _Pose:
+    """The drawn model and its pose."""
+
+    def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
+        self.model = dressed_model(Scene(robot, world, ground))
+        self.data = mujoco.MjData(self.model)
+        self.distance_m = DISTANCE_LENGTHS * robot.length_m
+
+    def move(self, qpos: Floats) -> Floats:
+        """Move the body; return its middle, (3,) m."""
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.data)
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_camlight(self.model, self.data)
+        return np.array(self.data.subtree_com[1])
 
 
 class ChaseWindow:

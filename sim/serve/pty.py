@@ -36,14 +36,6 @@ _OUTPUT_SPEED = 5
 """Index of the output speed in the attributes of a terminal."""
 
 
-def _checked_pace(pace: float) -> float:
-    if not 0.0 < pace < math.inf:
-        raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
-    if pace > PACE_MAX:
-        raise InputError(f"pace {pace:g}: must be at most {PACE_MAX:g}; 1 is real time")
-    return pace
-
-
 _LINK_CHECK_S = 1.0
 """Time between two looks at the link (ours)."""
 _LOGGER = logging.getLogger("snakewalk")
@@ -245,3 +237,11 @@ class PtyServer:
 
     def _now_s(self) -> float:
         return self._clock.now_s() * self._pace + self._offset_s
+
+
+def _checked_pace(pace: float) -> float:
+    if not 0.0 < pace < math.inf:
+        raise InputError(f"pace {pace:g}: must be above 0; 1 is real time, 0.5 half as fast")
+    if pace > PACE_MAX:
+        raise InputError(f"pace {pace:g}: must be at most {PACE_MAX:g}; 1 is real time")
+    return pace

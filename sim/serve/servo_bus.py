@@ -27,15 +27,6 @@ _BUSY_MS = 10.0
 """Lateness that a client with short time-outs notices (ours)."""
 
 
-class _Order:
-    """A change for the serving thread."""
-
-    def __init__(self, change: Callable[[], None]) -> None:
-        self.change = change
-        self.is_done = threading.Event()
-        self.error: Exception | None = None
-
-
 class ServoBus:
     """One simulated bus; reading ``path`` starts serving it in real time."""
 
@@ -156,3 +147,12 @@ class ServoBus:
         if self._server is not None:
             self._server.close()
         self._thread = None
+
+
+class _Order:
+    """A change for the serving thread."""
+
+    def __init__(self, change: Callable[[], None]) -> None:
+        self.change = change
+        self.is_done = threading.Event()
+        self.error: Exception | None = None

@@ -59,7 +59,7 @@ class SynthesisedWalk:
     skeleton: GroundedSkeleton
     """On the ground."""
     half_height_m: Floats
-    """(N + 1,) of the body at the skeleton's points."""
+    """(N + 1,) radius of the body at the skeleton's points."""
     rate_hz: float
     path: SplinePath
     targets: Targets

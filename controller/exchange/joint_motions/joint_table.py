@@ -34,11 +34,6 @@ _SEPARATORS: Final = (",", ";", "\t")
 _MISSING: Final = {"", "na", "nan", "null", "none"}
 
 
-def _cells(line: str) -> tuple[str, list[str]]:
-    separator = max(_SEPARATORS, key=line.count)
-    return separator, [cell.strip().strip('"') for cell in line.split(separator)]
-
-
 @plugin("joints", "csv")
 class JointTable:
     """A CSV with the columns time and one for each joint."""
@@ -88,6 +83,11 @@ class JointTable:
         unit = _unit_of(path, units, request, values[:, 1:])
         time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])
+
+
+def _cells(line: str) -> tuple[str, list[str]]:
+    separator = max(_SEPARATORS, key=line.count)
+    return separator, [cell.strip().strip('"') for cell in line.split(separator)]
 
 
 def _second(path: Path, column: str, request: JointRequest, time: Floats) -> float:

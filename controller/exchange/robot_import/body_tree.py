@@ -48,7 +48,7 @@ class Branch:
     """A chain of bodies that hangs on a link of the spine."""
 
     link: int
-    """Number along the spine, 0 is the first body."""
+    """Index along the spine; 0 is the first body."""
     hinges: list[Hinge]
     groups: list[list[int]]
     """Bodies behind each hinge."""

@@ -185,7 +185,7 @@ class ServedRobot:
         self.body.reset(place.start_m, heading_rad, shaft_rad)
         tracked = TrackedBody(robot, robot.pose or PoseConfig())
         self.tracker = SimulatedTracker(serving.tracker, tracked, serving.seed)
-        """Measures the body and makes datagrams."""
+        """Tracker that measures the body and encodes its poses as datagrams."""
         plant = WatchedPlant(
             self.body, 1.0 / serving.tracker.rate_hz, self._measure, serving.goal_delay_s
         )

@@ -24,29 +24,6 @@ if TYPE_CHECKING:
     from snakewalk.sim.physics.plant import MujocoPlant
 
 
-class _SimulatedBody:
-    def __init__(
-        self,
-        run: RunConfig,
-        robot: RobotConfig,
-        world: WorldConfig,
-        ground: HeightField | None,
-        deviation: Deviation,
-    ) -> None:
-        plant, twin = physics_modules()
-        self.plant: MujocoPlant = plant.MujocoPlant(
-            deviation.robot(robot),
-            deviation.world(world),
-            ground,
-            run.physics_step_s,
-            is_placed=False,
-        )
-        self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
-        """Makes the robot's IMU from the motion of the body; None without an IMU."""
-        self.twin = partial(twin.PlantTwin, robot, world, ground)
-        """Makes a second body."""
-
-
 def simulated(
     run: RunConfig,
     robot: RobotConfig,
@@ -100,6 +77,29 @@ def simulated(
         lay_down,
         servos.cut_power,
     )
+
+
+class _SimulatedBody:
+    def __init__(
+        self,
+        run: RunConfig,
+        robot: RobotConfig,
+        world: WorldConfig,
+        ground: HeightField | None,
+        deviation: Deviation,
+    ) -> None:
+        plant, twin = physics_modules()
+        self.plant: MujocoPlant = plant.MujocoPlant(
+            deviation.robot(robot),
+            deviation.world(world),
+            ground,
+            run.physics_step_s,
+            is_placed=False,
+        )
+        self.imu = partial(plant.plant_imu, robot, self.plant, robot.servo.baud, run.seed)
+        """Makes the robot's IMU from the motion of the body; None without an IMU."""
+        self.twin = partial(twin.PlantTwin, robot, world, ground)
+        """Makes a second body."""
 
 
 def split(

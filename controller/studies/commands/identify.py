@@ -59,29 +59,6 @@ from snakewalk.controller.studies.identification.servo_constants import (
 )
 
 
-class _RobotFile(NamedTuple):
-    """A robot to write with the results."""
-
-    before: RobotConfig
-    out: Path
-
-
-class _Search(NamedTuple):
-    """Constants to begin with, and which of them to fit."""
-
-    start: Path | None
-    seed: int
-    fit: bool
-    backlash: bool
-
-
-class _Outs(NamedTuple):
-    """Files for the results from logs of runs: ground and robot."""
-
-    world: Path | None
-    robot: Path | None
-
-
 @command(
     "robot identify",
     examples=(
@@ -169,6 +146,29 @@ def identify(
         raise InputError("--backlash: needs a fit; remove --no-fit")
     search = _Search(start, seed, fit=fit, backlash=backlash)
     _servo(logs, judge, search, out, robot_file, force=force, as_json=as_json)
+
+
+class _RobotFile(NamedTuple):
+    """A robot to write with the results."""
+
+    before: RobotConfig
+    out: Path
+
+
+class _Search(NamedTuple):
+    """Constants to begin with, and which of them to fit."""
+
+    start: Path | None
+    seed: int
+    fit: bool
+    backlash: bool
+
+
+class _Outs(NamedTuple):
+    """Files for the results from logs of runs: ground and robot."""
+
+    world: Path | None
+    robot: Path | None
 
 
 def _is_run(path: Path) -> bool:

@@ -99,13 +99,6 @@ TrialsOut = Annotated[
 ]
 
 
-class _Where(NamedTuple):
-    """Place of the simulation: processes, or a Dask cluster."""
-
-    workers: int
-    dask: str | None
-
-
 @command(
     "trials run",
     examples=("trials run flat-slalom --seeds 10 --motion walk --motion serpenoid --json",),
@@ -203,6 +196,13 @@ def trials(
         _print(rows, [key for key, values in overs if len(values) > 1])
     if all(trial.cause == "refused" for trial in finished_trials):
         raise InputError(f"no run was possible: {study.reasons(finished_trials)}")
+
+
+class _Where(NamedTuple):
+    """Place of the simulation: processes, or a Dask cluster."""
+
+    workers: int
+    dask: str | None
 
 
 def _check_results(picture: Path | None, parquet: Path | None, out: Path | None) -> None:

@@ -23,17 +23,17 @@ _AXES: Final = "XYZ"
 _TO_Z_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
+def is_bvh(head: bytes) -> bool:
+    """Whether a file with this head is a BVH."""
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().upper().startswith(b"HIERARCHY")
+
+
 @dataclass(slots=True)
 class _Joint:
     name: str
     parent: int
     offset: Floats = field(default_factory=lambda: np.zeros(3))
     channels: list[str] = field(default_factory=list)
-
-
-def is_bvh(head: bytes) -> bool:
-    """Whether a file with this head is a BVH."""
-    return head.removeprefix(b"\xef\xbb\xbf").lstrip().upper().startswith(b"HIERARCHY")
 
 
 def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:

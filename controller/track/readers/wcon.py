@@ -26,21 +26,6 @@ _OWN = "@snakewalk"
 """Key of a record with facts for which WCON has no name."""
 
 
-def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
-    """Unit of each coordinate in metres; None for all that are not lengths."""
-    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
-    metres |= {
-        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
-        for name in ("ox", "oy", "cx", "cy")
-    }
-    if len({value is None for value in metres.values()}) > 1:
-        raise InputError(
-            f"{file}: units: some are lengths and some are not: "
-            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
-        )
-    return metres
-
-
 def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
@@ -80,6 +65,21 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
         else (),
     )
     return _about(track, document.get("metadata"), records)
+
+
+def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
+    """Unit of each coordinate in metres; None for all that are not lengths."""
+    metres = {name: _unit(file, units, name, "m") for name in ("x", "y")}
+    metres |= {
+        name: _unit(file, units, name, "m") if name in units else metres[name[1]]
+        for name in ("ox", "oy", "cx", "cy")
+    }
+    if len({value is None for value in metres.values()}) > 1:
+        raise InputError(
+            f"{file}: units: some are lengths and some are not: "
+            + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
+        )
+    return metres
 
 
 def _all_bodies(
