@@ -303,7 +303,8 @@ class SafetyConfig(Strict):
         A pitch joint has ``following_limit_rad``: its current shows whether the ground holds it
         off.
         """
-        most_rad, limits_rad = 0.9 * self.goal_lead_rad, []
+        most_rad = 0.9 * self.goal_lead_rad
+        limits_rad = []
         columns = robot.all_axes, robot.position_p_gains, robot.servo_records
         for axis, gain, facts in zip(*columns, strict=True):
             full_rad = facts.full_output_rad / max(gain, 1) if axis != "p" else 0.0

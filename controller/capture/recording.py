@@ -116,7 +116,8 @@ def examine(
     kept = shapes
     for reason, refuse in shape_filters(robot, friction, states).items():
         bad = refuse(kept)
-        refused[reason], kept = int(bad.sum()), kept[~bad]
+        refused[reason] = int(bad.sum())
+        kept = kept[~bad]
     facts = RecordingFacts(
         recording=name_or_path,
         source=track.source,

@@ -388,7 +388,7 @@ def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
 
 
 def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
-    """Longest path (K, 2) x, y between two ends, and the distance of the farthest other part from it."""
+    """Longest path (K, 2) x, y between two ends, and how far other parts lie from it."""
     rows, columns = np.nonzero(thin)
     if len(rows) < 3:
         return None

@@ -326,7 +326,9 @@ class ExternalPose:
 
     def _restart(self, why: str) -> None:
         self.counts["restarts"] += 1
-        self._newest, self._clock, self._check = None, SenderClock(), MotionCheck()
+        self._newest = None
+        self._clock = SenderClock()
+        self._check = MotionCheck()
         self._relocation = Relocation()
         self._on_event(f"restarted sender: {why}; its clock is estimated again")
 

@@ -91,7 +91,8 @@ class WaypointTurns:
                     to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD
                 )
                 if legs_now is not None:
-                    legs[max(k - 1, 0) : k + 1], turned = legs_now, True
+                    legs[max(k - 1, 0) : k + 1] = legs_now
+                    turned = True
         if not turned:
             return path
         yield 200

@@ -103,7 +103,8 @@ class _Results:
         self._played: dict[str, dict[str, float]] = {}
 
     def compared(self, row: MeasuredRow) -> Compared:
-        measured, simulated = row.value, None
+        measured = row.value
+        simulated = None
         cause = self._measurement.cause(row)
         travels = False
         try:
@@ -115,7 +116,8 @@ class _Results:
                 measured /= other.value
                 simulated /= self._simulated(other)
         except InputError as error:
-            cause, simulated = str(error), None
+            cause = str(error)
+            simulated = None
         return Compared(
             file=self._name,
             row=row.name,

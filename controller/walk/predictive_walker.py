@@ -130,7 +130,8 @@ class PredictiveWalker:
         """Continue with another state from a body (N,) that did not follow the track."""
         self.track.restart(body_rad)
         self.steering.forget()
-        self._option, self._bends = None, np.zeros(2)
+        self._option = None
+        self._bends = np.zeros(2)
         self.think_anew()
 
     def think_anew(self) -> None:

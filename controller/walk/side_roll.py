@@ -242,7 +242,8 @@ class SideRolls(MotionWrapper, OnCourse):
             self._plan = None
             self._pilot.go_on(self._walker.think_anew)
             return
-        self._plan, cycle = plan, _cycle(plan, self._robot)
+        self._plan = plan
+        cycle = _cycle(plan, self._robot)
         self._switch.join(cycle)
         self._rolling = _Rolling(plan, cycle.frequency_hz, view)
         word = "left" if plan.side > 0.0 else "right"

@@ -93,7 +93,8 @@ class CrowdView:
         """Draw a frame (height, width, 3), valid until the next one."""
         camera = self._camera
         scene = self._scene
-        camera.lookat[:], camera.distance = shot.lookat_m, shot.distance_m
+        camera.lookat[:] = shot.lookat_m
+        camera.distance = shot.distance_m
         camera.azimuth = shot.azimuth_deg
         camera.elevation = shot.elevation_deg
         if self._tiles is not None:

@@ -59,7 +59,8 @@ class FigureView:
         model = self._model
         view = self._camera
         scene = self._scene
-        view.lookat[:], view.distance = camera.lookat_m, camera.distance_m
+        view.lookat[:] = camera.lookat_m
+        view.distance = camera.distance_m
         view.azimuth = camera.azimuth_deg
         view.elevation = camera.elevation_deg
         every = mujoco.mjtCatBit.mjCAT_ALL

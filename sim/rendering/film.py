@@ -173,7 +173,8 @@ class _Stage:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
-        view.lookat[:], view.azimuth = camera[:3], camera[3]
+        view.lookat[:] = camera[:3]
+        view.azimuth = camera[3]
         view.elevation = -camera[4]
         view.distance = camera[5]
         every = mujoco.mjtCatBit.mjCAT_ALL

@@ -33,7 +33,9 @@ class BlockedShaft:
 
     def block(self, row: int, at_rad: float) -> None:
         """Hold a shaft; the firmware then applies its registers again."""
-        self.rows[row], self._at_rad[row], self.any = True, at_rad, True
+        self.rows[row] = True
+        self._at_rad[row] = at_rad
+        self.any = True
 
     def free(self, row: int) -> None:
         """Release a shaft."""

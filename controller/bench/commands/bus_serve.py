@@ -328,7 +328,9 @@ def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console
 
 
 def _converse(server: "PtyServer", console: Console, stopped: Callable[[], bool]) -> None:
-    console.set_pace, heard, unread = server.set_pace, sys.stdin.fileno(), ""
+    console.set_pace = server.set_pace
+    heard = sys.stdin.fileno()
+    unread = ""
     listening = True
     while not stopped():
         server.step(STEP_S)
