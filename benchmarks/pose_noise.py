@@ -28,7 +28,7 @@ from snakewalk.controller.pose.sample import ArrivedPose
 from snakewalk.controller.pose.tracked_body import TrackedBody
 from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.pose.udp_feed import decoded
-from snakewalk.controller.rehearsal.metric_errors import slip_alarms, with_head_poses
+from snakewalk.controller.rehearsal.rehearsal import slip_alarms, with_head_poses
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose, JointState

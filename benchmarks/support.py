@@ -13,7 +13,7 @@ from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import body_in_world
-from snakewalk.controller.mechanics.support import lifted, support_n
+from snakewalk.controller.metrics.ground_contact import lifted, support_n
 from snakewalk.sim.physics.plant import MujocoPlant
 from snakewalk.sim.servo.motor import MOTORS, make_drive, p_gain_per_rad
 

@@ -11,8 +11,8 @@ from typing import Any
 import typer
 from sphinx.application import Sphinx
 
+from snakewalk.controller.cli.command_line import FORMER
 from snakewalk.controller.cli.command_line import app as program
-from snakewalk.controller.cli.command_tree import FORMER
 from snakewalk.controller.runlog import topics
 from snakewalk.controller.runlog.column import Column, registered_tables
 

@@ -1,23 +1,78 @@
 """``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
 
+import io
 import os
 import signal
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
+from typing import IO, Any, Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.config.plain_text import plain
-from snakewalk.controller.cli.compilation_notice import CompilationNotice
-from snakewalk.controller.console.import_speed import without_collections
+from snakewalk.controller.console.plugins import without_collections
 from snakewalk.controller.console.safe_path import make_path_safe
-from snakewalk.controller.console.safe_streams import make_streams_safe
+from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError, notes_of
+
+_FAILING: Final = {"strict", "surrogateescape"}
+"""Error handlers that raise for a character which the encoding lacks."""
+
+
+def make_streams_safe() -> None:
+    """Open closed standard streams as the null device; escape characters that output lacks.
+
+    A closed descriptor is opened before any file, so that a file or port never becomes the standard
+    output of this program.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, _null(mode))
+        elif mode == "w" and isinstance(stream, io.TextIOWrapper) and stream.errors in _FAILING:
+            with suppress(OSError):  # a stream over a pipe may want to seek
+                stream.reconfigure(errors="backslashreplace")
+
+
+def _null(mode: str) -> IO[Any]:
+    """Open the null device at the lowest free descriptor, for child processes too."""
+    descriptor = os.open(os.devnull, os.O_RDWR)
+    os.set_inheritable(descriptor, True)
+    return open(descriptor, mode, encoding="utf-8", errors="backslashreplace", closefd=False)
+
+
+_NOTICE_S = 3.0
+"""Time between two lines of progress (ours)."""
+
+
+class CompilationNotice:
+    """Prints a line at the first compiled loop of a process, and then how many are compiled."""
+
+    def __init__(self, print_line: Callable[[str], None]) -> None:
+        self._print_line, self._clock = print_line, WallClock()
+        self._count = 0
+        self._next_s = 0.0
+
+    def __call__(self, loop: str) -> None:
+        """Count ``loop``, a dotted name."""
+        self._count += 1
+        now_s = self._clock.now_s()
+        if self._count == 1:
+            self._print_line(
+                "compiling loops for this computer, once; in advance: snakewalk tools compile"
+            )
+            self._next_s = now_s + _NOTICE_S
+        elif now_s >= self._next_s:
+            self._print_line(f"compiled {self._count} loops; last: {loop}")
+            self._next_s = now_s + _NOTICE_S
+
 
 _ENDING = tuple(
     getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name)

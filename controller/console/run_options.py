@@ -5,7 +5,6 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from snakewalk.config.base import Strict
-from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.options import (
     VIEW_AT,
     Film,
@@ -16,6 +15,7 @@ from snakewalk.controller.console.options import (
     RunPort,
     View,
     ViewAt,
+    check_port_name,
 )
 
 

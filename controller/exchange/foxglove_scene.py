@@ -6,6 +6,7 @@ The MCAP file has Foxglove's well-known messages in JSON, which needs no package
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
 from itertools import cycle
 from operator import itemgetter
 from pathlib import Path
@@ -19,7 +20,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import water_surface_m
 from snakewalk.config.heightfield import HeightField, surface
 from snakewalk.controller.exchange.body_frames import WORLD, body_frames
-from snakewalk.controller.exchange.foxglove_schema import foxglove_schema
 from snakewalk.controller.exchange.imu_readings import imu_readings
 from snakewalk.controller.exchange.remaining_fields import TIME, Shown, remaining_fields
 from snakewalk.controller.exchange.ros_messages import (
@@ -43,6 +43,49 @@ from snakewalk.controller.runlog.topics import (
     WaypointTable,
 )
 from snakewalk.sim.physics.solids import solids
+
+Schema = dict[str, Any]
+_WHOLE: Final[Schema] = {"type": "integer"}
+_KINDS: Final = {"DOUBLE": "number", "FLOAT": "number", "STRING": "string", "BOOL": "boolean"}
+"""JSON types by protobuf's; the others are integers."""
+
+
+@cache
+def foxglove_schema(name: str) -> Schema:
+    """Return the schema of a message such as ``foxglove.Log``.
+
+    Foxglove's JSON has all fields but the optional ones; times are ``sec`` and ``nsec``.
+    """
+    short = name.removeprefix("foxglove.")
+    module = import_module(f"foxglove_schemas_protobuf.{short}_pb2")
+    return _message(module.DESCRIPTOR.message_types_by_name[short])
+
+
+def _message(descriptor: Any) -> Schema:
+    if descriptor.full_name in {"google.protobuf.Timestamp", "google.protobuf.Duration"}:
+        fields = {"sec": _WHOLE, "nsec": _WHOLE}
+        title = descriptor.name.lower()
+        return {"title": title, "type": "object", "properties": fields, "required": [*fields]}
+    return {
+        "title": descriptor.full_name,
+        "type": "object",
+        "properties": {field.name: _field(field) for field in descriptor.fields},
+        "required": [field.name for field in descriptor.fields if not _is_optional(field)],
+    }
+
+
+def _is_optional(field: Any) -> bool:
+    return field.has_presence and field.message_type is None
+
+
+def _field(field: Any) -> Schema:
+    if field.message_type is not None:
+        message = _message(field.message_type)
+    else:
+        names = {getattr(field, f"CPPTYPE_{name}"): kind for name, kind in _KINDS.items()}
+        message = {"type": names.get(field.cpp_type, "integer")}
+    return {"type": "array", "items": message} if field.is_repeated else message
+
 
 Json = dict[str, Any]
 Row = tuple[float, str, Json]

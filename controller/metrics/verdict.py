@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from snakewalk.controller.metrics.failure import failure
+from snakewalk.controller.metrics.failure import Cause, Failure, failure
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -12,7 +12,8 @@ NOT_MEASURED: Final = 3
 _MISSED: Final = 1
 """Exit code of a run that safety stopped, or that missed a waypoint."""
 _SIMULATED: Final = "sim"
-_ADVICE: Final = {
+_ADVICE: Final[dict[Cause, str]] = {
+    "safety": "snakewalk log report {log}",
     "roll": "snakewalk plan {run}",
     "climb": "snakewalk plan {run}",
     "time": "snakewalk plan {run}",
@@ -38,6 +39,8 @@ class RunVerdict:
     """Why the exit code is not 0; None if it is."""
     next_command: str | None
     """Command that shows more of the cause; None without one."""
+    failure: Cause | None = None
+    """Class of the cause; None without a failure, or if no class fits."""
 
     def accepted(self, dead_reckoning: bool) -> "RunVerdict":
         """Return the verdict if a user accepts a dead-reckoned arrival."""
@@ -53,6 +56,11 @@ class RunVerdict:
         more = "" if self.next_command is None else f"; more: {self.next_command}"
         return f"exit code {self.exit_code}: {self.cause}{more}"
 
+    @property
+    def text(self) -> str:
+        """The sentence, with the explanation if there is one."""
+        return "; ".join(part for part in (self.sentence, self.explanation) if part)
+
     def to_dict(self) -> dict[str, Any]:
         """Keys and values for JSON."""
         return asdict(self)
@@ -67,29 +75,34 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
         log: name of the log in the next command.
 
     """
-    exit_code, cause, more = _judged(record, numbers)
-    next_command = more.format(run=numbers.run, log=log, port=numbers.backend) or None
-    return RunVerdict(_sentence(numbers), _evidence(numbers), exit_code, cause, next_command)
-
-
-def _judged(record: RunRecord, numbers: RunSummary) -> tuple[int, str | None, str]:
-    """Return the exit code, the cause, and the form of the next command."""
-    if numbers.trip is not None:
-        on_port = numbers.backend != _SIMULATED
-        more = "snakewalk doctor --port {port}" if on_port else "snakewalk log report {log}"
-        return _MISSED, f"stopped by safety: {numbers.trip}", more
-    if _reached(numbers) < numbers.waypoints:
-        fault = failure(record)
+    exit_code = 0
+    cause = None
+    more = ""
+    fault = None
+    if numbers.trip is not None or _reached(numbers) < numbers.waypoints:
+        exit_code = _MISSED
+        if numbers.trip is None:
+            fault = failure(record)
+        else:
+            fault = Failure("safety", f"stopped by safety: {numbers.trip}")
         cause = "a waypoint was missed" if fault is None else fault.text
-        return _MISSED, cause, "" if fault is None else _ADVICE.get(fault.cause, "")
-    if numbers.waypoints and not numbers.is_measured:
-        return (
-            NOT_MEASURED,
+        more = "" if fault is None else _ADVICE[fault.cause]
+        if numbers.trip is not None and numbers.backend != _SIMULATED:
+            more = "snakewalk doctor --port {port}"
+    elif numbers.waypoints and not numbers.is_measured:
+        exit_code = NOT_MEASURED
+        cause = (
             "the arrival is dead-reckoned, nothing measured the pose; give a pose source with "
-            "--pose, or accept it with --accept-dead-reckoning",
-            "",
+            "--pose, or accept it with --accept-dead-reckoning"
         )
-    return 0, None, ""
+    return RunVerdict(
+        sentence=_sentence(numbers),
+        evidence=_evidence(numbers),
+        exit_code=exit_code,
+        cause=cause,
+        next_command=more.format(run=numbers.run, log=log, port=numbers.backend) or None,
+        failure=None if fault is None else fault.cause,
+    )
 
 
 def _reached(numbers: RunSummary) -> int:

@@ -38,11 +38,12 @@ from snakewalk.controller.exchange.ros_messages import (
     Row,
     pose_frame,
 )
+from snakewalk.controller.metrics.verdict import NOT_MEASURED, RunVerdict
 from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_commands import QUEUE, CommandTopics, in_words, message_type
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import BUTTON, ObserverEnd
+from snakewalk.controller.runlog.row_line import BUTTON, VERDICT, ObserverEnd
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
@@ -67,6 +68,9 @@ _STOP_S: Final = 1.0
 _LOOK_S: Final = 1e-3
 _LAST_S: Final = 0.2
 """For the last messages to leave."""
+_RUN: Final = "run"
+_LEVELS: Final = {0: OK, NOT_MEASURED: WARNING}
+"""Level of a run by its exit code."""
 _LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
     JOINT_STATES: ("robot_joint_states", QUEUE),
@@ -186,6 +190,7 @@ class RobotNode:
         self._button: PressedButton | None = None
         self._told_s = -_DIAGNOSTICS_S
         self._said: dict[str, tuple[int, str]] = {}
+        self._verdict: dict[str, str] = {}
         self.commands = CommandTopics(node, options)
         node.create_service(message_type("std_srvs/srv/Trigger"), "~/stop", self._stop)
 
@@ -201,9 +206,9 @@ class RobotNode:
     def end(self) -> None:
         """Say how the run ended."""
         if self._button is not None and self._button.end is None:
-            self._said["run"] = ERROR, "the run is gone without a word: is torque off?"
-        elif self._said.get("run", (OK, ""))[0] == OK:
-            self._said["run"] = OK, "it has come to its end"
+            self._said[_RUN] = ERROR, "the run is gone without a word: is torque off?"
+        elif not self._verdict and self._said.get(_RUN, (OK, ""))[0] == OK:
+            self._said[_RUN] = OK, "it has come to its end"
         self._told_s = -_DIAGNOSTICS_S
         self._publish_diagnostics()
         self._clock.sleep_until_s(self._clock.now_s() + _LAST_S)
@@ -217,6 +222,10 @@ class RobotNode:
             self._publish(self._messages.paths(self._record({topic: [row]})), skip=1)
         elif topic == EventTable.topic.name:
             self._log_event(row)
+        elif topic == VERDICT:
+            verdict = RunVerdict(**row)
+            self._said[_RUN] = _LEVELS.get(verdict.exit_code, ERROR), verdict.text
+            self._verdict = {key: str(value) for key, value in row.items() if value is not None}
         else:
             self._newest[topic] = row
 
@@ -282,8 +291,9 @@ class RobotNode:
         ros_s = self._ros_now_s()
         run_s = ros_s - self._offset.ros_s(0.0)
         status = [
-            self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, {})
+            self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, values)
             for name, (level, text) in self._said.items()
+            for values in (self._verdict if name == _RUN else {},)
         ]
         status.append(self._messages.pose_status(self._header))
         if _SLOW in self._newest:
@@ -303,9 +313,9 @@ class RobotNode:
         if kind in ("command", "refused", "stale"):
             self._said["commands"] = OK if kind == "command" else WARNING, f"{kind}: {text}"
         elif kind in ("trip", "interrupt"):
-            self._said["run"] = ERROR, text
+            self._said[_RUN] = ERROR, text
         elif kind == "start":
-            self._said["run"] = OK, text
+            self._said[_RUN] = OK, text
         self._told_s = -_DIAGNOSTICS_S
 
     def _send(self) -> None:

@@ -49,12 +49,12 @@ from snakewalk.controller.run.pose_provider import (
     pose_provider,
 )
 from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
-from snakewalk.controller.run.request import RunRequest, RunResult
-from snakewalk.controller.run.run_ending import RunEnding
+from snakewalk.controller.run.request import RunEnding, RunRequest, RunResult
 from snakewalk.controller.run.servo_setup import check_compliance, motor_constants
 from snakewalk.controller.runlog.evidence import PoseEvidence
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Header, InitialPose, PlanSummary
+from snakewalk.controller.runlog.row_line import VERDICT
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.controller.runtime.drive import (
     CycleObserver,
@@ -303,12 +303,12 @@ def drive(request: RunRequest, opened: OpenedRun) -> Outcome:
 
 
 def finish(request: RunRequest, opened: OpenedRun, outcome: Outcome, folder: Path) -> RunResult:
-    """Read the log back and write the summary."""
+    """Read the log back, write the summary, and send the verdict to the observers."""
     log = folder / LOG
     record = read_log(log, is_ours=True)
     moved = travel(record)
     numbers = write_summary(summary(record, moved), folder)
-    return RunResult(
+    result = RunResult(
         prepared=request.prepared,
         outcome=outcome,
         record=record,
@@ -320,6 +320,8 @@ def finish(request: RunRequest, opened: OpenedRun, outcome: Outcome, folder: Pat
         ending=opened.ending,
         saved_log=None if request.folder is None else log,
     )
+    opened.observers.on_row(VERDICT, json.dumps(result.verdict.to_dict()).encode())
+    return result
 
 
 def write_summary(numbers: RunSummary, folder: Path) -> RunSummary:

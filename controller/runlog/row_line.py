@@ -21,9 +21,10 @@ BUTTON: Final = "/button"
 GAIT: Final = "/gait"
 COURSE: Final = "/course"
 PICTURE: Final = "/picture"
+VERDICT: Final = "/verdict"
 """Topics of the line that are not in the log."""
 KEPT: Final = frozenset(
-    {BUTTON, GAIT, COURSE, *(t.topic.name for t in TABLES if t.topic.watched == "all")}
+    {BUTTON, GAIT, COURSE, VERDICT, *(t.topic.name for t in TABLES if t.topic.watched == "all")}
 )
 """Topics of which every row is sent, in order; of others the newest."""
 SENT: Final = KEPT | {PICTURE, *(t.topic.name for t in TABLES if t.topic.watched == "newest")}

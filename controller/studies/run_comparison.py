@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import path_error_m
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.metrics.tracking import tracking_error_rad
+from snakewalk.controller.metrics.verdict import RunVerdict, verdict
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -22,6 +23,7 @@ class ComparedRun:
     name: str
     """Name that separates it from the others."""
     summary: RunSummary
+    verdict: RunVerdict
     settings: Mapping[str, Any]
     """Values of run, robot and world by dotted key, with the bus and the software."""
     pose: str
@@ -61,9 +63,11 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
     rms_rad[~is_known.any(axis=1)] = np.nan
     current_a = np.where(np.isfinite(cycle.current_a), np.abs(cycle.current_a), -1.0)
     largest_a = current_a.max(axis=1, initial=-1.0)
+    numbers = summary(record)
     return ComparedRun(
         name=name,
-        summary=summary(record),
+        summary=numbers,
+        verdict=verdict(record, numbers),
         settings=settings,
         pose=header.pose_evidence.text,
         waypoints_m=header.plan.waypoints_m,

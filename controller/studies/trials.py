@@ -13,7 +13,6 @@ from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest
 from snakewalk.controller.console.pool import each
-from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import ground_contact
 from snakewalk.controller.run.factory import changed, prepare_job
 from snakewalk.controller.run.kinds.gait_factory import is_gait, prepare_gait
@@ -98,6 +97,10 @@ class Trial:
     """Cause of an incomplete run, of ``metrics.failure``, or ``refused`` or ``error``."""
     why: str = ""
     """The same in a sentence."""
+    verdict: str = ""
+    """How the run ended by its own log, in a sentence."""
+    exit_code: int = 2
+    """Exit code of ``snakewalk run`` with this end; 2 if the run could not be prepared."""
 
     @property
     def first_pass(self) -> bool:
@@ -212,7 +215,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
     except InputError as error:
         return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
     except Exception as error:  # the other runs go on
-        return replace(trial, cause="error", why=f"{type(error).__name__}: {error}")
+        return replace(trial, cause="error", why=f"{type(error).__name__}: {error}", exit_code=1)
 
 
 def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
@@ -223,7 +226,7 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
     off = result.pose.error
     reached = outcome.reached if off is None else off.waypoints_reached
     complete = outcome.tripped is None and reached == outcome.waypoints
-    ended = None if complete else failure(result.record)
+    verdict = result.verdict
     return replace(
         trial,
         complete=complete,
@@ -244,8 +247,10 @@ def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
         pose_evidence=numbers.pose_evidence,
         pose_source=numbers.pose_source,
         alarms=outcome.alarms,
-        cause="" if ended is None else ended.cause,
-        why="" if ended is None else ended.text,
+        cause="" if complete else verdict.failure or "",
+        why="" if complete or verdict.failure is None else verdict.cause or "",
+        verdict=verdict.sentence,
+        exit_code=verdict.exit_code,
     )
 
 
@@ -338,6 +343,9 @@ class CaseSummary:
     """Where one was chosen."""
     pose: str = ""
     """Evidence of the poses: ``measured (simulator)``."""
+    exit_codes: dict[str, int] | None = None
+    """Number of runs by exit code. 0: as planned; 1: a waypoint missed, a stop or an error;
+    2: rejected; 3: arrival not measured."""
     rolled: int = 0
     """Runs in which the head link was over 90 degrees on its side."""
 
@@ -383,6 +391,7 @@ def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummar
                 head_error_m=_mean([t.head_error_m for t in some], 3),
                 world=case.world or "",
                 pose=_evidence(some),
+                exit_codes=_counts([str(t.exit_code) for t in some]),
                 rolled=sum(t.roll_max_deg > 90.0 for t in some),
             )
         )

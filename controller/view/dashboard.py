@@ -11,6 +11,7 @@ from viser import uplot
 from snakewalk.config import colours
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_slope import carrier_share, ground_slope
+from snakewalk.controller.metrics.verdict import RunVerdict
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import CurveValues, panel_curves
 from snakewalk.controller.runlog.record import POSE_CHECK, Event, Header, RunRecord
@@ -48,16 +49,17 @@ class Dashboard:
         self._gui = gui = server.gui
         self._picture: viser.GuiImageHandle | None = None
         self._state = gui.add_html("")
+        self._verdict = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", True)
-        self._checks_pose = header.backend == POSE_CHECK
+        self.checks_pose = header.backend == POSE_CHECK
         self.goals = gui.add_checkbox(
             "show goals",
-            not self._checks_pose,
+            not self.checks_pose,
             hint="amber, where joints should be",
-            visible=not self._checks_pose,
+            visible=not self.checks_pose,
         )
         self.tabs = tabs = gui.add_tab_group()
-        if self._checks_pose:
+        if self.checks_pose:
             with tabs.add_tab("pose"):
                 self._feed = gui.add_html("")
         else:
@@ -112,7 +114,7 @@ class Dashboard:
             facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
         if self._ground is not None:
             ahead_rad, steepest_rad = ground_slope(self._ground, where.links_m[pose][None])
-            if np.isfinite(ahead_rad[0]) and not self._checks_pose:
+            if np.isfinite(ahead_rad[0]) and not self.checks_pose:
                 ahead, steepest = np.degrees([ahead_rad[0], steepest_rad[0]])
                 facts.append(f"slope {steepest:.0f}°, {ahead:+.0f}° ahead")
         if np.isfinite(share := carrier_share(record)):
@@ -127,9 +129,17 @@ class Dashboard:
             f"{self._contours}<br>{escape(text)}</div>"
         )
 
+    def show_verdict(self, verdict: RunVerdict) -> None:
+        """Show how the run ended."""
+        colour = _BAD if verdict.exit_code else _INK
+        self._verdict.content = (
+            f"<div style='padding:0 .8em .4em;color:{colour}'>{escape(verdict.text)}"
+            f"<br>{escape(verdict.evidence)}</div>"
+        )
+
     def show_servos(self, record: RunRecord, cycle: int, slow: int | None) -> None:
         """Show a row of bars for each servo; a check of a pose knows none."""
-        if self._checks_pose:
+        if self.checks_pose:
             return
         rows = record.cycle
         period_s = 1.0 / self._run.cycle_hz
@@ -169,7 +179,7 @@ class Dashboard:
 
     def show_curves(self, record: RunRecord, cycle: int) -> None:
         """Show the last seconds up to a row; a check of a pose has no curves."""
-        if self._checks_pose:
+        if self.checks_pose:
             return
         rows = record.cycle
         first = int(np.searchsorted(rows.time_s, rows.time_s[cycle] - SPAN_S))
@@ -189,7 +199,7 @@ class Dashboard:
 
     def show_events(self, events: tuple[Event, ...]) -> None:
         """Show the newest events, the newest first; of a checked pose, its facts as well."""
-        if self._checks_pose:
+        if self.checks_pose:
             self._feed.content = _feed_lines(events)
         self._events.content = "".join(
             "<div style='padding:.15em .8em;font-size:12px;"

@@ -14,8 +14,16 @@ from typing import Any, Final
 import viser
 
 from snakewalk.config.plain_text import plain
+from snakewalk.controller.metrics.verdict import RunVerdict
 from snakewalk.controller.runlog.record import Header, RunRecord
-from snakewalk.controller.runlog.row_line import BUTTON, COURSE, GAIT, PICTURE, ObserverEnd
+from snakewalk.controller.runlog.row_line import (
+    BUTTON,
+    COURSE,
+    GAIT,
+    PICTURE,
+    VERDICT,
+    ObserverEnd,
+)
 from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
@@ -45,6 +53,8 @@ _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
 _SILENT_S: Final = 2.0
 """A run that sends nothing for this time is reported."""
+_LAST_S: Final = 0.2
+"""For the verdict to reach the browsers."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
 
@@ -71,6 +81,8 @@ def serve(line: socket.socket, host: str, port: int) -> None:
                 raise
             except Exception as fault:  # the E-STOP stays
                 page.report(fault)
+    server.flush()
+    WallClock().sleep_until_s(WallClock().now_s() + _LAST_S)
     server.stop()
 
 
@@ -166,9 +178,8 @@ class _LivePage:
         if topic == ConfigTable.topic.name:
             self._open(record_of({topic: [row]}, complete=False, note="").header)
             return
-        if topic == PICTURE:
-            if self._dashboard is not None:
-                self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
+        if topic in (PICTURE, VERDICT):
+            self._show(topic, row)
             return
         if topic == GAIT:
             self._gait = row
@@ -184,6 +195,14 @@ class _LivePage:
         self._rows[topic].append(row)
         if topic == EventTable.topic.name:
             self._take_event(row["kind"], row["text"])
+
+    def _show(self, topic: str, row: dict[str, Any]) -> None:
+        if self._dashboard is None:
+            return
+        if topic == PICTURE:
+            self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
+        else:
+            self._dashboard.show_verdict(RunVerdict(**row))
 
     def _open(self, header: Header) -> None:
         """Draw the body of a run that begins, and its panels."""

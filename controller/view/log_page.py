@@ -11,6 +11,8 @@ import viser
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import surface
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.view.dashboard import Dashboard
 from snakewalk.controller.view.page_server import float_above, open_page
@@ -76,7 +78,10 @@ class LogPage:
         for number, (name, record) in enumerate(records.items()):
             scene = BodyScene(self.server, record.header, number)
             with nullcontext() if tabs is None else tabs.add_tab(name):
-                self._shown.append(_Shown(record, scene, Dashboard(self.server, record.header)))
+                board = Dashboard(self.server, record.header)
+            if not board.checks_pose:
+                board.show_verdict(verdict(record, summary(record)))
+            self._shown.append(_Shown(record, scene, board))
         self._shown[0].scene.first_camera()
         self.playing = False
         self.time_s = self._begin_s

@@ -69,7 +69,9 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
-    "controller.view": (9200, "0193-budget-of-the-live-page.md"),
+    "controller.view": (9300, "0242-code-of-one-importer.md"),
+    "controller.run": (22_100, "0242-code-of-one-importer.md"),
+    "controller.metrics": (5750, "0242-code-of-one-importer.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""
 

@@ -10,7 +10,7 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import SafetyTrippedError
 from snakewalk.drivers.types import JointState
-from snakewalk.sim.line.rx_queue import RxQueue
+from snakewalk.sim.line.wire import RxQueue
 from tests.campaign import rig
 from tests.campaign.campaign import Tally, campaign, run_scenario
 from tests.campaign.report import table

@@ -18,7 +18,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.run.external.served_robot import simulated_line
-from snakewalk.controller.run.external.simulated_bus import SimulatedBus
+from snakewalk.controller.run.external.simulated_backend import SimulatedBus
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus

@@ -17,6 +17,20 @@ def test_the_page_describes_every_public_name_and_no_other() -> None:
     assert sorted(described) == sorted(snakewalk.__all__)
 
 
+def test_the_page_begins_with_a_complete_example_of_ten_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    example = PAGE.split("```python\n")[1].split("```")[0]
+    assert example.count("\n") == 10
+    exec(example, {})
+    verdict, numbers = capsys.readouterr().out.splitlines()
+    assert verdict.startswith("2 of 2 waypoints, ")
+    assert verdict.endswith("; exit code 0")
+    assert numbers.endswith(" simulated")
+
+
 @pytest.mark.slow
 def test_the_examples_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from snakewalk.controller.animals.fish.fish_film import swim
 from snakewalk.controller.animals.fish.fish_synthesis import synthesise_motion
-from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 
 SETS = 20

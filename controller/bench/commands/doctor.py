@@ -22,11 +22,10 @@ from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.bench.servo_checks import unnamed_robot
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.device_kind import check_port_name
 from snakewalk.controller.console.finding import Finding
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.messages import stderr_console
-from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot
+from snakewalk.controller.console.options import DEFAULT_RUN, Json, Robot, check_port_name
 from snakewalk.controller.run.backend import FILE_PORTS, on_ports, real_ports
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, user_file
 from snakewalk.drivers.errors import BusError

@@ -10,7 +10,7 @@ from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.kinds.gait_run import GaitRun
-from snakewalk.controller.run.kinds.path_run import PathRun
+from snakewalk.controller.run.kinds.walk_run import PathRun
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.walk.course import Course

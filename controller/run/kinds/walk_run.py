@@ -6,9 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import FlatGround, WaterGround
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.roll_compensation import RollCompensation
 from snakewalk.controller.mechanics.ground_step import bridged
@@ -16,8 +17,7 @@ from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import Rollout
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
-from snakewalk.controller.run.kinds.path_run import PathRun
-from snakewalk.controller.run.prepared_run import pose_with
+from snakewalk.controller.run.prepared_run import GroundedRun, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
@@ -25,6 +25,8 @@ from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_
 from snakewalk.controller.terrain.climb import CLIMBED_RAD, SteepSection, steep_sections
 from snakewalk.controller.terrain.growing_map import GrowingMap
 from snakewalk.controller.terrain.map_planner import MapPlanner
+from snakewalk.controller.terrain.path import SplinePath
+from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.joint_track import JointTrack
@@ -39,6 +41,66 @@ from snakewalk.controller.walk.side_roll import SideRolls
 from snakewalk.controller.walk.steering import Steering
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
+
+
+@dataclass(frozen=True)
+class PathRun(GroundedRun):
+    """Base of prepared runs along a path that is planned through waypoints."""
+
+    @cached_property
+    def planner(self) -> TerrainPlanner:
+        """Plans paths over safe ground."""
+        return TerrainPlanner(self.ground_ahead, self.world.planner)
+
+    @cached_property
+    def path(self) -> SplinePath:
+        """Through the start and the waypoints."""
+        return self.planner.plan(np.vstack([self.run.start_m, self.run.waypoints_m]))
+
+    def path_length_m(self) -> float:
+        """Return the length of the path."""
+        return self.path.length_m
+
+    def check_waypoint(self, point_m: Floats) -> None:
+        """Reject a point (2,) off the ground or in an obstacle; paths are not checked.
+
+        Raises:
+            InputError: with the fault.
+
+        """
+        x_m, y_m = (float(coordinate) for coordinate in point_m)
+        where = f"waypoint ({x_m:.2f}, {y_m:.2f})"
+        if not self.on_map(point_m):
+            wide_m = self._map_size_m
+            raise InputError(
+                f"{where} is outside the world, {wide_m[0]:.1f} m by {wide_m[1]:.1f} m"
+            )
+        obstacle = self.world.obstacle
+        if obstacle is not None and obstacle.is_blocked_at(x_m, y_m):
+            raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
+
+    def on_map(self, points_m: Floats) -> Bools:
+        """Whether points (..., 2) are on the world's ground: (...)."""
+        ground = self.world.ground
+        if isinstance(ground, FlatGround | WaterGround):
+            return np.asarray(np.abs(points_m).max(axis=-1) <= 0.5 * ground.size_m)
+        assert self.ground is not None
+        return self.ground.contains(points_m[..., 0], points_m[..., 1])
+
+    @property
+    def _map_size_m(self) -> tuple[float, float]:
+        ground = self.world.ground
+        if isinstance(ground, FlatGround | WaterGround):
+            return ground.size_m, ground.size_m
+        assert self.ground is not None
+        return self.ground.size_m
+
+    @property
+    def start_heading_rad(self) -> float:
+        """Mean heading of the body at the start."""
+        given = self.run.start_heading_rad
+        return self.path.heading_rad(0.05) if given is None else given
+
 
 POINTS = 100
 _BRIDGED_LINKS = 4.0

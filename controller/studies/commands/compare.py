@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 from rich.table import Column, Table
@@ -18,6 +18,11 @@ from snakewalk.controller.studies.run_comparison import compared_run, differing,
 
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
+
+_NOT_SHOWN: Final = frozenset(
+    {"config_hash", "software", "outcome", "pose_evidence", "pose_source", "assumptions"}
+)
+"""Numbers that the verdicts or the differing settings state."""
 
 
 @command(
@@ -52,7 +57,10 @@ def compare(
     changed = differing(runs)
     if as_json:
         logs_and_runs = zip(logs, runs, strict=True)
-        summaries = [{"log": str(log)} | run.summary.to_dict() for log, run in logs_and_runs]
+        summaries = [
+            {"log": str(log), **run.summary.to_dict(), "verdict": run.verdict.to_dict()}
+            for log, run in logs_and_runs
+        ]
         drawn = None if picture is None else str(picture)
         print(json.dumps({"summaries": summaries, "differing": changed, "picture": drawn}))
         return
@@ -68,11 +76,19 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
     else:
         console.print("Run, robot and world are the same.\n")
     numbers = _table("number", "What came of it", runs)
+    verdicts = [run.verdict for run in runs]
+    numbers.add_row("verdict", *(verdict.sentence for verdict in verdicts))
+    numbers.add_row("pose", *(verdict.evidence for verdict in verdicts))
+    numbers.add_row("exit code", *(str(verdict.exit_code) for verdict in verdicts))
+    for label in ("cause", "next_command"):
+        texts = [getattr(verdict, label) for verdict in verdicts]
+        if any(texts):
+            numbers.add_row(label.replace("_", " "), *(text or "-" for text in texts))
     summaries = [flat(run.summary.to_dict()) for run in runs]
     for key in dict.fromkeys(key for summary in summaries for key in summary):
         values = [summary.get(key) for summary in summaries]
         is_known = any(value not in (None, "") for value in values)
-        if is_known and key not in {"config_hash", "software"}:
+        if is_known and key.split(".")[0] not in _NOT_SHOWN:
             cells = [labelled(key, value) for value in values]
             label = min(
                 (spelling for spelling, _ in cells), key=len

@@ -11,9 +11,9 @@ from PIL import Image
 
 from snakewalk.config.animal import SkinConfig
 from snakewalk.config.loader import load, locate, shipped
+from snakewalk.controller.animals.fish.fish_film import swim
 from snakewalk.controller.animals.fish.model import fish_model
 from snakewalk.controller.animals.fish.postures import save_postures
-from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.animals.mesh.body_skin import Cut, body_skin, fish_skin
 from snakewalk.controller.animals.mesh.skin_file import Y_UP
 from snakewalk.controller.images.mesh_files import read_mesh

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.robot import ImuConfig, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.bench import adapter
-from snakewalk.controller.bench.doctor import examine
-from snakewalk.controller.bench.imu_check import imu_finding
+from snakewalk.controller.bench.doctor import examine, imu_finding
 from snakewalk.controller.bench.scan import ScanResult, pick_port, scan
 from snakewalk.controller.console.finding import Finding, worst
 from snakewalk.drivers.bus.budget import chain_budget, wire_budget

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from snakewalk.controller.bench.loop_compiler import compile_loops, loop_modules
-from snakewalk.controller.cli.compilation_notice import CompilationNotice
+from snakewalk.controller.cli.main import CompilationNotice
 from snakewalk.drivers.compilation import observe_compilation, report_compiled
 
 ROOT = Path(__file__).resolve().parents[3]

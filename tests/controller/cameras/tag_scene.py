@@ -8,7 +8,7 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.tags import TagMount, TagsConfig
-from snakewalk.controller.cameras.tags.drawn_tags import DrawnTags
+from snakewalk.controller.cameras.tags.tag_camera import DrawnTags
 from snakewalk.controller.cameras.tags.tag_detector import TagDetector
 from snakewalk.controller.cameras.tags.tag_fit import HeadFit, TagFit
 from snakewalk.controller.cameras.tags.tag_view import TagView

@@ -14,7 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.config.pose import PoseConfig
 from snakewalk.config.tags import FixedTag, TagMount, TagsConfig
-from snakewalk.controller.cameras.tags.drawn_tags import DrawnTags
+from snakewalk.controller.cameras.tags.tag_camera import DrawnTags
 from snakewalk.controller.cameras.tags.tag_detector import TagDetector, TagPicture, tag_dictionary
 from snakewalk.controller.cameras.tags.tag_fit import TagFit
 from snakewalk.controller.cameras.tags.tag_source import TagFeed, TagsPose

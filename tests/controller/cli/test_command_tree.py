@@ -3,7 +3,7 @@
 import pytest
 
 from snakewalk.controller.cli import command_line
-from snakewalk.controller.cli.command_tree import FAMILIES, FORMER, VERBS, former_name
+from snakewalk.controller.cli.command_line import FAMILIES, FORMER, VERBS, former_name
 from snakewalk.controller.console.plugins import Plugin, builtin_plugins
 from tests.help.shown import FOLDER
 from tests.helpers.command import snakewalk

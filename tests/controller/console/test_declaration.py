@@ -11,8 +11,7 @@ from typing import Any, get_args
 import pytest
 import typer
 
-from snakewalk.controller.console.command import command_info
-from snakewalk.controller.console.declaration import declaration
+from snakewalk.controller.console.command import command_info, declaration
 from snakewalk.controller.console.plugins import builtin_plugins
 
 COMMANDS = [each for each in builtin_plugins() if each.kind == "command"]

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.console.device_kind import check_port_name
+from snakewalk.controller.console.options import check_port_name
 from snakewalk.drivers.errors import PortError
 
 

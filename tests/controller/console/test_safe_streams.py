@@ -9,7 +9,7 @@ from contextlib import redirect_stdout
 import pytest
 
 from snakewalk.controller.cli import main as entry
-from snakewalk.controller.console.safe_streams import make_streams_safe
+from snakewalk.controller.cli.main import make_streams_safe
 from tests.helpers.command import snakewalk
 
 LISTED = "from snakewalk.controller.cli.main import main; main()"

@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.world import WaterGround
 from snakewalk.controller.exchange.body_frames import body_frames
-from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
-from snakewalk.controller.exchange.foxglove_schema import foxglove_schema
+from snakewalk.controller.exchange.foxglove_scene import foxglove_schema, write_foxglove_scene
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.sim.physics.plant import MujocoPlant
 

@@ -7,7 +7,7 @@ from benchmarks.support import measured
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.links import body_in_world, chain_axes, chain_points_m, pose_at
-from snakewalk.controller.mechanics.support import lifted, support_n
+from snakewalk.controller.metrics.ground_contact import lifted, support_n
 from tests.helpers.uneven import UNEVEN
 
 ROBOT = load_robot("alternating16")

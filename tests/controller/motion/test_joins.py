@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.animals.fish.fish_film import swim
 from snakewalk.controller.animals.fish.piece_graph import piece_graph
 from snakewalk.controller.animals.fish.segments import segment_motion
-from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.animals.fish.synthesis import joint_motion, random_sequence
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait

@@ -11,12 +11,11 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.controller.console.gamepad import Gamepad, Pad
-from snakewalk.controller.console.keyboard import Keyboard, names
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.operator import Operator
+from snakewalk.controller.run.hands import Gamepad, Keyboard, Pad, names
 
 VIEW = BodyView(np.zeros((17, 3)), np.zeros((17, 3, 3)), np.zeros(3))
 

@@ -13,8 +13,7 @@ from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.rehearsal import rehearsal
 from snakewalk.controller.rehearsal.commands import rehearse as rehearse_command
 from snakewalk.controller.rehearsal.judgement import judge, true_arrivals
-from snakewalk.controller.rehearsal.metric_errors import metric_errors
-from snakewalk.controller.rehearsal.rehearsal import SimulatedPort
+from snakewalk.controller.rehearsal.rehearsal import SimulatedPort, metric_errors
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.request import RunRequest, RunResult

@@ -213,6 +213,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
     assert answer.success
     assert answer.message.startswith("stop requested by ROS service /snakewalk/stop; after ")
     client.until(lambda: says("stop requested by ROS service"))
+    client.until(lambda: says(finished.verdict.text))
     refused = [event.text for event in finished.record.events if event.kind == "refused"]
     for text, why in zip(
         [

@@ -13,7 +13,7 @@ from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run import backend
 from snakewalk.controller.run.external.served_robot import simulated_line
-from snakewalk.controller.run.external.simulated_bus import SimulatedBus
+from snakewalk.controller.run.external.simulated_backend import SimulatedBus
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot

@@ -6,11 +6,10 @@ import pytest
 from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
-from snakewalk.controller.terrain.footprint import Footprint
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief, interpolated
-from snakewalk.controller.terrain.safe_graph import RISK_LIMIT
+from snakewalk.controller.terrain.safe_graph import RISK_LIMIT, Footprint
 from snakewalk.controller.terrain.summary import path_relief, path_warnings
 from tests.controller.terrain.test_planner import field, looked_at
 

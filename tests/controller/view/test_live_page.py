@@ -177,6 +177,8 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     assert "the run has ended: stop requested by E-STOP of the page" in said
     assert not json.loads(said)["armed"]
     assert "trip: stop requested" in view.shown("_events")
+    assert finished.verdict.cause is not None
+    assert finished.verdict.cause in view.shown("_verdict")
 
 
 @pytest.mark.slow

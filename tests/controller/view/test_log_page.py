@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.cli.main import main
 from snakewalk.controller.kinematics.legs import leg_segments_m
 from snakewalk.controller.kinematics.links import body_in_world
+from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.runlog.evidence import SIMULATED, Kind, PoseEvidence
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.tables import record_of
@@ -56,6 +59,13 @@ def test_it_plays_in_time_follows_the_slider_and_stops_at_the_end(page: LogPage)
     assert not page.playing
     page.toggle()
     assert page.time_s == page._begin_s
+
+
+def test_it_states_the_verdict_of_the_log(page: LogPage, record: RunRecord) -> None:
+    shown = unescape(re.sub("<[^>]*>", " ", page._shown[0].board._verdict.content))
+    found = verdict(record, summary(record))
+    assert found.text in shown
+    assert found.evidence in shown
 
 
 def test_bars_and_curves_show_the_rows_of_the_time(page: LogPage, record: RunRecord) -> None:

@@ -12,7 +12,7 @@ from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
-from snakewalk.controller.run.external.simulated_bus import SimulatedBus
+from snakewalk.controller.run.external.simulated_backend import SimulatedBus
 from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.chain.fingerprint_file import FingerprintFile
 from snakewalk.drivers.chain.servo_chain import ServoChain

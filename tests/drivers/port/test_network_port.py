@@ -29,7 +29,7 @@ from snakewalk.controller.bench.adapter import permission
 from snakewalk.controller.bench.doctor import examine
 from snakewalk.controller.bench.scan import scan
 from snakewalk.controller.cli.main import main
-from snakewalk.controller.console.device_kind import check_port_name
+from snakewalk.controller.console.options import check_port_name
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import PortError

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
-from snakewalk.sim.line.line_fast_path import LineFastPath
-from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.line.sim_line import LineFastPath, SimLine
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 

@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.fish.fish_film import swim
 from snakewalk.controller.animals.fish.model import fish_model
 from snakewalk.controller.animals.fish.postures import load_postures, save_postures
 from snakewalk.controller.animals.fish.rendered_fish import FilmConditions, FishScene
-from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.track.readers.load import load_track
 

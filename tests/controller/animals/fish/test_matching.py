@@ -6,6 +6,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.fish.accuracy import compare
 from snakewalk.controller.animals.fish.calibration import calibrate
+from snakewalk.controller.animals.fish.fish_film import Stroke, swim
 from snakewalk.controller.animals.fish.initial_posture import midline_starts, rough_midline
 from snakewalk.controller.animals.fish.match_film import match_film, track_film
 from snakewalk.controller.animals.fish.matching import SilhouetteFrame, Target, agreement
@@ -14,7 +15,6 @@ from snakewalk.controller.animals.fish.pattern_search import pattern_search
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.raster import Window
 from snakewalk.controller.animals.fish.rendered_fish import FilmConditions
-from snakewalk.controller.animals.fish.swimmer import Stroke, swim
 from snakewalk.controller.animals.fish.top_view import TopViewFit, search
 from tests.helpers.pools import film, side_film
 

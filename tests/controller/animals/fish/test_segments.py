@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
+from snakewalk.controller.animals.fish.fish_film import Stroke, swim
 from snakewalk.controller.animals.fish.piece_graph import Piece, PieceGraph, piece_graph, placed
 from snakewalk.controller.animals.fish.postures import Postures, postures_of_track
 from snakewalk.controller.animals.fish.segments import (
@@ -22,7 +23,6 @@ from snakewalk.controller.animals.fish.segments import (
     speeds,
     turned,
 )
-from snakewalk.controller.animals.fish.swimmer import Stroke, swim
 from snakewalk.controller.animals.fish.synthesis import (
     compose,
     fading,

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.animals.fish.fish_film import swim
 from snakewalk.controller.animals.fish.fish_synthesis import synthesise_motion
 from snakewalk.controller.animals.fish.piece_graph import piece_graph
 from snakewalk.controller.animals.fish.segments import segment_motion
 from snakewalk.controller.animals.fish.steering import steered
-from snakewalk.controller.animals.fish.swimmer import swim
 from snakewalk.controller.animals.fish.synthesis import compose, sequence_through
 from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 

@@ -16,10 +16,11 @@ from snakewalk.controller.animals.people.cycle import (
     GAITS,
     RUN,
     WALK,
+    FootParameters,
     PersonMotion,
     animate,
+    feet,
 )
-from snakewalk.controller.animals.people.feet import FootParameters, feet
 from snakewalk.controller.animals.people.feet_law import FeetLaw
 from snakewalk.controller.animals.people.skeleton import INDEX
 from snakewalk.controller.animals.people.surface import Person

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.rig import Rig, posed_m
 from snakewalk.controller.animals.mesh.skin import Weights
+from snakewalk.controller.animals.synthesis.synthesis_skin import bones_with_tongue, rig_with_tongue
 from snakewalk.controller.animals.synthesis.tongue import (
     HeightChain,
     Tongue,
     TongueRecord,
     flicks,
 )
-from snakewalk.controller.animals.synthesis.tongue_skin import bones_with_tongue, rig_with_tongue
 from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import from_points
 
