@@ -71,10 +71,16 @@ class PoseConfig(Strict):
         description="how long a run without a pose holds, torque on, before it ends as failed",
     )
     start_m: float = Field(
-        0.5,
+        0.25,
         gt=0.0,
         le=10.0,
         description="largest distance of the first pose from the start of the run",
+    )
+    start_deg: float = Field(
+        20.0,
+        gt=0.0,
+        le=180.0,
+        description="largest angle of the body at the first pose from the heading of the start",
     )
 
 

@@ -185,7 +185,7 @@ class RunSummary:
     @property
     def is_measured(self) -> bool:
         """Whether distances and arrivals are measured."""
-        return self.pose_evidence != Kind.DEAD_RECKONED
+        return self.pose_evidence not in (Kind.DEAD_RECKONED, Kind.UNCONFIRMED)
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values of ``summary.json``."""
@@ -212,8 +212,8 @@ def summary(record: RunRecord, moved: Travel | None = None) -> RunSummary:
 
     ``moved`` is its travel, where it was computed before.
 
-    Where the pose is dead-reckoned, the numbers that need a measured pose are None and have a
-    counterpart ``dead_reckoned_*``. Times count from the moment torque was switched on.
+    Where the pose is dead-reckoned or unconfirmed, the numbers that need a measured pose are None
+    and have a counterpart ``dead_reckoned_*``. Times count from the moment torque was switched on.
     """
     numbers = _summary(record, travel(record) if moved is None else moved)
     if numbers.is_measured:
@@ -312,17 +312,20 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
 def _evidence(record: RunRecord) -> dict[str, Any]:
     """Return the fields of a summary about pose, port and assumptions.
 
-    The uncertainty is the one that the source states, or the median of the one it measured.
+    The uncertainty is the one that the source states, or the one it measured: the largest of the
+    position, which grows with the distance from the start, and the median of the heading.
     """
     header = record.header
     measured = record.pose_source
     stated = header.pose_evidence
-    position_m = _median(measured.position_sd_m) if stated.is_measured else None
+    position_m = _largest(measured.position_sd_m[measured.is_confirmed])
     heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
     return {
         "pose_evidence": str(stated.kind),
         "pose_source": stated.source,
-        "pose_position_sd_m": position_m if stated.position_m is None else stated.position_m,
+        "pose_position_sd_m": (
+            position_m if stated.is_measured and stated.position_m is None else stated.position_m
+        ),
         "pose_heading_sd_rad": heading_rad if stated.heading_rad is None else stated.heading_rad,
         "pose_is_simulated": header.initial_pose is not None,
         "port_is_pseudo_terminal": header.port_is_pseudo_terminal,
@@ -397,7 +400,10 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
     if tripped is not None:
         return f"stopped by safety: {tripped}"
     if not record.header.pose_evidence.is_measured and waypoints:
-        so_far = f"believes it reached {reached} of {waypoints} (dead reckoning)"
+        how = "dead reckoning"
+        if record.header.pose_evidence.kind is Kind.UNCONFIRMED:
+            how = "unconfirmed pose"
+        so_far = f"believes it reached {reached} of {waypoints} ({how})"
     elif waypoints and reached == waypoints:
         return "every waypoint reached"
     else:
@@ -412,6 +418,11 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
 def _mean(values: Floats) -> float:
     finite_values = values[np.isfinite(values)]
     return float(finite_values.mean()) if finite_values.size else float("nan")
+
+
+def _largest(values: Floats) -> float | None:
+    known = values[np.isfinite(values)]
+    return _digits(float(known.max())) if known.size else None
 
 
 def _median(values: Floats) -> float | None:

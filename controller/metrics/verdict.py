@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from snakewalk.controller.metrics.failure import Cause, Failure, failure
 from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import RunRecord
 
 NOT_MEASURED: Final = 3
@@ -42,9 +43,14 @@ class RunVerdict:
     failure: Cause | None = None
     """Class of the cause; None without a failure, or if no class fits."""
 
+    @property
+    def is_unconfirmed(self) -> bool:
+        """Whether a source sent poses that did not agree with the joints."""
+        return self.evidence.startswith(Kind.UNCONFIRMED)
+
     def accepted(self, dead_reckoning: bool) -> "RunVerdict":
         """Return the verdict if a user accepts a dead-reckoned arrival."""
-        if not dead_reckoning or self.exit_code != NOT_MEASURED:
+        if not dead_reckoning or self.exit_code != NOT_MEASURED or self.is_unconfirmed:
             return self
         return RunVerdict(self.sentence, self.evidence, 0, None, None)
 
@@ -89,18 +95,27 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
         more = "" if fault is None else _ADVICE[fault.cause]
         if numbers.trip is not None and numbers.backend != _SIMULATED:
             more = "snakewalk doctor --port {port}"
+    elif numbers.pose_evidence == Kind.UNCONFIRMED:
+        exit_code = NOT_MEASURED
+        cause = (
+            f"the pose of {numbers.pose_source} is unconfirmed: it did not agree with the joints; "
+            "check the source"
+        )
+        more = "snakewalk pose check {pose} --run {run}"
     elif numbers.waypoints and not numbers.is_measured:
         exit_code = NOT_MEASURED
         cause = (
             "the arrival is dead-reckoned, nothing measured the pose; give a pose source with "
             "--pose, or accept it with --accept-dead-reckoning"
         )
+    pose = record.header.run.pose
+    next_command = more.format(run=numbers.run, log=log, port=numbers.backend, pose=pose)
     return RunVerdict(
         sentence=_sentence(numbers),
         evidence=_evidence(numbers),
         exit_code=exit_code,
         cause=cause,
-        next_command=more.format(run=numbers.run, log=log, port=numbers.backend) or None,
+        next_command=next_command or None,
         failure=None if fault is None else fault.cause,
     )
 
@@ -125,7 +140,9 @@ def _sentence(numbers: RunSummary) -> str:
         parts.append(f"moved {travelled_m:.2f} m")
     if numbers.duration_s is not None:
         parts.append(f"{numbers.duration_s:.1f} s")
-    if not is_measured:
+    if numbers.pose_evidence == Kind.UNCONFIRMED:
+        parts.append("by an unconfirmed pose")
+    elif not is_measured:
         parts.append("by dead reckoning")
     if numbers.trip is not None:
         parts.insert(0, "stopped by safety")

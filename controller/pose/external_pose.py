@@ -10,9 +10,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.pose import PoseConfig
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.pose.motion_check import MotionCheck
+from snakewalk.controller.pose.agreement import Agreement
 from snakewalk.controller.pose.motion_history import Moment, MotionHistory
 from snakewalk.controller.pose.pose_filter import PoseFilter
 from snakewalk.controller.pose.relocation import PlacedPose, Relocation
@@ -134,7 +136,20 @@ class ExternalPose:
         feed: PoseFeed,
         reckoning: Callable[[JointState], BodyPose],
         on_event: Callable[[str], None] = lambda text: None,
+        *,
+        is_level: bool = True,
     ) -> None:
+        """Prepare.
+
+        Args:
+            robot: whose head it is.
+            config: its tracked body.
+            feed: of the source.
+            reckoning: dead reckoning from the joints; it begins at the start of the run.
+            on_event: accepts a line for each fault and each correction.
+            is_level: whether the ground is a floor.
+
+        """
         self._config = config
         self._feed = feed
         self._reckoning = reckoning
@@ -142,7 +157,10 @@ class ExternalPose:
         self._body = TrackedBody(robot, config)
         self._history = MotionHistory(robot.joint_count)
         self._filter = PoseFilter(robot)
-        self._clock, self._check = SenderClock(), MotionCheck()
+        self._is_level = is_level
+        self._clock = SenderClock()
+        self._check = Agreement(is_level=is_level)
+        self._start_m: Floats | None = None
         self._relocation = Relocation()
         self._has_slid = False
         self._latency = LatencyEstimate(config.latency_s)
@@ -180,6 +198,21 @@ class ExternalPose:
             self._accept(arrival)
         return self._filter.pose(state.time_s)
 
+    def needs_caution(self) -> bool:
+        """Whether the run should move slowly until the source has agreed with the joints."""
+        return self._check.is_cautious
+
+    @property
+    def position_sd_m(self) -> float:
+        """Standard deviation of the head's position, with errors that agreement cannot show.
+
+        A wrong scale moves a body that is far from its start more than one that is near it.
+        """
+        if self._start_m is None:
+            return self._filter.position_sd_m
+        away_m = np.hypot(*(self._filter.pose(self._now_s).head_in_world_m - self._start_m)[:2])
+        return float(np.hypot(self._filter.position_sd_m, self._check.scale_sd * away_m))
+
     def fault(self) -> str | None:
         """Return why the pose cannot be trusted any more; None while it can."""
         if self._check.fault is not None:
@@ -212,12 +245,13 @@ class ExternalPose:
         used = self._used
         return {
             "age_s": self._now_s - self._used_s if np.isfinite(self._used_s) else float("nan"),
-            "position_sd_m": self._filter.position_sd_m,
+            "position_sd_m": self.position_sd_m,
             "heading_sd_rad": self._filter.heading_sd_rad,
             "latency_s": self._latency.latency_s,
             "sequence": -1 if used is None else used.sequence,
             "arrival_s": float("nan") if self._newest is None else self._newest.arrival_s,
             "fault": self.fault() or "",
+            "is_confirmed": self._check.is_confirmed,
         }
 
     def _accept(self, arrived: ArrivedPose) -> None:
@@ -257,9 +291,13 @@ class ExternalPose:
             return
         off = self._filter.innovation(measured, then)
         placed = _placed(measured, then, self._filter.turn_rad(measured, then))
+        if not self._filter.is_placed:
+            self._compare_start(placed)
         if not self._filter.is_placed or not off.is_jump:
             self._filter.update(measured, then, off)
         elif not self._has_relocated(placed):
+            if self._check.has_agreed and self._relocation.is_followed:
+                self._check.forget()  # a body that slides does not move as its joints do
             self._reject(
                 "jump",
                 f"jump by {off.distance_m:.2f} m and {np.degrees(off.angle_rad):.0f} degrees",
@@ -274,6 +312,26 @@ class ExternalPose:
         self._used = sample
         self._used_s = measured_s
         self._reason = ""
+
+    def _compare_start(self, placed: PlacedPose) -> None:
+        """Compare the first pose with the start of the run.
+
+        Raises:
+            InputError: the robot lies elsewhere, or points elsewhere.
+
+        """
+        config = self._config
+        self._start_m = placed.position_m.copy()
+        away_m = float(np.hypot(*(placed.position_m[:2] - placed.odometry_m)))
+        turned_deg = float(np.degrees(placed.turn_rad))
+        if away_m <= config.start_m and abs(turned_deg) <= config.start_deg:
+            return
+        raise InputError(
+            f"pose: the robot lies {away_m:.2f} m from the start of the run, turned by "
+            f"{turned_deg:+.0f} degrees; put it there, or correct pose.world_m and pose.world_deg "
+            f"(at most {config.start_m:g} m and {config.start_deg:g} degrees: pose.start_m, "
+            "pose.start_deg)"
+        )
 
     def _has_relocated(self, placed: PlacedPose) -> bool:
         """Whether the body truly moved without its joints, and now lies where the poses say."""
@@ -328,7 +386,7 @@ class ExternalPose:
         self.counts["restarts"] += 1
         self._newest = None
         self._clock = SenderClock()
-        self._check = MotionCheck()
+        self._check = Agreement(is_level=self._is_level)
         self._relocation = Relocation()
         self._on_event(f"restarted sender: {why}; its clock is estimated again")
 

@@ -20,8 +20,17 @@ from snakewalk.drivers.clock import Clock
 WAIT_S: Final = 5.0
 """How long the first pose is awaited (ours)."""
 LOOK_S: Final = 0.02
+WATCH_S: Final = 2.0
+"""How long the poses of a robot at rest are watched (ours)."""
+BLOCKS: Final = 8
+DRIFT_M_S: Final = 0.01
+DRIFT_SD: Final = 5.0
+"""Smallest speed of a robot at rest that is drift of its source, also in standard deviations
+(ours). It comes from the means of ``BLOCKS`` parts of the time."""
 LEAST_UP: Final = 0.5
 """Least cosine between the link's up axis and the vertical (ours)."""
+UNIT_M: Final = 10.0
+"""Distance from the start above which millimetres are considered (ours)."""
 HEIGHT_M: Final = 0.3
 """Largest distance of the first pose from the height of the ground (ours)."""
 
@@ -29,10 +38,11 @@ HEIGHT_M: Final = 0.3
 def await_first_pose(
     source: str, feed: PoseFeed, clock: Clock, judge: Callable[[PoseSample], str | None]
 ) -> list[ArrivedPose]:
-    """Wait for the first pose; returns all that have arrived.
+    """Wait for the first pose, and watch the next ones at rest; returns the newest message.
 
     Raises:
-        InputError: none arrives, none can be read, or ``judge`` returns why it cannot be right.
+        InputError: none arrives, none can be read, ``judge`` returns why it cannot be right, or
+            the robot that rests seems to move.
 
     """
     until_s = clock.now_s() + WAIT_S
@@ -47,12 +57,46 @@ def await_first_pose(
             fault = judge(arrival.sample)
             if fault is not None:
                 raise InputError(f"pose {source}: {fault}")
-            return arrived
+            return _watched(source, feed, clock, arrived)
         clock.sleep_until_s(clock.now_s() + LOOK_S)
     raise InputError(
         f"pose {source}: no usable pose within {WAIT_S:g} s: "
         f"{reason or 'nothing arrived; start the sender, or correct its address'}"
     )
+
+
+def _watched(
+    source: str, feed: PoseFeed, clock: Clock, arrived: list[ArrivedPose]
+) -> list[ArrivedPose]:
+    """Receive the poses of a robot at rest, whose source should not drift.
+
+    Raises:
+        InputError: the poses move.
+
+    """
+    until_s = clock.now_s() + WATCH_S
+    while clock.now_s() < until_s:
+        clock.sleep_until_s(clock.now_s() + LOOK_S)
+        arrived += feed.arrived(clock.now_s())
+    samples = [m.sample for m in arrived if isinstance(m.sample, PoseSample)]
+    if len(samples) < 2 * BLOCKS:
+        return arrived[-1:]
+    time_s = np.array([sample.time_s for sample in samples])
+    place_m = np.array([sample.position_m for sample in samples])
+    blocks = np.array_split(np.arange(len(samples)), BLOCKS)
+    at_s = np.array([time_s[rows].mean() for rows in blocks]) - time_s.mean()
+    mean_m = np.array([place_m[rows].mean(axis=0) for rows in blocks]) - place_m.mean(axis=0)
+    spread_s2 = float(at_s @ at_s)
+    drift_m_s = at_s @ mean_m / spread_s2
+    off_m = mean_m - np.outer(at_s, drift_m_s)
+    sd_m_s = float(np.sqrt(np.sum(off_m**2) / (3 * (BLOCKS - 2)) / spread_s2))
+    speed_m_s = float(np.linalg.norm(drift_m_s))
+    if speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
+        raise InputError(
+            f"pose {source}: the robot rests, and its pose moves by {100.0 * speed_m_s:.1f} cm/s; "
+            "leave the robot alone, or wait until the source does not drift"
+        )
+    return arrived[-1:]
 
 
 def start_fault(
@@ -82,7 +126,7 @@ def start_fault(
     away_m = float(np.hypot(*(link_m[:2] - start_m)))
     start = f"({start_m[0]:.2f}, {start_m[1]:.2f})"
     small_m = np.array(config.world_m) + world @ (1e-3 * sample.position_m)
-    if away_m > reach_m and float(np.hypot(*(small_m[:2] - start_m))) <= reach_m:
+    if away_m > UNIT_M and float(np.hypot(*(small_m[:2] - start_m))) <= reach_m:
         return (
             f"wrong unit: position {_places(sample.position_m)} looks like millimetres; send metres"
         )

@@ -77,8 +77,12 @@ class PoseFilter:
         self._body = np.eye(3)
         self._shape = np.eye(3)
         """Mean frame of the links in the axes of the head link, for the newest joints."""
-        self._measured_s = -np.inf
-        """When the newest measurement that was used was made."""
+        self._seen_s = -np.inf
+        """When the newest measurement was made, used or not: poses that arrive without a gap leave
+        no time in which the body could have slid unseen."""
+        self._gate = self._used_gate = np.zeros((3, 3))
+        """Covariance of the position with which a jump is judged, and the same after the newest
+        measurement that was used."""
         self._frame_rad = 0.0
         """Heading of the frame of dead reckoning in the world."""
         self.is_placed = False
@@ -119,7 +123,9 @@ class PoseFilter:
             across = DRIFT_M2_S * step_s + moved
             rise = RISE_M2_S * step_s + 0.5 * moved
             tilt = TILT_RAD2_S * step_s
-            self.position_covariance += np.diag([across, across, rise])
+            growth = np.diag([across, across, rise])
+            self.position_covariance += growth
+            self._gate = self._gate + growth
             self.turn_covariance += np.diag([tilt, tilt, DRIFT_RAD2_S * step_s + turned])
 
     def innovation(self, measured: HeadMeasurement, then: Moment) -> Innovation:
@@ -130,8 +136,9 @@ class PoseFilter:
         body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
         measured_frame = measured.rotation @ self._mean_frame(then)
         off_m, off_rad = measured.position_m - head_m, rotation_vector(measured_frame @ body.T)
-        gap_s = min(max(then.time_s - self._measured_s, 0.0), SLIDE_S)
-        far = _deviations(off_m, self.position_covariance + measured.position_covariance)
+        gap_s = min(max(then.time_s - self._seen_s, 0.0), SLIDE_S)
+        self._seen_s = then.time_s
+        far = _deviations(off_m, self._gate + measured.position_covariance)
         variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
         turn_rad = abs(_turn_between(body[:, 0], measured_frame[:, 0]))
         is_jump = bool(
@@ -141,6 +148,8 @@ class PoseFilter:
                 and turn_rad > JUMP_RAD + SLIDE_RAD_S * gap_s
             )
         )
+        if is_jump:
+            self._gate = self._used_gate
         return Innovation(off_m, off_rad, is_jump)
 
     def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
@@ -157,18 +166,19 @@ class PoseFilter:
 
     def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
         """Correct the pose by a measurement and its innovation; the first one places the body."""
-        self._measured_s = then.time_s
         if not self.is_placed:
             self.is_placed = True
             self.position_covariance = measured.position_covariance.copy()
             self.turn_covariance = measured.rotation_covariance.copy()
             self._head_m += off.position_m
             self._body = rotation_by(off.turn_rad) @ self._body
+            self._gate = self._used_gate = self.position_covariance.copy()
             self._align()
             return
         gain, self.position_covariance = _corrected(
             self.position_covariance, measured.position_covariance
         )
+        self._gate = self._used_gate = self.position_covariance.copy()
         self._head_m += gain @ off.position_m
         gain, self.turn_covariance = _corrected(self.turn_covariance, measured.rotation_covariance)
         self._body = rotation_by(gain @ off.turn_rad) @ self._body

@@ -20,6 +20,8 @@ friction 0.08 ends at 1.4 m/s."""
 STEP_M: Final = 0.15
 STEP_RAD: Final = 0.3
 """How far at most between two poses, however long apart: a body that nobody saw slide did not."""
+GAPS: Final = 1.5
+"""Intervals between poses in which a step may happen (ours): a tracker's step needs one."""
 STEP_SD: Final = 5.0
 """Noise of two poses that may add to a step, in standard deviations (ours)."""
 SETTLED_S: Final = 1.0
@@ -67,6 +69,7 @@ class Relocation:
     def __init__(self) -> None:
         self._used: PlacedPose | None = None
         self._last: PlacedPose | None = None
+        self._seen_s = -np.inf
         self._settled: deque[PlacedPose] = deque()
 
     @property
@@ -77,13 +80,16 @@ class Relocation:
     def use(self, pose: PlacedPose) -> None:
         """Begin at a pose that is used."""
         self._used = self._last = pose
+        self._seen_s = pose.time_s
         self._settled.clear()
 
     def add(self, pose: PlacedPose) -> Relocated | None:
         """Return how the body moved once its poses have settled; None before."""
         used = self._used
         last = self._last
-        if used is None or last is None or not _follows(last, pose):
+        gap_s = pose.time_s - self._seen_s
+        self._seen_s = pose.time_s
+        if used is None or last is None or not _follows(last, pose, GAPS * gap_s):
             return None
         self._last = pose
         self._settled.append(pose)
@@ -99,9 +105,9 @@ class Relocation:
         return Relocated(float(np.linalg.norm(away_m)), pose.time_s - used.time_s)
 
 
-def _follows(last: PlacedPose, pose: PlacedPose) -> bool:
-    """Whether a body may have moved from one pose to the next."""
-    gap_s = pose.time_s - last.time_s
+def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
+    """Whether a body may have moved from one pose to the next, in at most ``most_s``."""
+    gap_s = min(pose.time_s - last.time_s, most_s)
     off_m = float(np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad)))
     off_rad = abs(_wrapped(pose.turn_rad - last.turn_rad))
     noise_m = STEP_SD * np.hypot(last.position_sd_m, pose.position_sd_m)

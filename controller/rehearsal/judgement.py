@@ -10,9 +10,10 @@ from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
 
-MARGIN_M: Final = 0.02
-"""How much farther than its radius a waypoint may be from the true body: twice the noise of a
-tracker of 1 cm (ours)."""
+LEAST_SD_M: Final = 0.01
+"""Accuracy of a pose that states none (ours)."""
+SD: Final = 2.0
+"""How many standard deviations that the run states a waypoint may be farther than its radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,8 @@ class Judgement:
     claimed: int
     """Waypoints that the run says it reached."""
     truly_reached: int
-    """Waypoints that the body truly came to, in order, within their radius and ``MARGIN_M``."""
+    """Waypoints that the body truly came to, in order, within their radius and the stated
+    accuracy."""
     closest_m: tuple[float, ...]
     """Least distance of the true body from each waypoint, after the waypoint before."""
     outcome: str
@@ -66,7 +68,13 @@ class Judgement:
         }
 
 
-def judge(truth: Truth, record: RunRecord, tripped: str | None, outcome: str) -> Judgement:
+def judge(
+    truth: Truth,
+    record: RunRecord,
+    tripped: str | None,
+    outcome: str,
+    position_sd_m: float | None = None,
+) -> Judgement:
     """Compare a run with the truth of the robot that was served.
 
     Args:
@@ -74,12 +82,12 @@ def judge(truth: Truth, record: RunRecord, tripped: str | None, outcome: str) ->
         record: log of the run.
         tripped: why the run was stopped, or None.
         outcome: of the run's summary.
+        position_sd_m: accuracy of the pose that the run states; None: ``LEAST_SD_M``.
 
     """
     plan = record.header.plan
-    reached, closest = true_arrivals(
-        truth.centre_m[:, :2], plan.waypoints_m, plan.waypoint_radius_m + MARGIN_M
-    )
+    within_m = plan.waypoint_radius_m + SD * max(position_sd_m or 0.0, LEAST_SD_M)
+    reached, closest = true_arrivals(truth.centre_m[:, :2], plan.waypoints_m, within_m)
     off_path_m = _off_path_m(truth, record)
     head_m, heading_rad = pose_errors(truth, record)
     steps_m = truth.centre_m[:: _stride(truth), :2]

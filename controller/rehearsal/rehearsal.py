@@ -284,7 +284,13 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
     except InputError as error:
         return {"error": error.faults[0]}
     numbers = result.summary
-    judgement = judge(read_truth(truth), result.record, result.outcome.tripped, numbers.outcome)
+    judgement = judge(
+        read_truth(truth),
+        result.record,
+        result.outcome.tripped,
+        numbers.outcome,
+        numbers.pose_position_sd_m,
+    )
     metrics = metric_errors(read_truth(truth), result.record, numbers)
     return {
         **judgement.facts(),
@@ -292,6 +298,7 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
         "friction": _friction_facts(result, deviation),
         "duration_s": round(result.outcome.duration_s, 2),
         "missed": result.outcome.missed,
+        "position_sd_m": numbers.pose_position_sd_m,
         "latency_s": result.pose.facts().get("pose_latency_s"),
     }
 

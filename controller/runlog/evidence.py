@@ -18,6 +18,8 @@ class Kind(StrEnum):
     """Read from a file or an option."""
     DEAD_RECKONED = "dead-reckoned"
     """A pose integrated from the joints, or from the joints and an IMU."""
+    UNCONFIRMED = "unconfirmed"
+    """A pose that a source sent, and that did not agree with the joints."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class PoseEvidence:
     @property
     def is_measured(self) -> bool:
         """Whether distances and arrivals that follow from these poses are measured."""
-        return self.kind is not Kind.DEAD_RECKONED
+        return self.kind not in (Kind.DEAD_RECKONED, Kind.UNCONFIRMED)
 
     @property
     def text(self) -> str:

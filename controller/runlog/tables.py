@@ -11,6 +11,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.column import ANY, JOINT, LINK, REQUIRED, Column, Table
 from snakewalk.controller.runlog.encode import array
+from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Event, Header, RunRecord
 from snakewalk.controller.runlog.topics import (
     ConfigTable,
@@ -97,6 +98,10 @@ def record_of(
         *zip(changed.time_s.tolist(), changed.waypoints_m, strict=True),
     )
     tables: dict[str, Any] = {name: table(kind) for name, kind in _TABLES.items()}
+    confirmed = tables["pose_source"].is_confirmed
+    if len(confirmed) and not confirmed[-1]:
+        evidence = replace(header.pose_evidence, kind=Kind.UNCONFIRMED)
+        header = replace(header, pose_evidence=evidence)
     return RunRecord(
         header=_with_waypoints(header, waypoints) if len(waypoints) > 1 else header,
         paths=(

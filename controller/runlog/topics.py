@@ -248,6 +248,9 @@ class PoseSourceTable(Table):
     sequence: Annotated[Ints, Column("of the newest pose that was used", "integer", default=-1)]
     arrival_s: Annotated[Floats, _optional("when the newest pose arrived")]
     fault: Annotated[Texts, Column("why the pose is not trusted", "text", default="")]
+    is_confirmed: Annotated[
+        Flags, Column("whether the source agrees with the joints", "flag", default=True)
+    ]
 
 
 @topic("/path", watched="all")

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
+CAUTIOUS: Final = 0.5
+"""Rate of the motion before a source has agreed with the joints (ours)."""
 SLOW_S: Final = 0.5
 """Time in which the motion comes to rest, and starts again (ours)."""
 
@@ -18,6 +20,8 @@ class PoseHealth:
     """How long a run without a pose holds."""
     row: Callable[[], dict[str, Any]]
     """State of the source, as ``PoseSourceTable`` logs it."""
+    is_cautious: Callable[[], bool] = lambda: False
+    """Whether the motion should be slow until the source has agreed with the joints."""
 
 
 @dataclass(slots=True)
@@ -52,5 +56,7 @@ class PoseHold:
         if since_s is not None and now_s - since_s >= self.health.hold_s:
             self.failure = f"pose: {fault}"
         step = period_s / SLOW_S
-        self._rate = min(max(self._rate + (step if fault is None else -step), 0.0), 1.0)
+        most = CAUTIOUS if self.health.is_cautious() else 1.0
+        target_rate = most if fault is None else 0.0
+        self._rate += min(max(target_rate - self._rate, -step), step)
         return self._rate

@@ -107,10 +107,15 @@ class TagsPose:
             _check_start(context, fit, first, config)
             feed = TagFeed(robot, pictures, fit)
             pose = ExternalPose(
-                robot, config, feed, context.reckoning, lambda text: context.on_event("pose", text)
+                robot,
+                config,
+                feed,
+                context.reckoning,
+                lambda text: context.on_event("pose", text),
+                is_level=context.prepared.ground is None,
             )
             source = _NotedJoints(feed, pose)
-            health = PoseHealth(pose.fault, config.hold_s, pose.row)
+            health = PoseHealth(pose.fault, config.hold_s, pose.row, pose.needs_caution)
             yield PoseProvider(
                 source, lambda: pose.facts() | feed.facts(), health, pose.take_measured
             )

@@ -22,7 +22,9 @@ def judge(
     """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""
     record = read_log(log)
     numbers = summary(record)
-    judgement = judged(read_truth(truth), record, numbers.trip, numbers.outcome)
+    judgement = judged(
+        read_truth(truth), record, numbers.trip, numbers.outcome, numbers.pose_position_sd_m
+    )
     facts = judgement.facts()
     show(facts if as_json else {"verdict": judgement.text, **facts}, as_json)
     if (

@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from typing import Protocol
 
-import numpy as np
-
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.pose import PoseConfig
@@ -75,10 +73,8 @@ class ExternalSource(ABC):
         return faults
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
-        """Return that the source measures, with the noise of the robot's [pose]."""
-        config = robot.pose or PoseConfig()
-        noise_rad = float(np.radians(config.noise_deg))
-        return PoseEvidence(Kind.MEASURED, self.name, config.noise_m, noise_rad)
+        """Return that the source measures; each pose has its accuracy in the log."""
+        return PoseEvidence(Kind.MEASURED, self.name)
 
     @contextmanager
     def open(self, context: PoseContext) -> Iterator[PoseProvider]:
@@ -97,7 +93,12 @@ class ExternalSource(ABC):
         opened = rehearsed if rehearsed is not None else self.open_feed(context.argument, clock)
         with closing(_Feed(opened)) as feed:
             pose = ExternalPose(
-                robot, config, feed, context.reckoning, lambda text: context.on_event("pose", text)
+                robot,
+                config,
+                feed,
+                context.reckoning,
+                lambda text: context.on_event("pose", text),
+                is_level=prepared.ground is None,
             )
             early = await_first_pose(
                 f"{self.name}:{context.argument}",
@@ -108,7 +109,7 @@ class ExternalSource(ABC):
                 ),
             )
             pose.keep(early)
-            health = PoseHealth(pose.fault, config.hold_s, pose.row)
+            health = PoseHealth(pose.fault, config.hold_s, pose.row, pose.needs_caution)
             yield PoseProvider(pose, pose.facts, health, pose.take_measured)
 
 

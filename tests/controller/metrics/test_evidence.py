@@ -64,6 +64,12 @@ def test_dead_reckoning_gives_null_and_a_counterpart(
     assert n["outcome"] == "believes it reached 3 of 4 (dead reckoning)"
 
 
+def test_an_unconfirmed_pose_measures_nothing(record: RunRecord) -> None:
+    n = summary(with_evidence(record, PoseEvidence(Kind.UNCONFIRMED, "udp")))
+    assert n.waypoints_reached is None
+    assert n.outcome == "believes it reached 3 of 4 (unconfirmed pose)"
+
+
 @pytest.mark.parametrize("evidence", MEASURED, ids=lambda e: e.source)
 def test_a_measured_pose_gives_the_numbers(record: RunRecord, evidence: PoseEvidence) -> None:
     n = summary(with_evidence(record, evidence)).to_dict()
@@ -73,13 +79,17 @@ def test_a_measured_pose_gives_the_numbers(record: RunRecord, evidence: PoseEvid
 
 
 def test_an_uncertainty_that_the_source_measured_is_that_of_the_run(record: RunRecord) -> None:
-    """A source without a stated accuracy has the median of its poses; others keep theirs."""
+    """A source without a stated accuracy has the largest of its poses; others keep theirs.
+
+    Poses before the source agreed with the joints do not count.
+    """
     measured = dataclasses.replace(
         record.pose_source,
-        position_sd_m=np.array([np.nan, 0.002, 0.003, 0.1]),
+        position_sd_m=np.array([np.nan, 0.2, 0.003, 0.1]),
         heading_sd_rad=np.array([np.nan, 0.01, 0.02, 0.03]),
+        is_confirmed=np.array([True, False, True, True]),
     )
-    for source, expected in (("tags", (0.003, 0.02)), ("camera", (0.01, 0.05))):
+    for source, expected in (("tags", (0.1, 0.02)), ("camera", (0.01, 0.05))):
         (evidence,) = (each for each in MEASURED if each.source == source)
         n = summary(dataclasses.replace(with_evidence(record, evidence), pose_source=measured))
         assert (n.pose_position_sd_m, n.pose_heading_sd_rad) == expected

@@ -37,6 +37,8 @@ DEAD_RECKONED = {
     "dead_reckoned_travelled_m": 2.5,
 }
 
+UNCONFIRMED = DEAD_RECKONED | {"pose_evidence": "unconfirmed", "pose_source": "udp"}
+
 
 @pytest.mark.parametrize(
     ("changes", "sentence"),
@@ -49,6 +51,7 @@ DEAD_RECKONED = {
         ({"waypoints": 0}, "moved 1.50 m, 12.3 s"),
         ({"waypoints": 0, "travelled_m": None, "duration_s": None}, ""),
         (DEAD_RECKONED, "2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by dead reckoning"),
+        (UNCONFIRMED, "2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by an unconfirmed pose"),
         (DEAD_RECKONED | {"waypoints": 0}, "moved 2.50 m, 12.3 s, by dead reckoning"),
         ({"waypoints": 0, "trip": "heat"}, "stopped by safety, moved 1.50 m, 12.3 s"),
         ({"waypoints": 0, "outcome": "interrupted by Ctrl-C"}, "interrupted, moved 1.50 m, 12.3 s"),
@@ -66,6 +69,8 @@ def test_the_sentence(record: RunRecord, changes: dict[str, Any], sentence: str)
         ({"trip": "heat", "backend": "/dev/x"}, 1, "snakewalk doctor --port /dev/x"),
         (DEAD_RECKONED, NOT_MEASURED, None),
         (DEAD_RECKONED | {"waypoints": 0}, 0, None),
+        (UNCONFIRMED, NOT_MEASURED, "snakewalk pose check None --run None"),
+        (UNCONFIRMED | {"waypoints": 0}, NOT_MEASURED, "snakewalk pose check None --run None"),
     ],
 )
 def test_the_exit_code_and_the_next_command(
@@ -80,6 +85,8 @@ def test_a_user_accepts_a_dead_reckoned_arrival_and_nothing_else() -> None:
     assumed = RunVerdict("2 of 2", "dead-reckoned (joints)", NOT_MEASURED, "not measured", None)
     assert assumed.accepted(False) is assumed
     assert assumed.accepted(True) == RunVerdict("2 of 2", assumed.evidence, 0, None, None)
+    wrong = RunVerdict("2 of 2", "unconfirmed (udp)", NOT_MEASURED, "did not agree", None)
+    assert wrong.accepted(True) is wrong
     missed = RunVerdict("1 of 2", "simulated", 1, "slip", "snakewalk log shadow log.mcap")
     assert missed.accepted(True) is missed
     assert missed.explanation == "exit code 1: slip; more: snakewalk log shadow log.mcap"

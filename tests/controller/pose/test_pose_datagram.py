@@ -145,6 +145,40 @@ def test_a_frame_whose_y_axis_is_up_is_turned_by_the_table() -> None:
     assert start_fault(sample, ROBOT, config, (-1.2, 0.9), lambda x_m, y_m: 0.0) is None
 
 
+def test_millimetres_are_suggested_only_far_away() -> None:
+    """A robot half a metre from its start was told that its pose looks like millimetres."""
+    fault = start_fault(at(0.0, 0.48, 0.03), ROBOT, PoseConfig(), (0.0, 0.0), lambda x_m, y_m: 0.0)
+    assert fault is not None
+    assert "0.48 m from the start of the run" in fault
+
+
+class AtRest:
+    """A sender of 50 poses a second with noise of 1 cm and a drift."""
+
+    def __init__(self, drift_m_s: float) -> None:
+        self.drift_m_s = drift_m_s
+        self.rng = np.random.default_rng(2)
+        self.sent = 0
+
+    def arrived(self, now_s: float) -> list[ArrivedPose]:
+        found = []
+        while self.sent <= 50.0 * now_s:
+            time_s = self.sent / 50.0
+            place_m = [self.drift_m_s * time_s, 0.0, 0.0] + 0.01 * self.rng.standard_normal(3)
+            sample = PoseSample(self.sent, time_s, place_m, np.eye(3), "lab")
+            found.append(ArrivedPose(time_s, "10.0.0.1:5000", sample))
+            self.sent += 1
+        return found
+
+
+def test_poses_of_a_robot_at_rest_do_not_drift() -> None:
+    clock = SimClock()
+    (newest,) = await_first_pose("udp:9870", AtRest(0.0), clock, lambda sample: None)
+    assert newest.arrival_s == pytest.approx(2.0, abs=0.1)
+    with pytest.raises(InputError, match=r"the robot rests, and its pose moves by (1\.[89]|2\.)"):
+        await_first_pose("udp:9870", AtRest(0.02), SimClock(), lambda sample: None)
+
+
 class Silence:
     def arrived(self, now_s: float) -> list[ArrivedPose]:
         return []
@@ -155,6 +189,15 @@ def test_a_missing_sender_ends_a_run_before_torque() -> None:
     with pytest.raises(InputError, match="no usable pose within 5 s: nothing arrived; start"):
         await_first_pose("udp:9870", Silence(), clock, lambda sample: None)
     assert clock.now_s() == pytest.approx(WAIT_S, abs=0.1)
+
+
+def test_a_motion_is_slow_until_the_pose_has_agreed() -> None:
+    cautious = [True]
+    health = PoseHealth(lambda: None, 2.0, dict, lambda: cautious[0])
+    hold = PoseHold(health, lambda level, text: None)
+    assert [hold.rate(0.1 * k, 0.1) for k in range(5)] == pytest.approx([0.8, 0.6, 0.5, 0.5, 0.5])
+    cautious[0] = False
+    assert [hold.rate(0.5 + 0.1 * k, 0.1) for k in range(4)] == pytest.approx([0.7, 0.9, 1.0, 1.0])
 
 
 def test_a_run_without_a_pose_pauses_and_then_fails() -> None:

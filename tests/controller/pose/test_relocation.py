@@ -74,6 +74,14 @@ def test_a_slide_is_reported_to_the_estimate_of_friction() -> None:
     assert not scene.pose.take_measured().has_slid
 
 
+def test_a_step_of_the_source_is_no_slide() -> None:
+    """A step of 0.2 m was taken for a slide: the gates widened while poses arrived."""
+    scene = walked()
+    scene.run(8.0, lambda time_s, sample: [moved(sample, [0.0, 0.2, 0.0])])
+    assert scene.pose.counts["relocations"] == 0
+    assert "jump by" in str(scene.pose.fault())
+
+
 @pytest.mark.costs("a simulated run")
 def test_a_body_that_slides_on_is_not_placed() -> None:
     slide = Slide()

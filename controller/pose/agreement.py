@@ -1,0 +1,230 @@
+"""Whether measured poses agree with the joints: turning, sideways swing, axes and scale.
+
+Slip hardly changes how the head turns and swings, so they are compared with dead reckoning. The way
+that a body travels depends on the ground, and shows nothing about the source.
+"""
+
+from collections import deque
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.pose.motion_history import Moment
+from snakewalk.controller.pose.tracked_body import HeadMeasurement
+
+WINDOW_S: Final = 4.0
+"""Time that is compared at once, one to two waves of a walk (ours)."""
+LEAST_S: Final = 2.5
+"""Least time that is compared."""
+SAMPLE_S: Final = 0.04
+JUDGE_S: Final = 0.5
+"""Time between two samples and between two judgements."""
+DOUBT_S: Final = 3.0
+"""How long a body may move without agreement (ours)."""
+NAMED_S: Final = 1.5
+"""The same for a contradiction that has a name (ours)."""
+CAUTIOUS_S: Final = 8.0
+"""How long a run moves slowly before the first agreement (ours)."""
+LEAST_UP: Final = 0.7
+"""Least cosine between the head's up axis and the vertical (ours)."""
+LEAST_TURN_RAD: Final = 0.12
+LEAST_SWING_M: Final = 0.025
+"""Root mean square turning and swing below which a window shows nothing (ours)."""
+SHARE: Final = 0.8
+"""Least correlation of turns that agree (ours)."""
+TURNS: Final = (0.6, 1.5)
+"""Measured over expected turning that agrees: 0.84 to 1.23 in 13 walks of sound sources."""
+SCALES: Final = (0.6, 1.5)
+"""Measured over expected swing that agrees on a floor: 0.74 to 1.29 in five walks."""
+SCALES_HILLS: Final = (0.5, 1.7)
+"""The same on hills, as the median of ``WINDOWS`` windows: dead reckoning knows no hills, and
+single windows of sound sources have 0.57 to 1.75."""
+TURNED_DEG: Final = 45.0
+"""Direction of the swing beyond which the frame is turned (ours)."""
+UNIT: Final = 20.0
+"""A swing that is this many times larger than expected has another unit (ours)."""
+WINDOWS: Final = 5
+"""Windows before the scale is judged on hills, or its accuracy stated (ours)."""
+SCALE_SD: Final = 0.02
+"""Least standard deviation of the scale (ours)."""
+SCALE_FLAT: Final = 0.05
+SCALE_HILLS: Final = 0.3
+"""How far the swing of a sound source is from the expected one, on a floor and on hills: means of
+13 walks are within 0.04 and 0.2."""
+
+
+class Agreement:
+    """Call ``add`` with each measurement, in order of time."""
+
+    def __init__(self, *, is_level: bool = True) -> None:
+        """Prepare; ``is_level`` says that the ground is a floor."""
+        self._is_level = is_level
+        self._allowed = SCALE_FLAT if is_level else SCALE_HILLS
+        self._rows: deque[_Row] = deque()
+        self._scales: list[float] = []
+        self._judged_s = self._scaled_s = -np.inf
+        self._begun_s: float | None = None
+        self._doubt_s = self._seconds = 0.0
+        self._named: str | None = None
+        self.has_agreed = False
+        """Whether it ever did."""
+
+    @property
+    def fault(self) -> str | None:
+        """How the source contradicts the joints; None while it does not."""
+        if self._named is not None and self._doubt_s >= NAMED_S and not self.has_agreed:
+            return self._named
+        if self._doubt_s < DOUBT_S:
+            return None
+        why = self._named or (
+            "it does not turn as the joints turn the head; check that it is this robot, and that "
+            "the tracked body is fixed to its link"
+        )
+        begun = "it agreed with the joints before, but not" if self.has_agreed else "not confirmed"
+        return f"unconfirmed pose: {begun} for {self._doubt_s:.1f} s of motion: {why}"
+
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether the source has agreed with the joints, and does not contradict them since."""
+        return self.has_agreed and self._doubt_s < NAMED_S
+
+    @property
+    def is_cautious(self) -> bool:
+        """Whether the run should move slowly until the source has agreed."""
+        return not self.has_agreed and self._seconds < CAUTIOUS_S
+
+    @property
+    def scale_sd(self) -> float:
+        """Standard deviation of the source's scale, over 1."""
+        if len(self._scales) < WINDOWS:
+            return self._allowed
+        scales = np.array(self._scales)
+        spread = float(scales.std(ddof=1)) / np.sqrt(len(scales))
+        over = max(abs(float(np.median(scales)) - 1.0) - self._allowed, 0.0)
+        return float(np.hypot(max(spread, SCALE_SD), over))
+
+    def forget(self) -> None:
+        """Begin again after a body moved without its joints; ``has_agreed`` stays."""
+        self._rows.clear()
+        self._doubt_s = 0.0
+        self._named = None
+
+    def add(self, measured: HeadMeasurement, then: Moment) -> None:
+        """Compare a measurement with those before; a head that lies on its side shows nothing."""
+        if measured.rotation[2, 2] < LEAST_UP:
+            self._rows.clear()
+            return
+        rows = self._rows
+        time_s = then.time_s
+        if rows and time_s - rows[-1].time_s < SAMPLE_S:
+            return
+        if rows and time_s - rows[-1].time_s > JUDGE_S:
+            rows.clear()
+        self._begun_s = time_s if self._begun_s is None else self._begun_s
+        self._seconds = time_s - self._begun_s
+        x, y, heading_rad = then.place.tolist()
+        head_x, head_y = measured.position_m[:2].tolist()
+        seen_rad = float(np.arctan2(measured.rotation[1, 0], measured.rotation[0, 0]))
+        rows.append(_Row(time_s, complex(head_x, head_y), seen_rad, complex(x, y), heading_rad))
+        while time_s - rows[0].time_s > WINDOW_S:
+            rows.popleft()
+        if time_s - rows[0].time_s >= LEAST_S and time_s - self._judged_s >= JUDGE_S:
+            self._judged_s = time_s
+            self._judge()
+
+    def _judge(self) -> None:
+        columns = (np.array(column) for column in zip(*self._rows, strict=True))
+        times, measured_m, measured_rad, reckoned_m, reckoned_rad = columns
+        line = np.column_stack([np.ones(len(times)), times - times.mean()])
+        expected = _detrended(np.unwrap(reckoned_rad), line)
+        turns = _detrended(np.unwrap(measured_rad), line)
+        if float(np.sqrt(np.mean(expected**2))) < LEAST_TURN_RAD:
+            return
+        share = float(turns @ expected / (expected @ expected))
+        related = _related(expected, turns)
+        off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(reckoned_rad))
+        slow_rad = off_rad - _detrended(off_rad, line)
+        steps = np.diff(reckoned_m) * np.exp(1j * slow_rad[:-1])
+        swing = _detrended(np.concatenate([[0.0], np.cumsum(steps)]), line)
+        shape = _detrended(measured_m, line)
+        named = _mirrored(related, shape, swing)
+        swings = related > SHARE and float(np.sqrt(np.mean(np.abs(swing) ** 2))) >= LEAST_SWING_M
+        if swings and named is None:
+            named = self._off(shape, swing, times[-1])
+        is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
+        if named is None and not is_alike and (self._named or not self.has_agreed):
+            named = self._named  # a window without a swing clears nothing
+            agrees = False
+        else:
+            agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
+        self._named = named
+        self._doubt_s = 0.0 if agrees else self._doubt_s + JUDGE_S
+        self.has_agreed |= agrees
+
+    def _off(self, shape: Floats, swing: Floats, time_s: float) -> str | None:
+        """Return what is wrong with direction or size of a measured swing; None if nothing is."""
+        if abs(np.vdot(swing, shape)) < SHARE * _size(swing, shape):
+            return None
+        same = np.vdot(swing, shape) / np.vdot(swing, swing).real
+        angle_deg = float(np.degrees(np.angle(same)))
+        if abs(angle_deg) > TURNED_DEG:
+            return (
+                f"wrong frame: the head moves {angle_deg:+.0f} degrees off the direction "
+                "that it points to; correct pose.offset_deg or the source's axes"
+            )
+        scale = float(abs(same))
+        if time_s - self._scaled_s >= WINDOW_S:  # windows that do not overlap
+            self._scaled_s = time_s
+            self._scales.append(scale)
+        low, high = SCALES
+        if not self._is_level:
+            low, high = SCALES_HILLS
+            few = len(self._scales) < WINDOWS and scale < UNIT
+            scale = 1.0 if few else float(np.median([*self._scales, scale][-WINDOWS:]))
+        if scale > UNIT:
+            return f"wrong unit: the head moves {scale:.0f} times as far as expected; send metres"
+        if low < scale < high:
+            return None
+        return (
+            f"wrong scale: the head swings {scale:.2f} times as far as its joints say; correct the "
+            "source's scale, or the robot's link_length_m"
+        )
+
+
+class _Row(NamedTuple):
+    time_s: float
+    measured_m: complex
+    measured_rad: float
+    reckoned_m: complex
+    reckoned_rad: float
+
+
+def _mirrored(related: float, shape: Floats, swing: Floats) -> str | None:
+    if related < -SHARE:
+        return (
+            "mirrored axes: the head turns the other way than its joints say; send a "
+            "right-handed frame, z up"
+        )
+    size = _size(shape, swing)
+    mirrored = abs(np.vdot(swing.conj(), shape))
+    if mirrored > SHARE * size > abs(np.vdot(swing, shape)) + 0.2 * size:
+        return (
+            "mirrored axes: the head moves to the other side than its joints say; send a "
+            "right-handed frame, z up"
+        )
+    return None
+
+
+def _size(a: Floats, b: Floats) -> float:
+    return float(np.linalg.norm(a) * np.linalg.norm(b)) or 1.0
+
+
+def _detrended(values: Floats, line: Floats) -> Floats:
+    """Return values (n,), real or complex, without their straight line (n, 2)."""
+    fit = np.linalg.lstsq(line, values, rcond=None)[0]
+    return np.asarray(values - line @ fit)
+
+
+def _related(a: Floats, b: Floats) -> float:
+    return float(a @ b) / _size(a, b)
