@@ -114,7 +114,7 @@ class CameraPose:
             "sequence": self.used - 1,
             "arrival_s": nothing,
             "fault": "",
-            "is_confirmed": True,
+            "is_confirmed": 1,
         }
 
     def __call__(self, state: JointState) -> BodyPose:

@@ -318,7 +318,7 @@ def _evidence(record: RunRecord) -> dict[str, Any]:
     header = record.header
     measured = record.pose_source
     stated = header.pose_evidence
-    position_m = _largest(measured.position_sd_m[measured.is_confirmed])
+    position_m = _largest(measured.position_sd_m[measured.is_confirmed > 0])
     heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
     return {
         "pose_evidence": str(stated.kind),

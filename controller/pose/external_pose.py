@@ -251,7 +251,7 @@ class ExternalPose:
             "sequence": -1 if used is None else used.sequence,
             "arrival_s": float("nan") if self._newest is None else self._newest.arrival_s,
             "fault": self.fault() or "",
-            "is_confirmed": self._check.is_confirmed,
+            "is_confirmed": int(self._check.is_confirmed),
         }
 
     def _accept(self, arrived: ArrivedPose) -> None:

@@ -249,7 +249,7 @@ class PoseSourceTable(Table):
     arrival_s: Annotated[Floats, _optional("when the newest pose arrived")]
     fault: Annotated[Texts, Column("why the pose is not trusted", "text", default="")]
     is_confirmed: Annotated[
-        Flags, Column("whether the source agrees with the joints", "flag", default=True)
+        Ints, Column("1 while the source agrees with the joints, otherwise 0", "integer", default=1)
     ]
 
 

@@ -14,6 +14,7 @@ UNITS = ("_rad", "_rad_s", "_a", "_ah", "_s", "_m", "_m_s", "_c", "_v", "_j")
 UNITLESS = {
     "fault",
     "sequence",
+    "is_confirmed",
     *("pose_evidence", "pose_source"),
     *("verdict", "reason", "joints", "target", "level", "kind", "text", "number", "key", "value"),
     *("state", "visited", "candidates", "eta_q", "along", "across"),

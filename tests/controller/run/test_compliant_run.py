@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.faults import FaultPlan
-from snakewalk.controller.run.external import simulated_bus
+from snakewalk.controller.run.external import simulated_backend
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_keys import with_compliance
@@ -54,7 +54,7 @@ def test_lost_replies_hold_the_yield_and_the_run_goes_on(
         FaultPlayer(line, faults)  # type: ignore[arg-type]
         return DynamixelBus(line, *args, **values)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(simulated_bus, "servo_bus", faulty)
+    monkeypatch.setattr(simulated_backend, "servo_bus", faulty)
     found = ran(tmp_path, compliance=None)
     cycle = found.record.cycle
     assert found.outcome.tripped is None

@@ -1,5 +1,8 @@
 """A run checks everything before it opens anything, and switches torque on last."""
 
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -101,6 +104,16 @@ def test_a_run_keeps_the_order_of_its_steps(tmp_path: Path) -> None:
         )
     assert calls == list(ORDER)
     assert observer.rows > 0
+
+
+@pytest.mark.slow
+def test_few_functions_and_files_lead_from_a_command_to_its_loop(tmp_path: Path) -> None:
+    file = tmp_path / "rows.json"
+    words = [sys.executable, "-m", "benchmarks", "run_path", "--json", str(file)]
+    subprocess.run(words, check=True, capture_output=True)
+    rows = json.loads(file.read_text())["rows"]["run_path"]
+    judged = {row["what"]: row["met"] for row in rows if row["target"] is not None}
+    assert judged == {"functions": True, "files of cli/ console/ run/": True}
 
 
 def test_a_port_that_fails_leaves_the_files_of_the_folder(tmp_path: Path) -> None:
