@@ -101,7 +101,7 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
             f"the pose of {numbers.pose_source} is unconfirmed: it did not agree with the joints; "
             "check the source"
         )
-        more = "snakewalk pose check {pose} --run {run}"
+        more = "snakewalk pose check {pose}" + " --run {run}" * (numbers.waypoints > 0)
     elif numbers.waypoints and not numbers.is_measured:
         exit_code = NOT_MEASURED
         cause = (

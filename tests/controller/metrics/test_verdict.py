@@ -70,7 +70,7 @@ def test_the_sentence(record: RunRecord, changes: dict[str, Any], sentence: str)
         (DEAD_RECKONED, NOT_MEASURED, None),
         (DEAD_RECKONED | {"waypoints": 0}, 0, None),
         (UNCONFIRMED, NOT_MEASURED, "snakewalk pose check None --run None"),
-        (UNCONFIRMED | {"waypoints": 0}, NOT_MEASURED, "snakewalk pose check None --run None"),
+        (UNCONFIRMED | {"waypoints": 0}, NOT_MEASURED, "snakewalk pose check None"),
     ],
 )
 def test_the_exit_code_and_the_next_command(
