@@ -17,7 +17,7 @@ from snakewalk.controller.motion.refusals import NAME_MAX
 
 START_RAD: Final = 0.05
 """How far a joint may be from a first point at 0 s (ours)."""
-_SAMPLES: Final = 4
+_SAMPLES: Final = 32
 """Points of each piece at which the limits are checked."""
 _SLACK: Final = 1.0 + 1e-6
 _AT_REST_RAD_S: Final = 1e-3

@@ -245,6 +245,15 @@ COMMANDS = st.one_of(
 )
 
 
+def test_a_trajectory_that_turns_round_between_its_points_keeps_the_limit() -> None:
+    """Four samples a piece missed the turn: joint1 went 0.3 % beyond."""
+    bench = Bench()
+    for angle, seconds in ((1.125, 1.0), (0.0, 0.5), (1.0, 0.375)):
+        bench.run(seconds, JointGoals(["joint0", "joint1"], [0.0, angle]))
+    bench.run(1.0, points((1.625, 0.0), (3.25, 0.0)))
+    assert (np.abs(bench.goals) <= LIMITS).all()
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(COMMANDS, st.floats(0.02, 1.0)), min_size=1, max_size=6))
 def test_whatever_is_commanded_the_goals_keep_the_limits(
