@@ -318,7 +318,7 @@ def _evidence(record: RunRecord) -> dict[str, Any]:
     header = record.header
     measured = record.pose_source
     stated = header.pose_evidence
-    position_m = _largest(measured.position_sd_m[measured.is_confirmed > 0])
+    position_m = _digits(_peak(measured.position_sd_m[measured.is_confirmed > 0]))
     heading_rad = _median(measured.heading_sd_rad) if stated.is_measured else None
     return {
         "pose_evidence": str(stated.kind),
@@ -418,11 +418,6 @@ def _outcome(record: RunRecord, waypoints: int, reached: int, tripped: str | Non
 def _mean(values: Floats) -> float:
     finite_values = values[np.isfinite(values)]
     return float(finite_values.mean()) if finite_values.size else float("nan")
-
-
-def _largest(values: Floats) -> float | None:
-    known = values[np.isfinite(values)]
-    return _digits(float(known.max())) if known.size else None
 
 
 def _median(values: Floats) -> float | None:

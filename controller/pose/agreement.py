@@ -67,8 +67,10 @@ class Agreement:
         self._begun_s: float | None = None
         self._doubt_s = self._seconds = 0.0
         self._named: str | None = None
+        self.scale_sd = self._allowed
+        """Standard deviation of the source's scale, over 1."""
         self.has_agreed = False
-        """Whether it ever did."""
+        """Whether the source ever agreed with the joints."""
 
     @property
     def fault(self) -> str | None:
@@ -94,15 +96,14 @@ class Agreement:
         """Whether the run should move slowly until the source has agreed."""
         return not self.has_agreed and self._seconds < CAUTIOUS_S
 
-    @property
-    def scale_sd(self) -> float:
-        """Standard deviation of the source's scale, over 1."""
+    def _note_scale(self, scale: float) -> None:
+        self._scales.append(scale)
         if len(self._scales) < WINDOWS:
-            return self._allowed
+            return
         scales = np.array(self._scales)
         spread = float(scales.std(ddof=1)) / np.sqrt(len(scales))
         over = max(abs(float(np.median(scales)) - 1.0) - self._allowed, 0.0)
-        return float(np.hypot(max(spread, SCALE_SD), over))
+        self.scale_sd = float(np.hypot(max(spread, SCALE_SD), over))
 
     def forget(self) -> None:
         """Begin again after a body moved without its joints; ``has_agreed`` stays."""
@@ -176,7 +177,7 @@ class Agreement:
         scale = float(abs(same))
         if time_s - self._scaled_s >= WINDOW_S:  # windows that do not overlap
             self._scaled_s = time_s
-            self._scales.append(scale)
+            self._note_scale(scale)
         low, high = SCALES
         if not self._is_level:
             low, high = SCALES_HILLS

@@ -210,7 +210,7 @@ class ExternalPose:
         """
         if self._start_m is None:
             return self._filter.position_sd_m
-        away_m = np.hypot(*(self._filter.pose(self._now_s).head_in_world_m - self._start_m)[:2])
+        away_m = np.hypot(*(self._filter.head_m - self._start_m)[:2])
         return float(np.hypot(self._filter.position_sd_m, self._check.scale_sd * away_m))
 
     def fault(self) -> str | None:

@@ -73,7 +73,8 @@ class PoseFilter:
         self._last: Moment | None = None
         self._frames: deque[tuple[Moment, Floats]] = deque(maxlen=3)
         """Mean frames of the newest moments: each is needed several times in a cycle."""
-        self._head_m = np.zeros(3)
+        self.head_m = np.zeros(3)
+        """(3,) of the head in the world, at the newest moment."""
         self._body = np.eye(3)
         self._shape = np.eye(3)
         """Mean frame of the links in the axes of the head link, for the newest joints."""
@@ -102,7 +103,7 @@ class PoseFilter:
 
     def pose(self, time_s: float) -> BodyPose:
         """Return the head's pose at the newest moment."""
-        return BodyPose(time_s, self._head_m.copy(), self._body @ self._shape.T)
+        return BodyPose(time_s, self.head_m.copy(), self._body @ self._shape.T)
 
     def advance(self, moment: Moment) -> None:
         """Move the body as dead reckoning does since the last call, and grow the uncertainty."""
@@ -114,7 +115,7 @@ class PoseFilter:
             return
         step_s = moment.time_s - before.time_s
         turn, displacement_m = self._motion(before, moment)
-        self._head_m[:2] += displacement_m
+        self.head_m[:2] += displacement_m
         self._body = rotation_by(np.array([0.0, 0.0, turn])) @ self._body
         if step_s > 0.0:
             slip = 2.0 * SLIP_TIME_S * SLIP_SHARE**2 / step_s
@@ -132,7 +133,7 @@ class PoseFilter:
         """Compare a measurement with the prediction for its moment."""
         assert self._last is not None
         turn, displacement_m = self._motion(then, self._last)
-        head_m = self._head_m - np.append(displacement_m, 0.0)
+        head_m = self.head_m - np.append(displacement_m, 0.0)
         body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
         measured_frame = measured.rotation @ self._mean_frame(then)
         off_m, off_rad = measured.position_m - head_m, rotation_vector(measured_frame @ body.T)
@@ -166,22 +167,22 @@ class PoseFilter:
 
     def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
         """Correct the pose by a measurement and its innovation; the first one places the body."""
-        if not self.is_placed:
+        if self.is_placed:
+            gain, self.position_covariance = _corrected(
+                self.position_covariance, measured.position_covariance
+            )
+            self.head_m += gain @ off.position_m
+            gain, self.turn_covariance = _corrected(
+                self.turn_covariance, measured.rotation_covariance
+            )
+            self._body = rotation_by(gain @ off.turn_rad) @ self._body
+        else:
             self.is_placed = True
             self.position_covariance = measured.position_covariance.copy()
             self.turn_covariance = measured.rotation_covariance.copy()
-            self._head_m += off.position_m
+            self.head_m += off.position_m
             self._body = rotation_by(off.turn_rad) @ self._body
-            self._gate = self._used_gate = self.position_covariance.copy()
-            self._align()
-            return
-        gain, self.position_covariance = _corrected(
-            self.position_covariance, measured.position_covariance
-        )
         self._gate = self._used_gate = self.position_covariance.copy()
-        self._head_m += gain @ off.position_m
-        gain, self.turn_covariance = _corrected(self.turn_covariance, measured.rotation_covariance)
-        self._body = rotation_by(gain @ off.turn_rad) @ self._body
         self._align()
 
     def _motion(self, before: Moment, after: Moment) -> tuple[float, Floats]:
