@@ -104,6 +104,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture
 def patient_sdk(monkeypatch: pytest.MonkeyPatch) -> None:
     """The SDK waits some 35 ms of real time for an answer; a busy machine may need more."""
-    patience = 50.0
+    patience = 500.0
     real_ms = PortHandler.getCurrentTime
     monkeypatch.setattr(PortHandler, "getCurrentTime", lambda port: real_ms(port) / patience)

@@ -34,7 +34,7 @@ def call(folder: Path, *commands: tuple[str, ...], without: tuple[str, ...] = ()
         input=json.dumps(commands),
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=600,
         check=False,
     )
     assert ran.returncode == 0, ran.stderr

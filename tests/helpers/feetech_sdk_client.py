@@ -6,7 +6,7 @@ import sys
 import scservo_sdk as scs
 
 TRIES = 10
-PATIENCE = 50.0
+PATIENCE = 500.0
 """The SDK waits for some milliseconds of real time; a busy machine may need more."""
 real_ms = scs.PortHandler.getCurrentTime
 scs.PortHandler.getCurrentTime = lambda port: real_ms(port) / PATIENCE

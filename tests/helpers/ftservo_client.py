@@ -7,7 +7,7 @@ import time
 import scservo_sdk as scs
 
 TRIES = 10
-PATIENCE = 50.0
+PATIENCE = 500.0
 """The SDK waits for some milliseconds of real time; a busy machine may need more."""
 real_ms = scs.PortHandler.getCurrentTime
 scs.PortHandler.getCurrentTime = lambda port: real_ms(port) / PATIENCE
@@ -28,7 +28,7 @@ def call(name, *args):
 
 
 def settled(servo_id):
-    end_s = time.monotonic() + 10.0
+    end_s = time.monotonic() + 100.0
     while time.monotonic() < end_s:
         if call("ReadMoving", servo_id) == [0]:
             return
@@ -64,8 +64,10 @@ call("WheelMode", 3)
 call("LockEprom", 3)
 call("WriteSpec", 3, -800, 0)
 call("write1ByteTxRx", 3, scs.SMS_STS_TORQUE_ENABLE, 1)
-time.sleep(0.5)
-found["wheel"] = call("ReadSpeed", 3)
+end_s, near = time.monotonic() + 100.0, 0
+while near < 5 and time.monotonic() < end_s:  # it overshoots
+    found["wheel"] = call("ReadSpeed", 3)
+    near = near + 1 if abs(found["wheel"][0] + 800) < 80 else 0
 found["mode"] = call("read1ByteTxRx", 3, scs.SMS_STS_MODE)
 port.closePort()
 print(json.dumps(found))

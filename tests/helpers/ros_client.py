@@ -32,7 +32,7 @@ class Client:
         """Take what has come."""
         self._executor.spin_once(timeout_sec=0.0)
 
-    def until(self, what: Callable[[], object], within_s: float = 30.0) -> None:
+    def until(self, what: Callable[[], object], within_s: float = 300.0) -> None:
         clock = self.node.get_clock()
         end_ns = clock.now().nanoseconds + round(within_s * 1e9)
         while not what():

@@ -14,13 +14,18 @@ from snakewalk.drivers.safety.stop_button import StopButton
 from snakewalk.drivers.types import JointCommand
 
 ROBOT = RobotConfig(name="trio", joint_axes="yyy")
-WATCHDOG_S = 1.0
-"""Long, so that a busy test machine does not trip it."""
+WATCHDOG_S = 2.5
+"""Almost the longest of a servo, so that a busy test machine does not trip it."""
 
 
 def swing(device: str, how: str) -> None:
     """Swing; ``crash`` raises in the middle of it."""
-    safety = SafetyConfig(stale_limit_s=5.0, watchdog_s=WATCHDOG_S)
+    safety = SafetyConfig(
+        stale_limit_s=10.0,
+        slow_stale_limit_s=20.0,
+        watchdog_s=WATCHDOG_S,
+        following_time_s=20.0,
+    )
     with SerialPort(device) as port:
         bus = DynamixelBus(port, latency_s=0.1)
         chain = ServoChain(bus, ROBOT, watchdog_s=WATCHDOG_S)
@@ -30,7 +35,7 @@ def swing(device: str, how: str) -> None:
             SafeLink(chain, limits, port.clock, stop_requested=button.pressed) as link,
         ):
             link.enable()
-            for tick in ticks(port.clock, 0.02, port.clock.now_s() + 60.0):
+            for tick in ticks(port.clock, 0.02, port.clock.now_s() + 600.0):
                 link.read()
                 goal = 0.3 * np.sin(2.0 * port.clock.now_s())
                 link.write(JointCommand(port.clock.now_s(), np.full(3, goal)))

@@ -56,7 +56,7 @@ def test_only_a_failure_is_told(
         env=os.environ | {"TOLD": told},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=600,
         check=False,
     )
     asked = (tmp_path / "asked").read_text().splitlines()

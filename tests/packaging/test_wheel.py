@@ -105,7 +105,7 @@ class Installed:
             env=environment,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=600,
             check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
@@ -119,7 +119,7 @@ def build(kind: str, source: Path, folder: Path) -> Path:
         cwd=source,
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -155,7 +155,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
     (packages / "dependencies.pth").write_text("\n".join(site.getsitepackages()))
     pip = [sys.executable, "-m", "pip", "--python", str(home / "bin" / "python"), "install"]
     quiet = ["--quiet", "--no-deps", "--no-index", "--force-reinstall", "--no-compile"]
-    subprocess.run([*pip, *quiet, "--prefix", str(home), str(wheel)], check=True, timeout=120)
+    subprocess.run([*pip, *quiet, "--prefix", str(home), str(wheel)], check=True, timeout=600)
 
     project = tmp_path_factory.mktemp("project")
     for name in FOLDERS:
@@ -253,7 +253,7 @@ def lightly(light: Path, folder: Path, *words: str) -> "subprocess.CompletedProc
         env={"PYTHONPATH": str(light), "PATH": ""},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
 

@@ -2,7 +2,6 @@
 
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,10 +22,10 @@ from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.review import picture_scale, review_page
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
+from tests.helpers.browser import IN_A_BROWSER, chromium, new_tab
 from tests.helpers.command import snakewalk
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 SCENE = SnakeScene(rows=210, columns=240, length_px=125.0, frames=16, wave_hz=1.0)
 LOST = 9
 
@@ -187,14 +186,12 @@ def test_a_page_stays_one_that_a_browser_opens() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+@IN_A_BROWSER
 def test_a_person_flips_drops_drags_and_saves(
     folder: Path, held: CaptureFile, tmp_path: Path
 ) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1100, "height": 720})
+    with chromium() as browser:
+        page = new_tab(browser, viewport={"width": 1100, "height": 720})
         wrong: list[str] = []
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("request", lambda asked: wrong.append(asked.url) if "http" in asked.url[:5] else 0)
@@ -234,7 +231,6 @@ def test_a_person_flips_drops_drags_and_saves(
         page.get_by_text("no corrections").wait_for()
         page.set_input_files("#load", str(saved))
         page.get_by_text("1 flipped, 1 left out, 1 redrawn").wait_for()
-        browser.close()
     assert not wrong
     assert saved.name == "track-corrections.json"
     said = read_corrections(saved)

@@ -130,7 +130,7 @@ def test_an_interrupt_waits_for_no_worker(tmp_path: Path) -> None:
     with blocked_parent(tmp_path) as parent:
         os.killpg(parent.pid, signal.SIGINT)  # as a terminal does
         try:
-            said = parent.communicate(timeout=30)[1]
+            said = parent.communicate(timeout=600)[1]
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(parent.pid, signal.SIGKILL)
@@ -144,7 +144,7 @@ def test_workers_end_with_a_parent_that_is_killed(tmp_path: Path) -> None:
     with blocked_parent(tmp_path) as parent:
         parent.kill()
         try:
-            parent.communicate(timeout=30)  # until nobody holds the other end: no orphan is left
+            parent.communicate(timeout=600)  # until nobody holds the other end: no orphan is left
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(parent.pid, signal.SIGKILL)

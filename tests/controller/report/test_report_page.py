@@ -4,7 +4,6 @@ import base64
 import gzip
 import json
 import re
-import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -27,11 +26,11 @@ from snakewalk.controller.report.film import film_times
 from snakewalk.controller.report.page import Drawings, Section, film_on_page, page
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import Event, RunRecord
+from tests.helpers.browser import IN_A_BROWSER, chromium, new_tab
 
 pytestmark = pytest.mark.usefixtures("legible_figures", "whole_report")
 
 Make = Callable[..., Path]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
 class Sources(HTMLParser):
@@ -181,15 +180,12 @@ def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRec
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium to open the page with")
+@IN_A_BROWSER
 def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_page(
     hills: Path,
 ) -> None:
-    playwright = pytest.importorskip("playwright.sync_api")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": 1000, "height": 800})
-        page.set_default_timeout(120_000.0)
+    with chromium() as browser:
+        page = new_tab(browser, viewport={"width": 1000, "height": 800})
         faults: list[str] = []
         page.on("pageerror", lambda fault: faults.append(str(fault)))
         page.goto(hills.as_uri())
@@ -202,6 +198,7 @@ def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_p
         x, y = panel["x"] + 0.5 * panel["width"], panel["y"] + 0.5 * panel["height"]
         page.mouse.move(x, y)
         shown = page.locator(".hoverlayer .hovertext").first.text_content()
+        page.wait_for_function("window.seen")
         name, value = page.evaluate("[seen.data.name, seen.y]")
         text, _, number = shown.rpartition(" ")
         assert text == name
@@ -225,7 +222,6 @@ def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_p
         page.wait_for_function("document.documentElement.scrollWidth <= 400")
         hint = "box => getComputedStyle(box, '::before').content"
         assert "to the right" in page.locator(".wide").first.evaluate(hint)
-        browser.close()
     assert faults == []
 
 

@@ -77,7 +77,7 @@ def test_a_typo_is_told_before_anything_heavy_is_imported(tmp_path: Path) -> Non
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=600,
     )
     told_first = done.stdout.splitlines()[0]
     assert told_first.startswith("robot.toml:2: joint_axis: unknown key; did you mean joint_axes?")

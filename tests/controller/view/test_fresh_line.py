@@ -20,8 +20,7 @@ from snakewalk.controller.view.command_line import fresh_commands, timed
 from snakewalk.controller.view.dead_man import DeadMan, hold_command
 from snakewalk.controller.view.fresh_line import FreshConnection, Freshness
 from tests.controller.view.test_browser_gamepad import state
-
-PATIENCE_S = 60.0
+from tests.helpers.browser import PATIENCE_S
 
 
 class Proxy:

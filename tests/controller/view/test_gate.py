@@ -131,7 +131,7 @@ def test_the_server_has_the_gate_in_front_of_files_and_sockets(
         upgrade | cookie,
         upgrade | cookie | origin,
     ):
-        line = http.client.HTTPConnection("127.0.0.1", port, timeout=10.0)
+        line = http.client.HTTPConnection("127.0.0.1", port, timeout=60.0)
         line.request("GET", path, headers=headers)
         statuses.append(line.getresponse().status)
         line.close()

@@ -6,7 +6,6 @@ import dataclasses
 import json
 import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -53,10 +52,10 @@ from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.controller.view.test_fresh_line import Proxy
 from tests.controller.view.test_stop_element import ended, run_in
+from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
 from tests.helpers.bus import PATIENT
 
 ROOT = Path(__file__).parents[3]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 COMMAND = "from snakewalk.controller.cli.main import main; main()"
 ROBOT = 'name = "quartet"\njoint_axes = "yyyy"\nyaw_limit_rad = 1.4\n'
 
@@ -86,24 +85,17 @@ def browsed(
     through: Callable[[int], int] = lambda port: port,
 ) -> Iterator[Any]:
     """The page of a run in a browser; ``through`` returns the port of a proxy."""
-    playwright = pytest.importorskip("playwright.sync_api")
     assert child.stderr is not None
     line = child.stderr.readline()
     url = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", line)
     assert url is not None, line + child.stderr.read()
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(
-            executable_path=CHROMIUM,
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
-        )
-        page = browser.new_page(viewport={"width": width, "height": 500})
-        page.set_default_timeout(60_000.0)
+    with chromium() as browser:
+        page = new_tab(browser, viewport={"width": width, "height": 500})
         page.add_init_script(script)
         port = int(re.findall(r":(\d+)/", url[0])[0])
         page.goto(url[0].replace(f":{port}/", f":{through(port)}/"))
         page.get_by_text("torque off at once, latched").wait_for()
         yield page
-        browser.close()
 
 
 class View:
@@ -453,11 +445,6 @@ def test_what_a_browser_of_somebody_else_sets_is_no_command_or_a_short_one() -> 
     server.stop()
 
 
-IN_A_BROWSER = pytest.mark.skipif(
-    CHROMIUM is None, reason="there is no Chromium to open the page with"
-)
-
-
 @pytest.mark.slow
 @IN_A_BROWSER
 def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
@@ -477,7 +464,7 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
         assert button.is_disabled()
         assert bus["Torque Enable"].tolist() == [0] * 4
-        assert child.wait(60.0) == 1
+        assert child.wait(PATIENCE_S) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
 
@@ -538,7 +525,7 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
         page.get_by_text("late and is dropped").first.wait_for()
         page.keyboard.press("Escape")
         page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
-        assert child.wait(60.0) == 1
+        assert child.wait(PATIENCE_S) == 1
     run_in(loop, ended(asyncio.all_tasks(loop))).result()
     loop.call_soon_threadsafe(loop.stop)
     thread.join()
@@ -576,7 +563,7 @@ def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path
         page.get_by_text("operator: mirror = True").wait_for()
         page.evaluate("window.press(11, true)")
         page.get_by_text("the run has ended: stop requested by E-STOP of a gamepad").wait_for()
-        assert child.wait(60.0) == 1
+        assert child.wait(PATIENCE_S) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     said = [event.text for event in record.events if event.kind == "operator"]
     assert said[:2] == ["let go: it stands in its shape", "held: it moves"]
@@ -600,7 +587,7 @@ def test_in_a_browser_a_click_on_the_ground_is_where_the_body_goes(
         page.get_by_text("no waypoint is left: it holds, and waits for another").wait_for()
         page.get_by_role("button", name="end the run").click()
         page.get_by_text("the run has ended").wait_for()
-        assert child.wait(60.0) == 0
+        assert child.wait(PATIENCE_S) == 0
     record = read_log(tmp_path / "run" / "log.mcap")
     waypoints_m = record.header.plan.waypoints_m
     assert len(waypoints_m) == 2

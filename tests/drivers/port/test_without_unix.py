@@ -62,7 +62,7 @@ def test_what_is_offline_needs_no_unix(tmp_path: Path, monkeypatch: pytest.Monke
         capture_output=True,
         text=True,
         check=False,
-        timeout=120,
+        timeout=600,
     )
     told = done.stdout.splitlines()
     assert told[:2] == ["stop requested by somebody", "[]"], done.stderr

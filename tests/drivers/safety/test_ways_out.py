@@ -18,7 +18,7 @@ from snakewalk.sim.servo.bench import BenchPlant
 from tests.helpers.program import Program
 from tests.helpers.swing_child import ROBOT, WATCHDOG_S, swing
 
-PATIENCE_S = 60.0
+PATIENCE_S = 600.0
 
 
 class Servos:

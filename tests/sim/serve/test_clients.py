@@ -50,7 +50,7 @@ def test_the_sdk_through_its_easy_interface(servo_bus: Make) -> None:
 def test_rustypot(servo_bus: Make) -> None:
     rustypot = pytest.importorskip("rustypot")
     bus = servo_bus("1-3:XL330-M288")
-    robot = rustypot.Xl330PyController(serial_port=bus.path, baudrate=1_000_000, timeout=5.0)
+    robot = rustypot.Xl330PyController(serial_port=bus.path, baudrate=1_000_000, timeout=60.0)
     assert robot.ping(3)
     ids = [1, 2, 3]
     robot.sync_write_torque_enable(ids, [True] * 3)
@@ -171,7 +171,7 @@ def test_lerobots_feetech_bus(
     monkeypatch.syspath_prepend(str(folder))
     port = importlib.import_module("scservo_sdk").PortHandler
     real_ms = port.getCurrentTime  # as ``patient_sdk`` does for the DYNAMIXEL SDK
-    monkeypatch.setattr(port, "getCurrentTime", lambda own: real_ms(own) / 50.0)
+    monkeypatch.setattr(port, "getCurrentTime", lambda own: real_ms(own) / 500.0)
     feetech = importlib.import_module("lerobot.motors.feetech")
     base = importlib.import_module("lerobot.motors")
     bus = servo_bus("1-6:STS3215")

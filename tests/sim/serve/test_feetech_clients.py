@@ -31,7 +31,7 @@ def client(folder: str, script: str, *args: str) -> Any:
         [sys.executable, str(SCRIPTS / script), *args],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env={**os.environ, "PYTHONPATH": str(path)},
         check=False,
     )
@@ -74,7 +74,7 @@ def test_feetech_servo_sdk(servo_bus: Make, model: str) -> None:
 def test_rustypot(servo_bus: Make) -> None:
     rustypot = pytest.importorskip("rustypot")
     bus = servo_bus("1-3:STS3215")
-    robot = rustypot.Sts3215PyController(serial_port=bus.path, baudrate=1_000_000, timeout=5.0)
+    robot = rustypot.Sts3215PyController(serial_port=bus.path, baudrate=1_000_000, timeout=60.0)
     ids, goals = [1, 2, 3], [0.3, -0.2, 0.1]
     assert robot.ping(3)
     assert robot.sync_read_model(ids) == [777] * 3
