@@ -58,6 +58,8 @@ slow: loops
 nightly: loops
 	$(PYTEST) -m nightly --most-expensive 30
 	$(BIN)/python -m tests.campaign
+	$(BIN)/python -m benchmarks.hard_walks --walks 1000 -o build/hard-walks.jsonl
+	$(BIN)/python -m benchmarks.hard_walks --walks 200 --planted -o build/planted-walks.jsonl
 	$(BIN)/python -m tests.mutation
 	$(BIN)/python -m benchmarks
 

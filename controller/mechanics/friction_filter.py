@@ -28,6 +28,8 @@ _BOUND = math.log(4.0)
 DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
 out: 99 % and 95 % of chi square with two degrees of freedom."""
+_ESTIMATED = 0.8
+"""Variance over that of the prior below which a value is estimated (ours)."""
 _TRUST = 1.39
 """The same below which the file holds again: 50 %."""
 _NORMAL_95 = 1.96
@@ -94,6 +96,8 @@ class FoundFriction:
     across_95: tuple[float, float]
     differs: bool
     """Whether the file's friction is out."""
+    is_estimated: bool = True
+    """Whether motion made an interval narrower; otherwise the values are the file's."""
 
     @property
     def spread(self) -> float:
@@ -213,13 +217,15 @@ class FrictionFilter:
     def found(self) -> FoundFriction:
         """Present estimate."""
         mean, (uu, uv, vv) = self._friction(self._u, self._v), self._covariance
-        along = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) + uv))
-        across = math.exp(_NORMAL_95 * math.sqrt(0.5 * (uu + vv) - uv))
+        mid = 0.5 * (uu + vv)
+        along = math.exp(_NORMAL_95 * math.sqrt(mid + uv))
+        across = math.exp(_NORMAL_95 * math.sqrt(mid - uv))
         return FoundFriction(
             mean,
             (mean.along / along, mean.along * along),
             (mean.across / across, mean.across * across),
             self._differs,
+            mid - abs(uv) < _ESTIMATED * self._prior.uu,
         )
 
     def _friction(self, u: float, v: float) -> FrictionConfig:

@@ -1,12 +1,12 @@
 """Effort of a run from its log: energy, cost of transport; climb and slip of a gait.
 
-Only the simulation integrates energy. A real servo has only samples of Present Current, just before
-the next goal, when the error of the last goal has decayed; so power from samples is too low
+Only the simulation integrates energy. A real servo has samples of Present Current, just before the
+next goal. The current between them follows from goals and angles
 (``docs/benchmarks/gait-energy.md``).
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
 EnergySource = Literal["integrated", "sampled", "unknown"]
+PARTS: Final = 3
+"""Steps in which the current is computed before and after the goals of a cycle arrive."""
+WRITTEN_SHARE: Final = 0.25
+"""Part of a cycle before its goals arrive, if its time on the wire is not known (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +39,7 @@ class EnergyTrack:
     mechanical_j: Floats
     """(T,) net work at the shafts."""
     source: EnergySource
-    """``integrated`` in every physics step, or ``sampled``: too low, from one current a cycle."""
+    """``integrated`` in every physics step, or ``sampled``: from readings and goals of cycles."""
 
     def between(self, from_s: float, to_s: float) -> tuple[float, float]:
         """Electrical and mechanical energy from one time to another, J; NaN where not known."""
@@ -57,23 +61,48 @@ def energy_track(record: RunRecord) -> EnergyTrack:
 
 
 def sampled_energy(record: RunRecord) -> EnergyTrack:
-    """Return the energy from the current and speed that each cycle read, held until the next."""
+    """Return the energy from the current and speed that each cycle read, and the course between.
+
+    A reading comes just before the next goal, when the error of the last one has decayed. In
+    between the output follows the error; the reading corrects its course for supply and friction.
+    """
     header = record.header
     cycle = record.cycle
     winding = header.winding
     if winding is None or not np.isfinite(cycle.current_a).any():
         unknown = np.full(len(cycle.time_s), np.nan)
         return EnergyTrack(cycle.time_s, unknown, unknown, "unknown")
-    current_a = np.nan_to_num(cycle.current_a)
-    speed_rad_s = np.nan_to_num(cycle.velocity_rad_s)
-    # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
-    input_w = winding.resistance_ohm * current_a**2 + winding.back_emf_v_s * speed_rad_s * current_a
-    shaft_w = header.torque_constant_n_m_a * speed_rad_s * current_a
-    held_s = np.diff(cycle.time_s, append=cycle.time_s[-1:])
-    electrical_j, mechanical_j = (
-        np.concatenate([[0.0], np.cumsum(watts.sum(axis=1) * held_s)[:-1]])
-        for watts in (np.clip(input_w, 0.0, None), shaft_w)
-    )
+    columns = cycle.measured_rad, cycle.velocity_rad_s, cycle.current_a, cycle.sent_rad
+    position, speed, current, goal = (np.nan_to_num(column) for column in columns)
+    servos = header.robot.servo_records
+    stall_a = np.array([facts.stall_current_a or 0.0 for facts in servos])
+    full_rad = np.array([facts.full_output_rad for facts in servos])
+    per_rad = np.array(header.robot.position_p_gains) / np.where(full_rad > 0.0, full_rad, np.inf)
+    limit_a = np.array(header.robot.current_limits_a)
+
+    def driven_a(goal_rad: Floats, at_rad: Floats, turning: Floats) -> Floats:
+        share = np.clip(per_rad * (goal_rad - at_rad), -1.0, 1.0)
+        emf_a = np.where(stall_a > 0.0, winding.back_emf_v_s / winding.resistance_ohm, 0.0)
+        return np.asarray(np.clip(share * stall_a - emf_a * turning, -limit_a, limit_a))
+
+    step_s = np.diff(cycle.time_s)[:, None]
+    wire_s = cycle.wire_busy_s[np.isfinite(cycle.wire_busy_s)]
+    late = float(np.median(wire_s)) / record.period_s if len(wire_s) else WRITTEN_SHARE
+    before = np.concatenate([goal[:1], goal[:-1]])[:-1]
+    off_a = current[1:] - driven_a(goal[:-1], position[1:], speed[1:])
+    energy_j = np.zeros((2, len(goal)))
+    for part in (np.arange(PARTS) + 0.5) / PARTS:
+        for goal_rad, begin, end in ((before, 0.0, late), (goal[:-1], late, 1.0)):
+            at = begin + part * (end - begin)
+            turning = speed[:-1] + at * np.diff(speed, axis=0)
+            at_rad = position[:-1] + at * np.diff(position, axis=0)
+            amps = np.clip(driven_a(goal_rad, at_rad, turning) + off_a, -limit_a, limit_a)
+            # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
+            input_w = winding.resistance_ohm * amps**2 + winding.back_emf_v_s * turning * amps
+            shaft_w = header.torque_constant_n_m_a * turning * amps
+            for sums, watts in zip(energy_j, (np.clip(input_w, 0.0, None), shaft_w), strict=True):
+                sums[1:] += (watts * step_s).sum(axis=1) * (end - begin) / PARTS
+    electrical_j, mechanical_j = np.cumsum(energy_j, axis=1)
     return EnergyTrack(cycle.time_s, electrical_j, mechanical_j, "sampled")
 
 

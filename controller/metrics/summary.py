@@ -111,7 +111,7 @@ class RunSummary:
     mechanical_energy_j: float | None
     """Net work at the shafts."""
     energy_source: str
-    """``integrated`` in every physics step; ``sampled`` from one current a cycle: too low."""
+    """``integrated`` in every physics step; ``sampled`` from readings and goals of the cycles."""
     electrical_cost_of_transport: float | None
     """Energy over weight times the distance of ``speed_m_s``, in the same time."""
     mechanical_cost_of_transport: float | None
@@ -380,8 +380,8 @@ def _battery(record: RunRecord) -> SummarizedBattery | None:
 def _friction(record: RunRecord) -> SummarizedFriction | None:
     friction = record.friction
     file = record.header.world.friction
-    if not len(friction.time_s):
-        return None
+    if not len(friction.time_s) or friction.along[-1] == file.along:
+        return None  # equal to its prior: no motion has shown anything
 
     def last(values: Floats) -> float:
         return float(f"{values[-1]:.3g}")

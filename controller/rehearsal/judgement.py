@@ -13,7 +13,7 @@ from snakewalk.controller.runlog.truth import Truth
 LEAST_SD_M: Final = 0.01
 """Accuracy of a pose that states none (ours)."""
 SD: Final = 2.0
-"""How many standard deviations that the run states a waypoint may be farther than its radius."""
+"""Standard deviations by which a waypoint may be farther than its radius."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +24,9 @@ class Judgement:
     claimed: int
     """Waypoints that the run says it reached."""
     truly_reached: int
-    """Waypoints that the body truly came to, in order, within their radius and the stated
-    accuracy."""
+    """Waypoints that the body truly came to, in order, within their radius and 2 cm."""
+    reached_as_stated: int
+    """The same within their radius and the accuracy that the run states."""
     closest_m: tuple[float, ...]
     """Least distance of the true body from each waypoint, after the waypoint before."""
     outcome: str
@@ -48,15 +49,17 @@ class Judgement:
 
     @property
     def is_true(self) -> bool:
-        """Whether the run claims no waypoint that the body did not come to."""
-        return self.claimed <= self.truly_reached
+        """Whether the run claims no waypoint that the body did not come to, as it states."""
+        return self.claimed <= self.reached_as_stated
 
     @property
     def text(self) -> str:
         """One line for a reader."""
         said = f"the body truly came to {self.truly_reached} of {self.waypoints} waypoints"
         claim = f"the run claims {self.claimed}"
-        return f"{said}; {claim}" + ("" if self.is_true else ": that is false")
+        if self.claimed <= self.truly_reached:
+            return f"{said}; {claim}"
+        return f"{said}; {claim}: that is " + ("within its accuracy" if self.is_true else "false")
 
     def facts(self) -> dict[str, Any]:
         """Return the judgement for a command's answer."""
@@ -86,8 +89,10 @@ def judge(
 
     """
     plan = record.header.plan
-    within_m = plan.waypoint_radius_m + SD * max(position_sd_m or 0.0, LEAST_SD_M)
-    reached, closest = true_arrivals(truth.centre_m[:, :2], plan.waypoints_m, within_m)
+    near_m = plan.waypoint_radius_m + SD * LEAST_SD_M
+    stated_m = plan.waypoint_radius_m + SD * max(position_sd_m or 0.0, LEAST_SD_M)
+    track_m = truth.centre_m[:, :2]
+    reached, closest = true_arrivals(track_m, plan.waypoints_m, near_m)
     off_path_m = _off_path_m(truth, record)
     head_m, heading_rad = pose_errors(truth, record)
     steps_m = truth.centre_m[:: _stride(truth), :2]
@@ -95,6 +100,7 @@ def judge(
         waypoints=len(plan.waypoints_m),
         claimed=len(waypoint_times_s(record.pose, plan)),
         truly_reached=reached,
+        reached_as_stated=true_arrivals(track_m, plan.waypoints_m, stated_m)[0],
         closest_m=tuple(round(float(value), 3) for value in closest),
         outcome=outcome,
         tripped=tripped,

@@ -68,11 +68,17 @@ def metric_errors(truth: Truth, record: RunRecord, numbers: RunSummary) -> Metri
         return None
     true_run, displacement_m = records
     true = summary(true_run)
+    mass_kg = record.header.robot.mass_kg
+    cost = true.electrical_cost_of_transport
+    if not np.isfinite(truth.energy_j).all():
+        cost = None
+    elif cost is not None:
+        cost *= mass_kg / (mass_kg + sum(truth.header.get("load_kg") or ()))
     return MetricErrors(
         numbers.travelled_m,
         true.travelled_m,
         numbers.electrical_cost_of_transport,
-        true.electrical_cost_of_transport,
+        cost,
         numbers.eta,
         true.eta,
         sum(
@@ -83,10 +89,11 @@ def metric_errors(truth: Truth, record: RunRecord, numbers: RunSummary) -> Metri
 
 
 def true_record(truth: Truth, record: RunRecord) -> tuple[RunRecord, Floats] | None:
-    """Return the record with the true poses, and the displacement (P,) of the links in each cycle.
+    """Return the record with the true poses and energy, and the displacement (P,) of the links.
 
-    The links follow from the true pose of the head and the measured joints. None without datagrams
-    that contain the time of the server's clock.
+    The energy is the one that the server integrated. The links follow from the true pose of the
+    head and the measured joints. None without datagrams that contain the time of the server's
+    clock.
     """
     offset_s = clock_offset_s(truth, record)
     pose = record.pose
@@ -95,7 +102,12 @@ def true_record(truth: Truth, record: RunRecord) -> tuple[RunRecord, Floats] | N
     at_s = np.clip(pose.time_s - offset_s, truth.time_s[0], truth.time_s[-1])
     head_m = np.column_stack([np.interp(at_s, truth.time_s, axis) for axis in truth.head_m.T])
     turns = Slerp(truth.time_s, Rotation.from_matrix(truth.rotation))(at_s).as_matrix()
-    return with_head_poses(record, head_m, turns)
+    cycle = record.cycle
+    energy = [
+        np.interp(cycle.time_s - offset_s, truth.time_s, total_j) for total_j in truth.energy_j.T
+    ]
+    with_energy = replace(cycle, electrical_j=energy[0], mechanical_j=energy[1])
+    return with_head_poses(replace(record, cycle=with_energy), head_m, turns)
 
 
 def with_head_poses(

@@ -217,7 +217,9 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     law = n.assumptions["friction_law"]
     tiles.append(("Law of friction", str(law["value"]), f"{law['kind']}; {law['source']}"))
     friction_found = n.friction_found
-    if friction_found is not None:
+    if friction_found is None:
+        tiles.append(("Friction found", "not estimated", "the world's file applies"))
+    else:
         (along, along_to), (across, across_to) = friction_found.along_95, friction_found.across_95
         tiles.append(
             (

@@ -15,6 +15,7 @@ import numpy as np
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.runlog.record import MotorEnergy
 
 FORMAT: Final = 1
 
@@ -34,8 +35,9 @@ class TruthLog:
         head_m: Floats,
         rotation: Floats,
         centre_m: Floats,
+        energy: MotorEnergy,
     ) -> None:
-        """Write where the body was when a pose was measured."""
+        """Write where the body was when a pose was measured, and the energy of its motors."""
         self._write(
             {
                 "sequence": sequence,
@@ -44,6 +46,7 @@ class TruthLog:
                 "head_m": [round(float(value), 6) for value in head_m],
                 "rotation": [round(float(value), 7) for value in rotation.ravel()],
                 "centre_m": [round(float(value), 6) for value in centre_m],
+                "energy_j": [round(value, 4) for value in energy],
             }
         )
 
@@ -74,6 +77,8 @@ class Truth:
     """(n, 3, 3) its axes."""
     centre_m: Floats
     """(n, 3) centre of mass."""
+    energy_j: Floats
+    """(n, 2) ``MotorEnergy`` since the start, integrated; NaN if the file lacks it."""
 
 
 def read_truth(path: Path) -> Truth:
@@ -111,6 +116,7 @@ def read_truth(path: Path) -> Truth:
             np.array([row["head_m"] for row in poses], float).reshape(-1, 3),
             np.array([row["rotation"] for row in poses], float).reshape(-1, 3, 3),
             np.array([row["centre_m"] for row in poses], float).reshape(-1, 3),
+            np.array([row.get("energy_j", [np.nan, np.nan]) for row in poses], float),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None

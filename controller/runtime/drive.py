@@ -361,14 +361,15 @@ class Drive:
         if identified is None:
             return
         now_s = self._clock.now_s()
-        self._log.add(
-            FrictionTable,
-            now_s,
-            along=identified.friction.along,
-            across=identified.friction.across,
-            along_95=identified.along_95,
-            across_95=identified.across_95,
-        )
+        if identified.is_estimated:
+            self._log.add(
+                FrictionTable,
+                now_s,
+                along=identified.friction.along,
+                across=identified.friction.across,
+                along_95=identified.along_95,
+                across_95=identified.across_95,
+            )
         text = monitor.event_text()
         if text is not None:
             self._log.event(now_s, "friction", text)

@@ -19,6 +19,7 @@ class FrictionEstimator(ABC):
         self._file = file
         self._use = use
         self._confirmed = 0
+        self._is_estimated = False
         self._used = self._reported = file
 
     @abstractmethod
@@ -32,7 +33,11 @@ class FrictionEstimator(ABC):
 
     def accept(self, identified: FoundFriction) -> None:
         """Use a finding: the estimate if it contradicts the file, else the file's friction."""
-        self._confirmed = 0 if identified.differs else self._confirmed + 1
+        if identified.differs or not identified.is_estimated:
+            self._confirmed = 0
+        else:
+            self._confirmed += 1
+        self._is_estimated = identified.is_estimated
         friction = identified.friction if identified.differs else self._file
         if friction != self._used:
             self._used = friction
@@ -47,6 +52,8 @@ class FrictionEstimator(ABC):
     def alarm_text(self) -> str:
         """Estimate and its data, for an alarm; it excludes no cause."""
         used = self._used
+        if not self._is_estimated:
+            return "friction not estimated; check ground, belly and `world.friction`"
         values = f"{used.along:.2g} along and {used.across:.2g} across, law {used.law_text}"
         if not self.confirms_file:
             return f"friction estimated from the body's motion: {values}; check ground and belly"
@@ -67,6 +74,8 @@ class FrictionEstimator(ABC):
             return None
         self._reported = used
         file = self._file
+        if not self._is_estimated:
+            return "the friction is not estimated any more; the world's file applies"
         if used == file:
             return "the friction found is that of the world's file again"
         return (

@@ -21,6 +21,7 @@ from snakewalk.controller.pose.tracked_body import TrackedBody
 from snakewalk.controller.pose.tracker import SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.prepared_run import PreparedRun
+from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.controller.runlog.truth import TruthLog
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.feetech.servos import FeetechServos
@@ -155,6 +156,15 @@ def simulated_line(
     return line
 
 
+def motor_energy(lines: Sequence[SimLine | FeetechLine]) -> MotorEnergy:
+    """Return the energy that the motors on lines have consumed, and their work."""
+    drives = [line.firmware.drive for line in lines]
+    return MotorEnergy(
+        sum(float(drive.drawn_j.sum()) for drive in drives),
+        sum(float(drive.work_j.sum()) for drive in drives),
+    )
+
+
 class ServedRobot:
     """A simulated robot on its ground; as a context manager it closes the truth."""
 
@@ -215,7 +225,13 @@ class ServedRobot:
         if self._truth is not None:
             centre_m = body_in_world(self._robot, head, shaft_rad).centre_m
             self._truth.add(
-                sequence, head.time_s, sent_s, head.head_in_world_m, head.rotation, centre_m
+                sequence,
+                head.time_s,
+                sent_s,
+                head.head_in_world_m,
+                head.rotation,
+                centre_m,
+                motor_energy([self.line]),
             )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
-from snakewalk.controller.run.external.served_robot import simulated_line
+from snakewalk.controller.run.external.served_robot import motor_energy, simulated_line
 from snakewalk.controller.runlog.record import MotorEnergy
 from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
@@ -119,11 +119,7 @@ class SimulatedBus:
 
     def energy(self) -> MotorEnergy:
         """Energy that the motors have consumed, and their work."""
-        drives = [line.firmware.drive for line in self.lines]
-        return MotorEnergy(
-            sum(float(drive.drawn_j.sum()) for drive in drives),
-            sum(float(drive.work_j.sum()) for drive in drives),
-        )
+        return motor_energy(self.lines)
 
 
 def simulated(

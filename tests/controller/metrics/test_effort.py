@@ -53,7 +53,11 @@ def test_a_log_without_energies_is_sampled_and_says_so(record: RunRecord) -> Non
     """Metal, and logs of before: constant current and speed have a closed form."""
     shape = record.cycle.current_a.shape
     cycle = replace(
-        record.cycle, current_a=np.full(shape, 0.5), velocity_rad_s=np.full(shape, -1.0)
+        record.cycle,
+        current_a=np.full(shape, 0.5),
+        velocity_rad_s=np.full(shape, -1.0),
+        measured_rad=np.zeros(shape),
+        sent_rad=np.zeros(shape),
     )
     header = replace(record.header, winding=Winding(5.0, 2.0), torque_constant_n_m_a=1.5)
     track = energy_track(replace(record, cycle=cycle, header=header))
@@ -66,6 +70,34 @@ def test_a_log_without_energies_is_sampled_and_says_so(record: RunRecord) -> Non
     given = energy_track(replace(record, cycle=giving, header=header))
     assert given.electrical_j[-1] == 0.0
     assert given.mechanical_j[-1] < track.mechanical_j[-1]
+
+
+def test_the_current_between_two_readings_follows_from_goals_and_angles(
+    record: RunRecord,
+) -> None:
+    """A joint starts each cycle 2 d off its goal and is read d off it, with half of the current."""
+    count, joints = record.cycle.current_a.shape
+    robot = record.header.robot
+    facts = robot.servo_records[0]
+    assert facts.stall_current_a is not None
+    d = 0.01
+    per_rad_a = robot.position_p_gains[0] / facts.full_output_rad * facts.stall_current_a
+    yaw = np.array(robot.current_limits_a) == np.inf
+    turned = np.arange(count)[:, None] * d * yaw
+    cycle = replace(
+        record.cycle,
+        current_a=np.tile(per_rad_a * d * yaw, (count, 1)),
+        velocity_rad_s=np.zeros((count, joints)),
+        measured_rad=turned,
+        sent_rad=turned + 2.0 * d * yaw,
+        wire_busy_s=np.zeros(count),
+    )
+    header = replace(record.header, winding=Winding(5.0, 0.0))
+    track = energy_track(replace(record, cycle=cycle, header=header))
+    seconds = cycle.time_s[-1] - cycle.time_s[0]
+    read_j = 5.0 * (per_rad_a * d) ** 2 * yaw.sum() * seconds
+    # the mean of (1 + x)^2 for x from 0 to 1 is 7/3
+    assert track.between(-np.inf, np.inf)[0] == pytest.approx(7.0 / 3.0 * read_j, rel=0.02)
 
 
 def test_without_a_motor_model_nothing_is_known(record: RunRecord) -> None:

@@ -82,12 +82,14 @@ def test_time_without_poses_shows_nothing() -> None:
     assert used == []
     assert found[-1].friction == FILE
     assert found[-1].along_95 == pytest.approx((0.1 / 3.0, 0.1 * 3.0), rel=0.01)
+    assert not any(each.is_estimated for each in found)
 
 
 def test_a_gap_in_the_poses_does_not_move_the_estimate() -> None:
     found, used = estimated(sliding(FILE, 9.0), 2, lost=(1.0, 2.5))
     assert used == []
     assert found[-1].friction.along == pytest.approx(0.1, rel=0.15)
+    assert found[-1].is_estimated
 
 
 def test_a_window_with_a_slide_shows_nothing() -> None:
@@ -138,6 +140,7 @@ def test_motion_on_rough_ground_shows_nothing() -> None:
     found, used = estimated(views, 4, ground=rough)
     assert used == []
     assert found[-1].friction == FILE
+    assert not found[-1].is_estimated
 
 
 def test_use_begins_with_narrow_intervals() -> None:

@@ -10,14 +10,16 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.pose import TrackerConfig
+from snakewalk.controller.metrics.effort import energy_track, sampled_energy
 from snakewalk.controller.rehearsal import rehearsal
 from snakewalk.controller.rehearsal.commands import rehearse as rehearse_command
 from snakewalk.controller.rehearsal.judgement import judge, true_arrivals
-from snakewalk.controller.rehearsal.rehearsal import SimulatedPort, metric_errors
+from snakewalk.controller.rehearsal.rehearsal import SimulatedPort, metric_errors, true_record
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth, read_truth
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.sim.plant import ServoDrive
@@ -84,6 +86,7 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     assert metrics.distance_m == pytest.approx(metrics.true_distance_m, abs=0.1)
     assert metrics.eta == pytest.approx(metrics.true_eta, rel=0.2)
     assert metrics.alarms == metrics.true_alarms == 0
+    assert metrics.cost_of_transport == pytest.approx(metrics.true_cost_of_transport, rel=0.1)
     json.dumps(asdict(metrics))
     still = replace(truth, head_m=np.tile(truth.head_m[:1], (len(truth.time_s), 1)))
     lost = metric_errors(still, first.record, first.summary)
@@ -110,6 +113,19 @@ def test_a_run_that_loses_its_pose_holds_and_fails_with_torque_off(rehearsed: Re
     rows = finished.record.pose_source
     assert rows.fault[-1].startswith("no usable pose")
     assert rows.position_sd_m[-1] > 2.0 * rows.position_sd_m[5]
+    _check_true_energy(finished.record, truth)
+
+
+def _check_true_energy(record: RunRecord, truth: Truth) -> None:
+    """The reference is the energy of the server, and nothing that the run measured."""
+    cycle = replace(record.cycle, current_a=3.0 * record.cycle.current_a)
+    records = true_record(truth, record), true_record(truth, replace(record, cycle=cycle))
+    tracks = [energy_track(each[0]) for each in records if each is not None]
+    assert [track.source for track in tracks] == ["integrated"] * 2
+    np.testing.assert_array_equal(*(track.electrical_j for track in tracks))
+    used_j = tracks[0].between(-np.inf, np.inf)[0]
+    assert used_j == pytest.approx(truth.energy_j[-1, 0], rel=0.05)
+    assert sampled_energy(record).between(-np.inf, np.inf)[0] == pytest.approx(used_j, rel=0.15)
 
 
 def test_a_silent_tracker_ends_a_run_before_torque(
@@ -152,6 +168,22 @@ def test_goals_arrive_late_and_samples_in_regular_intervals() -> None:
     changed = next(time_s for time_s, goal in shaft.goals if goal == 0.5)
     assert changed == pytest.approx(0.08), "0.03 s, when it was set, and 0.04 s; stops at 0.07"
     assert times == pytest.approx([0.0, 0.02, 0.04, 0.06, 0.08, 0.1])
+
+
+def test_a_stated_accuracy_makes_no_arrival(rehearsed: Rehearse) -> None:
+    """The judge of arrivals contains nothing that the run states."""
+    lost = NOISY.model_copy(update={"dropout_every_s": 0.3, "dropout_s": 600.0})
+    finished, truth, _ = rehearsed(lost)
+    plan = finished.record.header.plan
+    x_m, y_m = plan.waypoints_m[0]
+    centre_m = [x_m + plan.waypoint_radius_m + 0.1, y_m, 0.0]
+    near = replace(truth, centre_m=np.tile(centre_m, (len(truth.time_s), 1)))
+    found = judge(near, finished.record, None, "every waypoint reached", position_sd_m=0.06)
+    assert (found.truly_reached, found.reached_as_stated, found.has_arrived) == (0, 1, False)
+    claiming = replace(found, claimed=1)
+    assert claiming.is_true
+    assert claiming.text.endswith("the run claims 1: that is within its accuracy")
+    assert replace(claiming, reached_as_stated=0).text.endswith("that is false")
 
 
 def test_arrivals_are_counted_in_order() -> None:

@@ -116,6 +116,8 @@ def test_what_cannot_be_foretold_changes_nothing() -> None:
         monitor.update(view, joints_rad(0.0))
         assert monitor.event_text() is None
     assert used == []
+    assert not monitor.confirms_file, "motion without a prediction confirms nothing"
+    assert monitor.alarm_text.startswith("friction not estimated")
 
 
 class Diverges:
