@@ -19,7 +19,7 @@ from snakewalk.controller.pose.motion_history import Moment, MotionHistory
 from snakewalk.controller.pose.pose_filter import PoseFilter
 from snakewalk.controller.pose.relocation import PlacedPose, Relocation
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, UnusablePoseError
-from snakewalk.controller.pose.sender_clock import SenderClock
+from snakewalk.controller.pose.sender_clock import MOST_DRIFT, SenderClock
 from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
 from snakewalk.drivers.types import BodyPose, JointState
 
@@ -233,11 +233,14 @@ class ExternalPose:
     def facts(self) -> dict[str, float | int]:
         """Return numbers for the log and for a command's answer."""
         counts = {f"poses_{key}": value for key, value in self.counts.items() if key != "poses"}
+        drift = self._clock.drift
+        # a bound is not a measurement
+        known = {"sender_drift_ppm": round(1e6 * drift, 1)} if abs(drift) < MOST_DRIFT else {}
         return {
             "poses": self.counts["poses"],
             **counts,
             "pose_latency_s": round(self._latency.latency_s, 3),
-            "sender_drift_ppm": round(1e6 * self._clock.drift, 1),
+            **known,
         }
 
     def row(self) -> dict[str, Any]:

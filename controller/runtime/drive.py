@@ -307,11 +307,20 @@ class Drive:
         if not self._run.waypoints_m:
             is_done = self._motion.done
             return "the motion came to its end" if is_done else "the motion was cut off"
+        if self._is_unconfirmed:
+            return (
+                f"reached {reached} of {self._waypoints} by a pose that the joints did not confirm"
+            )
         if self._believes:
             return f"believes it reached {reached} of {self._waypoints} (dead reckoning)"
         if reached == self._waypoints:
             return "every waypoint reached"
         return f"{reached} waypoints reached"
+
+    @property
+    def _is_unconfirmed(self) -> bool:
+        hold = self._pose_hold
+        return hold is not None and not hold.health.row().get("is_confirmed", True)
 
     def _hold_out(self, period_s: float) -> None:
         """Go on reading while a trip holds the body, until its torque is off."""
@@ -423,6 +432,8 @@ class Drive:
             log.add(WaypointTable, now_s, waypoints_m=self._waypoints_m)
         if path.reached > reached:
             text = f"waypoint {path.reached} reached"
+            if self._is_unconfirmed:
+                text += " by a pose that the joints have not confirmed"
             if self._believes:
                 text = f"believes it reached waypoint {path.reached} (dead reckoning)"
             log.event(now_s, "waypoint", text)

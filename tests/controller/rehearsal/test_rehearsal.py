@@ -47,8 +47,10 @@ def run_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def rehearsed(run_file: Path, tmp_path: Path) -> Rehearse:
-    def run(tracker: TrackerConfig, name: str = "run") -> tuple[RunResult, Truth, ServedRobot]:
-        prepared = prepare_job(str(run_file), pose="udp:9870")
+    def run(
+        tracker: TrackerConfig, name: str = "run", **changes: object
+    ) -> tuple[RunResult, Truth, ServedRobot]:
+        prepared = prepare_job(str(run_file), pose="udp:9870", **changes)
         truth = tmp_path / f"{name}.jsonl"
         served = ServedRobot(
             prepared.robot,
@@ -114,6 +116,15 @@ def test_a_run_that_loses_its_pose_holds_and_fails_with_torque_off(rehearsed: Re
     assert rows.fault[-1].startswith("no usable pose")
     assert rows.position_sd_m[-1] > 2.0 * rows.position_sd_m[5]
     _check_true_energy(finished.record, truth)
+
+
+def test_an_end_by_an_unconfirmed_pose_says_so_everywhere(rehearsed: Rehearse) -> None:
+    """The first waypoint is so near that the run ends before the joints can confirm the pose."""
+    finished, _, _ = rehearsed(NOISY, waypoint_radius_m=0.9)
+    assert finished.verdict.exit_code == 3
+    texts = {event.kind: event.text for event in finished.record.events}
+    assert texts["stop"] == ("torque off; reached 1 of 1 by a pose that the joints did not confirm")
+    assert texts["waypoint"].endswith("by a pose that the joints have not confirmed")
 
 
 def _check_true_energy(record: RunRecord, truth: Truth) -> None:
