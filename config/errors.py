@@ -6,6 +6,7 @@ with code 2. ``Assumptions`` has the answers to questions about a file.
 
 import math
 from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
 
 
 class InputError(Exception):
@@ -28,8 +29,9 @@ class ConfigError(InputError):
 class Assumptions:
     """Values of a user for facts that a foreign file does not state: ``--assume KEY=VALUE``.
 
-    A reader asks for a value with ``number``. If it is missing, the question is an ``InputError``
-    with the option and the likely value. ``lines`` lists the used values, for the output.
+    A reader asks for a value with ``number``, and goes on with the likely one. ``check_used`` asks
+    all open questions at once. ``*`` in a key stands for any text. ``lines`` lists the used values,
+    for the output.
     """
 
     def __init__(self, given: Iterable[str] = ()) -> None:
@@ -41,6 +43,8 @@ class Assumptions:
         """
         self._values: dict[str, str] = {}
         self._used: dict[str, str] = {}
+        self._answered = set[str]()
+        self._questions: dict[str, tuple[str, float]] = {}
         for word in given:
             key, sign, value = word.partition("=")
             if not (key.strip() and sign and value.strip()):
@@ -56,9 +60,12 @@ class Assumptions:
             InputError: the value is not a number, or beyond the limits.
 
         """
-        text = self._values.get(key)
-        if text is None:
+        patterns = [key, *(pattern for pattern in self._values if fnmatchcase(key, pattern))]
+        name = next((pattern for pattern in patterns if pattern in self._values), None)
+        if name is None:
             return None
+        text = self._values[name]
+        self._answered.add(name)
         try:
             value = float(text)
         except ValueError:
@@ -68,10 +75,8 @@ class Assumptions:
         self._used[key] = text
         return value
 
-    def number(
-        self, key: str, low: float, high: float, missing: str, likely: float | None = None
-    ) -> float:
-        """Value of a key that the file does not state.
+    def number(self, key: str, low: float, high: float, missing: str, likely: float) -> float:
+        """Value of a key that the file does not state; the likely one for now.
 
         Args:
             key: of the option.
@@ -81,23 +86,33 @@ class Assumptions:
             likely: value to suggest.
 
         Raises:
-            InputError: the value is missing (the question), or unusable.
+            InputError: the value is unusable.
 
         """
         value = self.given(key, low, high)
         if value is None:
-            shown = "VALUE" if likely is None else f"{likely:.4g}"
-            raise InputError(f"{missing}; add --assume {key}={shown}")
+            self._questions[key] = missing, likely
+            return likely
         return value
 
     def check_used(self, advice: str) -> None:
-        """Reject unused values.
+        """Ask all open questions at once; reject unused values.
 
         Raises:
-            InputError: a value is unused; ``advice`` describes the command's keys.
+            InputError: a value is missing, or unused; ``advice`` describes the command's keys.
 
         """
-        unused = [key for key in self._values if key not in self._used]
+        asked = [
+            f"{missing}; add --assume {key}={likely:.4g}"
+            for key, (missing, likely) in self._questions.items()
+        ]
+        if len(asked) > 1:
+            key, (_, likely) = next(iter(self._questions.items()))
+            pattern = f"*.{key.rpartition('.')[2]}={likely:.4g}"
+            asked.append(f"or answer several at once, by a *: --assume '{pattern}'")
+        if asked:
+            raise InputError(asked)
+        unused = [key for key in self._values if key not in self._answered]
         if unused:
             raise InputError(
                 f"--assume {unused[0]}={self._values[unused[0]]}: this file does not need it; "

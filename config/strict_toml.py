@@ -65,9 +65,13 @@ def checked(
     except PydanticSerializationError as error:
         raise ConfigError(f"{source}: {error}") from None
     except ValidationError as error:
-        raise ConfigError(
-            [_line(model, source, text, dict(fault), others) for fault in error.errors()]
-        ) from None
+        faults = error.errors()
+        lines = [_line(model, source, text, dict(fault), others) for fault in faults[:_MOST_FAULTS]]
+        if len(faults) > _MOST_FAULTS:
+            lines.append(
+                f"{source}: {len(faults) - _MOST_FAULTS} further faults; correct these first"
+            )
+        raise ConfigError(lines) from None
 
 
 def _plain(value: Any) -> Any:
@@ -100,6 +104,8 @@ def _check_keys(text: str) -> None:
 
 
 _MOST_BYTES: Final = 4_000_000
+_MOST_FAULTS: Final = 100
+"""Faults that are listed (ours)."""
 _MOST_TABLES: Final = 100
 """Limit of tables in a TOML file, and in a dotted key (ours)."""
 _NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")

@@ -1,18 +1,12 @@
 """Tables of numbers: CSV and XYZ, with decimal points or decimal commas."""
 
-import re
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from snakewalk.config.archive import check_expansion
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-
-_DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
-_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
-_MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+from snakewalk.config.text_table import DECIMAL_COMMA, MISSING, has_decimal_commas, read_lines
 
 
 def read_numbers(
@@ -28,22 +22,16 @@ def read_numbers(
         InputError: the file is not such a table; names the first cell that is not a number.
 
     """
-    size = file.stat().st_size
-    check_expansion(file, size, 4 * size)  # a number needs two characters or more
-    try:
-        text = file.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError:
-        raise InputError(f"{file}: is no text") from None
     lines = [
         (number, line)
-        for number, line in enumerate(text, start=1)
+        for number, line in enumerate(read_lines(file, "table"), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not lines:
         raise InputError(f"{file}: holds no numbers")
     mark = _separator([line for _, line in lines])
     rows = [(number, [cell.strip() for cell in line.split(mark)]) for number, line in lines]
-    comma = mark != "," and _has_decimal_commas(file, rows)
+    comma = mark != "," and has_decimal_commas(file, [cells for _, cells in rows])
     if not all(_is_number(cell, comma) for cell in rows[0][1]):
         if names is not None:
             names += rows[0][1]
@@ -82,27 +70,10 @@ def _separator(lines: list[str]) -> str | None:
     if any("," in line for line in first):
         words = next(line for line in reversed(first) if "," in line).split()
         decimal = len(words) > 1 and all(
-            _DECIMAL_COMMA.fullmatch(word) or _is_number(word, False) for word in words
+            DECIMAL_COMMA.fullmatch(word) or _is_number(word, False) for word in words
         )
         return None if decimal else ","
     return None
-
-
-def _has_decimal_commas(file: Path, rows: list[tuple[int, list[str]]]) -> bool:
-    """Whether the numbers have decimal commas.
-
-    Raises:
-        InputError: they may also be thousands.
-
-    """
-    cells = [cell for _, row in rows for cell in row if "," in cell]
-    if not cells or not any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells):
-        return False
-    if all(_THOUSANDS.fullmatch(cell) for cell in cells):
-        raise InputError(
-            f"{file}: {cells[0]!r} has a comma for decimals or for thousands; write decimal points"
-        )
-    return True
 
 
 def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> str:
@@ -124,7 +95,7 @@ def _plain(cells: list[str]) -> list[float] | None:
 
 
 def _number(cell: str, comma: bool) -> float | None:
-    if cell.lower() in _MISSING:
+    if cell.lower() in MISSING:
         return float("nan")
     try:
         return float(cell.replace(",", ".") if comma else cell)

@@ -49,11 +49,11 @@ class JointMotion:
     """Named joint angles over time."""
 
     time_s: Floats
-    """(T,) increasing, from 0 s."""
+    """(T,) increasing."""
     names: tuple[str, ...]
     """Names of the K joints of the file."""
     joint_rad: Floats
-    """(T, K)"""
+    """(T, K); NaN where a value is missing."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out, changed or assumed."""
 
@@ -112,11 +112,10 @@ def joint_motion(
     joint_rad: Floats,
     notes: Sequence[str] = (),
 ) -> JointMotion:
-    """Check angles (T, K); drop and count rows without a value.
+    """Check angles (T, K) of a reader; NaN is a missing value.
 
     Raises:
-        InputError: too many angles, repeated names, times that do not increase, or fewer than two
-            rows.
+        InputError: too many angles, repeated names, or times that do not increase.
 
     """
     twice = sorted({name for name in names if list(names).count(name) > 1})
@@ -124,22 +123,31 @@ def joint_motion(
         raise InputError(f"{path}: joint {twice[0]} is there twice; names must differ")
     if joint_rad.size > MOST_CELLS:
         raise InputError(f"{path}: holds {joint_rad.size} angles; at most {MOST_CELLS} are read")
-    is_complete = np.isfinite(joint_rad).all(axis=1) & np.isfinite(time_s)
-    lines = list(notes)
+    has_time = np.isfinite(time_s)
+    step_s = np.diff(time_s[has_time])
+    if not (step_s > 0.0).all():
+        last_s = time_s[has_time][int(np.argmax(step_s <= 0.0))]
+        raise InputError(f"{path}: time must increase, in seconds; it does not after {last_s:g} s")
+    return JointMotion(time_s, tuple(names), joint_rad, tuple(notes))
+
+
+def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion:
+    """Return a motion of angles (T, J) from 0 s; drop and count rows without a value.
+
+    Raises:
+        InputError: fewer than two rows are left.
+
+    """
+    is_complete = np.isfinite(joint_rad).all(axis=1) & np.isfinite(motion.time_s)
+    lines = list(motion.notes)
     if not is_complete.all():
         lines.append(
             f"{int((~is_complete).sum())} of {len(is_complete)} rows lack a value and are left out"
         )
-    time_s = time_s[is_complete]
-    joint_rad = joint_rad[is_complete]
+    time_s = motion.time_s[is_complete]
     if len(time_s) < 2:
-        raise InputError(f"{path}: {len(time_s)} whole rows of joint angles; a motion needs 2")
+        raise InputError(f"{where}: {len(time_s)} whole rows of joint angles; a motion needs 2")
     step_s = np.diff(time_s)
-    if not (step_s > 0.0).all():
-        row = int(np.argmax(step_s <= 0.0)) + 1
-        raise InputError(
-            f"{path}: time must increase, in seconds; it does not after {time_s[row - 1]:g} s"
-        )
     usual_s = float(np.median(step_s))
     missing = int(np.rint(step_s / usual_s - 1.0).clip(0).sum())
     if missing:
@@ -147,7 +155,7 @@ def joint_motion(
             f"{missing} rows are missing in {int((step_s > 1.5 * usual_s).sum())} gaps of up to "
             f"{float(step_s.max()):.3g} s"
         )
-    return JointMotion(time_s - time_s[0], tuple(names), joint_rad, tuple(lines))
+    return JointMotion(time_s - time_s[0], motion.names, joint_rad[is_complete], tuple(lines))
 
 
 def _in_order(names: Sequence[str], where: str) -> tuple[list[str], str]:
@@ -176,8 +184,8 @@ def _in_order(names: Sequence[str], where: str) -> tuple[list[str], str]:
 
 def onto_robot(
     motion: JointMotion, robot: RobotConfig, asked: Mapping[str, str], where: str
-) -> tuple[Floats, tuple[str, ...]]:
-    """Return angles (T, J) in the order of a robot's joints, and lines about the mapping.
+) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Return times (T,), angles (T, J) in the order of a robot's joints, and lines about both.
 
     ``asked`` has priority, then equal names. If no name is equal and the numbers of joints agree,
     joints are mapped by the numbers in their names if all have one stem, else in their order.
@@ -189,8 +197,8 @@ def onto_robot(
         where: name of the file in messages.
 
     Raises:
-        InputError: a joint of the robot has no counterpart, or the order contradicts the numbers
-            in the names.
+        InputError: a joint of the robot has no counterpart, the order contradicts the numbers in
+            the names, or fewer than two rows have all values.
 
     """
     joint_names = robot.joint_names
@@ -222,10 +230,12 @@ def onto_robot(
     lines = [f"joints by {source}: {listed}"]
     unused = [name for name in names if name not in pairs.values()]
     if unused:
-        moved = np.ptp(motion.joint_rad, axis=0) > _STILL_RAD
+        highest, lowest = (pick.reduce(motion.joint_rad) for pick in (np.fmax, np.fmin))
+        moved = highest - lowest > _STILL_RAD
         moving = [name for name in unused if moved[names.index(name)]]
         lines.append(
             f"{len(unused)} joints of the file are not used, {len(moving)} of them move: "
             f"{', '.join(unused)}"
         )
-    return np.stack(columns, axis=1), (*lines, *motion.notes)
+    complete = _complete(motion, np.stack(columns, axis=1), where)
+    return complete.time_s, complete.joint_rad, (*lines, *complete.notes)

@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.retarget import Retarget
+from snakewalk.controller.motion.parted_recording import gaps
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.slowing import CUT_CYCLES
 from snakewalk.controller.track.wave import measure_wave
@@ -18,7 +19,8 @@ from snakewalk.controller.track.wave import measure_wave
 def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
     """Read times (T,) and joint angles (T, J) from the file itself, or from its midlines.
 
-    Joints of midlines are smoothed, with a cut well above the wave's frequency.
+    Joints of midlines are smoothed, with a cut well above the wave's frequency. Long gaps, in which
+    the file has no midline, stay gaps.
 
     Raises:
         InputError: no such recording, or it was made for another robot.
@@ -32,13 +34,17 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
         raise InputError(f"{track}: has one frame; a motion needs two")
     joints = Retarget(robot).joints_rad(recording.angles_rad)
     known_s = recording.time_s - recording.time_s[0]
-    time_s = np.arange(0.0, known_s[-1] + 0.5 / recording.rate_hz, 1.0 / recording.rate_hz)
-    even = np.stack([np.interp(time_s, known_s, column) for column in joints.T], axis=1)
     wave_hz = measure_wave(recording).frequency_hz
-    if wave_hz > 0.0:
-        width = recording.rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz)
-        even = gaussian_filter1d(even, width, axis=0, mode="nearest")
-    return time_s, even
+    width = recording.rate_hz / (2.0 * np.pi * CUT_CYCLES * wave_hz) if wave_hz > 0.0 else 0.0
+    times = []
+    parts = []
+    for rows in np.split(np.arange(len(known_s)), gaps(known_s)):
+        ends_s = known_s[rows[[0, -1]]] * recording.rate_hz
+        time_s = np.arange(round(ends_s[0]), round(ends_s[1]) + 1) / recording.rate_hz
+        even = [np.interp(time_s, known_s[rows], column) for column in joints[rows].T]
+        times.append(time_s)
+        parts.append(gaussian_filter1d(np.stack(even, axis=1), width, axis=0, mode="nearest"))
+    return np.concatenate(times), np.concatenate(parts)
 
 
 def _stored_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats] | None:

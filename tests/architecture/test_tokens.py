@@ -7,7 +7,7 @@ from tests.architecture.layout import ORDER
 from tests.architecture.tokens import by_package, sizes, tokens
 
 DECISIONS: Final = Path(__file__).resolve().parents[2] / "docs/decisions"
-MOST: Final = 466_000
+MOST: Final = 466_900
 """Tokens of all packages."""
 LIMITS: Final = {
     "config": 19550,
@@ -64,9 +64,10 @@ LIMITS: Final = {
 RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.bench": (21_300, "0234-eight-parameters.md"),
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
-    "config": (19_750, "0253-a-pose-is-measured-while-it-agrees.md"),
     "controller.console": (7750, "0188-options-are-fields.md"),
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
+    "config": (20_100, "0270-one-reader-of-text-tables.md"),
+    "controller.exchange": (17_700, "0270-one-reader-of-text-tables.md"),
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
     "controller.pose": (8100, "0253-a-pose-is-measured-while-it-agrees.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),

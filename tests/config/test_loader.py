@@ -46,6 +46,16 @@ def test_all_faults_of_a_file_come_at_once(tmp_path: Path) -> None:
     assert "walk.carrot_m" in text
 
 
+def test_thousands_of_faults_are_counted(tmp_path: Path) -> None:
+    """Each line of a fault is searched for in the text: 20,000 took 45 s."""
+    file = tmp_path / "bad.toml"
+    file.write_text("".join(f"key{k} = {k}\n" for k in range(2000)))
+    with pytest.raises(ConfigError) as caught:
+        load_run(str(file))
+    assert len(caught.value.faults) == 101
+    assert "further faults" in caught.value.faults[-1]
+
+
 @pytest.mark.parametrize(
     ("line", "said"),
     [

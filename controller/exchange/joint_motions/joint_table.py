@@ -1,6 +1,5 @@
 """Joint angles as a CSV: a column of time, then a column for each joint."""
 
-import csv
 import re
 from pathlib import Path
 from typing import Final
@@ -9,6 +8,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import MISSING, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     TIME_UNITS,
@@ -30,8 +30,6 @@ _TIME: Final = {
 """Names of the column of time, and the unit that each states."""
 _OTHERS: Final = {"frame", "point", "frame_idx", "scorer"}
 _UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
-_SEPARATORS: Final = (",", ";", "\t")
-_MISSING: Final = {"", "na", "nan", "null", "none"}
 
 
 @plugin("joints", "csv")
@@ -44,20 +42,16 @@ class JointTable:
             line = head.decode("utf-8-sig", "strict" if len(head) < 4 else "ignore").splitlines()[0]
         except (UnicodeDecodeError, IndexError):
             return False
-        _, cells = _cells(line)
-        names = [_plain(cell) for cell in cells]
+        cells = re.split(r"[,;\t]", line)
+        names = [_plain(cell.strip(' "')) for cell in cells]
         return (
             len(cells) > 1 and names[0] in _TIME and not {*names} & _OTHERS and b"\x00" not in head
         )
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
         """Read the table; see ``JointReader.read``."""
-        try:
-            with path.open(newline="", encoding="utf-8-sig") as stream:
-                separator, cells = _cells(stream.readline())
-                rows = [row for row in csv.reader(stream, delimiter=separator) if any(row)]
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise InputError(f"{path}: is not a CSV in UTF-8: {error}") from None
+        first, *rows = (row for row in read_rows(path, "CSV") if any(row))
+        cells = [cell.strip() for cell in first]
         names = []
         units = set[str]()
         for cell in cells[1:]:
@@ -72,7 +66,7 @@ class JointTable:
                 )
             for k, cell in enumerate(row[: len(cells)]):
                 text = cell.strip()
-                if text.lower() in _MISSING:
+                if text.lower() in MISSING:
                     continue
                 try:
                     values[line - 2, k] = float(text)
@@ -83,11 +77,6 @@ class JointTable:
         unit = _unit_of(path, units, request, values[:, 1:])
         time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])
-
-
-def _cells(line: str) -> tuple[str, list[str]]:
-    separator = max(_SEPARATORS, key=line.count)
-    return separator, [cell.strip().strip('"') for cell in line.split(separator)]
 
 
 def _second(path: Path, column: str, request: JointRequest, time: Floats) -> float:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import check_expansion
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
@@ -17,6 +17,7 @@ from snakewalk.controller.motion.joint_motion import (
     JointRequest,
     joint_motion,
 )
+from snakewalk.controller.motion.parted_recording import gaps
 
 _STATE: Final = "sensor_msgs/msg/JointState"
 _TRAJECTORY: Final = "trajectory_msgs/msg/JointTrajectory"
@@ -45,7 +46,7 @@ class RosJoints:
                     for connection, stamp, data in bag.messages(connections=using)
                 )
                 rows = _states(messages) if kind == _STATE else _points(path, messages)
-                return _motion(path, topic, rows)
+                return motion_of_rows(path, topic, rows)
         except InputError:
             raise
         except Exception as error:
@@ -79,13 +80,16 @@ Row = tuple[float, tuple[str, ...], Any]
 def _states(messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
     """Times, names and positions of JointState messages.
 
-    All times are stamps if any message has one: in simulated time the first stamp may be 0.
+    All times are stamps if each set of joints has one: in simulated time the first stamp may be 0.
     """
     rows = []
+    stamped: dict[frozenset[str], bool] = {}
     for received, message in messages:
         stamp_s = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         rows.append((stamp_s, 1e-9 * received, tuple(message.name), message.position))
-    has_stamps = any(stamp_s for stamp_s, *_ in rows)
+        joints = frozenset(message.name)
+        stamped[joints] = stamped.get(joints, False) or stamp_s > 0.0
+    has_stamps = all(stamped.values())
     for stamp_s, received_s, names, positions in rows:
         yield stamp_s if has_stamps else received_s, names, positions
 
@@ -107,36 +111,44 @@ def _points(path: Path, messages: Iterator[tuple[int, Any]]) -> Iterator[Row]:
         yield 1e-9 * received, tuple(message.joint_names), message.points[0].positions
 
 
-def _motion(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
-    names: tuple[str, ...] = ()
-    times = []
-    angles = []
-    others = 0
-    unlike = set[str]()
+def motion_of_rows(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
+    """Return the angles of all joints at the times of the largest set of joints.
+
+    Angles from other messages, such as those of a second publisher, are interpolated there; in a
+    gap of their own they are missing.
+    """
+    by_joint: dict[str, dict[float, float]] = {}
+    times: dict[frozenset[str], list[float]] = {}
     cells = 0
-    for time_s, row_names, positions in rows:
-        names = names or row_names
-        angle_by_name = dict(zip(row_names, np.asarray(positions, float).tolist(), strict=False))
-        if not {*names} & {*angle_by_name}:
-            others += 1  # of another publisher, or without positions
-            unlike |= {*row_names} - {*names}
-            continue
-        unlike |= {*angle_by_name} - {*names}
-        cells += len(names)
-        check_expansion(path, cells, 8 * cells)
+    for time_s, names, positions in rows:
+        angles = dict(zip(names, np.asarray(positions, float).tolist(), strict=False))
+        cells += len(angles)
         if cells > MOST_CELLS:
             raise InputError(f"{path}: holds more than {MOST_CELLS} angles; give a part of it")
-        times.append(time_s)
-        angles.append([angle_by_name.get(name, np.nan) for name in names])
-    if not names or not angles:
+        times.setdefault(frozenset(angles), []).append(time_s)
+        for name, angle in angles.items():
+            by_joint.setdefault(name, {}).setdefault(time_s, angle)
+    if not by_joint:
         raise InputError(f"{path}: {topic}: no message has names and positions of joints")
+    main = max(times, key=lambda joints: len(joints) * len(times[joints]))
+    time = np.unique(times[main])
     notes = [f"topic {topic}"]
-    if others or unlike:
-        listed = ", ".join(sorted(unlike)) or "none"
-        notes.append(f"{others} messages are left out; further joints in some messages: {listed}")
-    order = np.argsort(times, kind="stable")
-    time = np.array(times)[order]
-    first = np.concatenate([[True], np.diff(time) > 0.0])
-    if not first.all():
-        notes.append(f"{int((~first).sum())} messages repeat a time and are left out")
-    return joint_motion(path, time[first], names, np.array(angles)[order][first], notes)
+    if len(time) < len(times[main]):
+        notes.append(f"{len(times[main]) - len(time)} messages repeat a time and are left out")
+    others = [name for name in by_joint if name not in main]
+    if others:
+        notes.append(f"other messages have {', '.join(others)}: interpolated to these times")
+    columns = [_at(time, np.array(sorted(angles.items()))) for angles in by_joint.values()]
+    return joint_motion(path, time, list(by_joint), np.stack(columns, axis=1), notes)
+
+
+def _at(time: Floats, rows: Floats) -> Floats:
+    """Angles at times (T,) from rows (N, 2) of time and angle; NaN in gaps and beyond the ends."""
+    if len(rows) < 2:
+        return np.where(time == rows[0, 0], rows[0, 1], np.nan)
+    values = np.asarray(np.interp(time, rows[:, 0], rows[:, 1], left=np.nan, right=np.nan))
+    after = rows[gaps(rows[:, 0])]
+    before = rows[gaps(rows[:, 0]) - 1]
+    for (start_s, _), (end_s, _) in zip(before, after, strict=True):
+        values[(time > start_s) & (time < end_s)] = np.nan
+    return values

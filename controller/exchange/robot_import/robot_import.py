@@ -97,7 +97,9 @@ def import_robot(
     try:
         model, source = load_model(path, assumed)
         imported = _read(model, source, name, servo_model, scale, reverse, assumed)
-        assumed.check_used("keys: LINK.length_m, LINK.mass_kg, MESH.mass_kg, radius_m")
+        assumed.check_used(
+            "keys: LINK.length_m, LINK.mass_kg, MESH.mass_kg, JOINT.limit_rad, radius_m"
+        )
     except ConfigError as error:
         raise InputError(f"{path}: {error.faults[0]}") from None
     except InputError as error:
@@ -132,7 +134,7 @@ def _read(
         *_wheel_notes(figures.wheel_friction(source), tree),
     ]
     legs = leg_pairs(model, data, tree, directions, figures.joints_m, figures.links, notes)
-    joints = _joints(model, tree, directions, reverse, notes)
+    joints = _joints(model, tree, directions, reverse, notes, assumed)
     _check_size(figures.links, tree.names, scale)
     keys = _keys(name, servo_model, scale, figures.links, directions.yaws, joints, legs)
     keys |= _plan_limits(source, {hinge.name for hinge in tree.hinges}, servo_model, notes)
@@ -281,8 +283,8 @@ def _plan_limits(
     return keys
 
 
-_TURN_RAD: Final = 4.0 * math.pi
-_DEGREES: Final = "; if the file means degrees, convert its limits to radians"
+_DEGREES: Final = 4.0 * math.pi, 360.0
+"""Half ranges that may be degrees: over two turns in radians, and at most one in degrees (ours)."""
 
 
 def _joints(
@@ -291,6 +293,7 @@ def _joints(
     directions: ChainDirections,
     reverse: bool,
     notes: list[str],
+    assumed: Assumptions,
 ) -> list[dict[str, object]]:
     """Tables of the spine's joints: axis, sign against the model's, and half range."""
     endless = [hinge.name for hinge in tree.hinges if not model.jnt_limited[hinge.joint]]
@@ -305,12 +308,22 @@ def _joints(
         if not model.jnt_limited[hinge.joint]:
             low, high = -_MOST_RAD, _MOST_RAD
         half = min(-low, high, _MOST_RAD)
-        if half <= 0.05:
+        key = f"{hinge.name}.limit_rad"
+        if _DEGREES[0] < high <= _DEGREES[1]:
+            missing = (
+                f"joint {hinge.name}: turns to {high:g} rad in the model, {high / math.tau:.3g} "
+                f"turns: degrees, or an endless joint (--assume {key}={_MOST_RAD:g})"
+            )
+            likely = min(math.radians(high), _MOST_RAD)
+            half = assumed.number(key, 0.05, _MOST_RAD, missing, likely)
+        elif (given := assumed.given(key, 0.05, _MOST_RAD)) is not None:
+            half = given
+        elif half <= 0.05:
             raise InputError(
                 f"joint {hinge.name}: its range, {low:.3g} to {high:.3g} rad, leaves less than "
                 "0.05 rad on one side of straight"
             )
-        if abs(low + high) > 1e-6:
+        elif abs(low + high) > 1e-6:
             notes.append(
                 f"joint {hinge.name}: turns from {low:.3g} to {high:.3g} rad in the model; ranges "
                 f"here are even: {half:.3g} rad both ways"
@@ -318,7 +331,7 @@ def _joints(
         elif half < high:
             notes.append(
                 f"joint {hinge.name}: its range of {high:.3g} rad is cut to {half:g}: a servo "
-                f"knows one turn{_DEGREES if high > _TURN_RAD else ''}"
+                "knows one turn"
             )
         sign = _sign(hinge, yaw, directions, reverse)
         tables.append({"axis": "y" if yaw else "p", "sign": sign, "limit_rad": half})

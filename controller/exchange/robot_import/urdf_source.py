@@ -36,6 +36,8 @@ _ONCE: Final = {
 """Elements that urdfdom reads once: the first counts."""
 _NOT_READ: Final = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
 _MESHES: Final = (".stl", ".obj")
+_FREE: Final = ("floating", "planar")
+"""Kinds of joints that let a robot move freely in its world."""
 _SLIVER_KG: Final = 1e-9
 """Mass that MuJoCo gets for a body that states none."""
 
@@ -61,7 +63,9 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
                 "here is a servo"
             )
     _drop_repeated(source)
+    _check_names(root, path)
     _check_limits(root, path)
+    _use_soft_limits(source)
     driven = _driven(root)
     source.actuated = driven or None
     source.friction = _friction(root)
@@ -128,16 +132,19 @@ def _drop_unread(source: ModelSource) -> None:
 
 
 def _first_link(source: ModelSource, path: Path) -> str:
-    """Name of the link on which all hang; a frame that only holds it is dropped.
+    """Name of the link on which all hang.
 
-    Such a frame is the link ``world``, or a link without mass and shape that holds the robot by a
-    floating or planar joint.
+    Links that hold it by a floating or planar joint are dropped, as is the link ``world``.
 
     Raises:
         InputError: no link is the root, several are, or the root is bolted to the world.
 
     """
     root = source.root
+    free = [joint for joint in children(root, "joint") if joint.get("type") in _FREE]
+    if free:
+        _drop_base(source, free[0], path)
+        return _first_link(source, path)
     joints = root.findall("joint")
     names = {end: [_end(joint, end) for joint in joints] for end in ("parent", "child")}
     for link in children(root, "link"):
@@ -154,10 +161,10 @@ def _first_link(source: ModelSource, path: Path) -> str:
         listed = ", ".join(first) or "each hangs on another"
         raise InputError(f"{path}: one link must be the first, on which all hang: {listed}")
     root_link = first[0]
-    holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == root_link]
-    if root_link != "world" and not _is_free_base(root, root_link, holding):
+    if root_link != "world":
         return root_link
-    turning = [j for j in holding if j.get("type") not in ("fixed", "floating", "planar")]
+    holding = [joint for joint in children(root, "joint") if _end(joint, "parent") == root_link]
+    turning = [joint for joint in holding if joint.get("type") != "fixed"]
     if turning:
         raise InputError(
             f"{path}: joint {turning[0].get('name')}, {turning[0].where}: connects the robot to "
@@ -169,24 +176,42 @@ def _first_link(source: ModelSource, path: Path) -> str:
         raise InputError(
             f"{path}: link {root_link} holds {children_text}; one robot is read at a time"
         )
-    root.remove(holding[0])
-    root.remove(next(link for link in root.findall("link") if link.get("name") == root_link))
-    name_held = _end(holding[0], "child")
-    kind = holding[0].get("type")
-    source.notes.append(
-        f"link {root_link} is dropped: it holds {name_held} "
-        f"by the {kind} joint {holding[0].get('name')}"
-    )
+    _drop_base(source, holding[0], path)
     return _first_link(source, path)
 
 
-def _is_free_base(root: LineElement, name: str, holding: list[LineElement]) -> bool:
-    """Whether a link is a mere frame from which the robot moves freely."""
-    link = next(
-        link_element for link_element in root.findall("link") if link_element.get("name") == name
-    )
-    is_frame = not any(child.tag in ("inertial", "visual", "collision") for child in link)
-    return is_frame and [joint.get("type") for joint in holding] in (["floating"], ["planar"])
+def _drop_base(source: ModelSource, holding: LineElement, path: Path) -> None:
+    """Drop the links around the robot, which a joint to the world holds.
+
+    Raises:
+        InputError: one of their joints turns.
+
+    """
+    root = source.root
+    kept = [str(_end(holding, "child"))]
+    for name in kept:
+        children_of = [_end(j, "child") for j in root.findall("joint") if _end(j, "parent") == name]
+        kept += [str(child) for child in children_of if child not in kept]
+    dropped = [
+        str(link.get("name")) for link in root.findall("link") if link.get("name") not in kept
+    ]
+    for joint in children(root, "joint"):
+        is_outside = _end(joint, "child") not in kept[1:]
+        if is_outside and joint.get("type") not in ("fixed", *_FREE):
+            raise InputError(
+                f"{path}: joint {joint.get('name')}, {joint.where}: moves a second body, apart "
+                f"from the one that joint {holding.get('name')} holds; one robot is read at a time"
+            )
+        if is_outside:
+            root.remove(joint)
+    for link in children(root, "link"):
+        if link.get("name") not in kept:
+            root.remove(link)
+    source.notes += [
+        f"link {name} is dropped: it holds {kept[0]} by the {holding.get('type')} joint "
+        f"{holding.get('name')}"
+        for name in dropped
+    ]
 
 
 def _check_limits(root: LineElement, path: Path) -> None:
@@ -206,6 +231,45 @@ def _check_limits(root: LineElement, path: Path) -> None:
                 f"{path}: joint {joint.get('name')}, {joint.where}: its lower limit of {low[0]:g} "
                 f"is above its upper limit of {high[0]:g}; exchange them"
             )
+
+
+def _check_names(root: LineElement, path: Path) -> None:
+    """Reject links or joints of one name, of which MuJoCo shows no name.
+
+    Raises:
+        InputError: with the name and both lines.
+
+    """
+    for tag in ("link", "joint"):
+        first_of: dict[str | None, LineElement] = {}
+        for element in children(root, tag):
+            first = first_of.setdefault(element.get("name"), element)
+            if first is not element:
+                raise InputError(
+                    f"{path}: {tag} {element.get('name')} is there twice, {first.where} and "
+                    f"{element.where}; names must differ"
+                )
+
+
+def _use_soft_limits(source: ModelSource) -> None:
+    """Narrow the ranges of joints to their soft limits, beyond which ROS pushes them back."""
+    used = []
+    for joint in children(source.root, "joint"):
+        soft, limit = joint.find("safety_controller"), joint.find("limit")
+        if soft is None or limit is None:
+            continue
+        low, high = (numbers(soft.get(f"soft_{end}_limit"), 1) for end in ("lower", "upper"))
+        if low is None or high is None or low[0] >= high[0]:
+            continue  # not stated
+        for end, value, inner in (("lower", low[0], max), ("upper", high[0], min)):
+            stated = numbers(limit.get(end), 1) or [value]
+            limit.set(end, repr(inner(value, stated[0])))
+            if inner(value, stated[0]) != stated[0]:
+                used.append(str(joint.get("name")))
+    if used:
+        source.notes.append(
+            f"the soft limits of safety_controller count: {', '.join(dict.fromkeys(used))}"
+        )
 
 
 def _end(joint: object, end: str) -> str | None:

@@ -46,8 +46,7 @@ def foreign_joints(
     motion = reader.read(
         path, JointRequest(asked.unit, asked.time_unit, asked.topic, asked.episode)
     )
-    angles, lines = onto_robot(motion, robot, asked.joints, track)
-    return motion.time_s, angles, lines
+    return onto_robot(motion, robot, asked.joints, track)
 
 
 def _reader(path: Path) -> JointReader | None:

@@ -16,8 +16,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import MISSING
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
-from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.track import frame_numbers
 
 PCUTOFF = 0.6

@@ -6,7 +6,6 @@ TRC has two lines of names and values (``DataRate``, ``Units``, ...), lines of m
 names, then rows of frame, time and places.
 """
 
-import csv
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import read_rows
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.track.readers.markers import (
     UNITS,
@@ -73,11 +73,7 @@ def load_vicon(
 
 def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     """Load a TRC; see ``load.load_file``."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            rows = list(csv.reader(stream, delimiter="\t"))
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is not a TRC in UTF-8") from None
+    rows = read_rows(file, "TRC", "\t")
     if len(rows) < 6:
         raise InputError(f"{file}: expected the five head lines of a TRC, then rows")
     about = dict(zip((cell.strip() for cell in rows[1]), rows[2], strict=False))

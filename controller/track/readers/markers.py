@@ -5,7 +5,6 @@ column names may follow, then rows of x, y, z per marker, mm. Some exports begin
 time. The values 0, 0, 0 or an empty cell mean a missing marker.
 """
 
-import csv
 import math
 import re
 from collections.abc import Sequence
@@ -16,10 +15,10 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
+from snakewalk.config.text_table import MISSING, read_rows
 from snakewalk.controller.track.readers.keypoints import FEWEST, PLANES, Choice, Keypoints
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-MISSING = {"", "nan", "null", "na", "n/a", "-", "none"}
 _UNLABELLED = re.compile(
     r"\*\d*|uname\*?\d+|unlabell?ed[ _-]?\d*|unknown[ _-]?\d*|unnamed[ _-]?\d*|new \d{4}",
 )
@@ -40,11 +39,7 @@ def is_qtm(head: bytes) -> bool:
 
 def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     """Load QTM's TSV; see ``load.load_file``."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            lines = [row for row in csv.reader(stream, delimiter="\t") if any(row)]
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is no TSV in UTF-8") from None
+    lines = [row for row in read_rows(file, "TSV", "\t") if any(row)]
     about: dict[str, list[str]] = {}
     while lines and lines[0][0].isupper() and not number_or_none(lines[0][0]):
         row = lines.pop(0)

@@ -1,6 +1,5 @@
 """Recordings as tables: midlines point by point, keypoints frame by frame."""
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,12 +7,12 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import MISSING, read_rows
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.track.readers.marker_tables import is_vicon, load_vicon
-from snakewalk.controller.track.readers.markers import MISSING
 from snakewalk.controller.track.readers.sleap import SleapRows, load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
@@ -30,11 +29,7 @@ def load_csv(
     file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
 ) -> Track | Keypoints:
     """Load any of these kinds of CSV; see ``load.load_file``."""
-    try:
-        with file.open(newline="", encoding="utf-8-sig") as stream:
-            every = list(csv.reader(stream))
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(f"{file}: is not a recording; known: {KNOWN}") from None
+    every = read_rows(file, f"recording (known: {KNOWN})")
     if is_vicon(every):
         return load_vicon(file, every, rate_hz, choice)
     rows = [row for row in every if row]

@@ -199,7 +199,7 @@ FAULTS = {
     "text.csv": (b"a,b\nc,d\n", "line 2, column 1: 'c' is not a number"),
     "ragged.csv": (b"1,2\n1\n", "all need as many"),
     "empty.csv": (b"", "holds no numbers"),
-    "bytes.csv": (b"\xff\xfe\x00", "is no text"),
+    "bytes.csv": (b"\xff\xfe\x00", "is not a table in UTF-8"),
     "none.npz": (b"PK", "is no .npz"),
     "cut.pcd": (WHOLE[:-40], "do not fit"),
     "head.pcd": (b"VERSION 0.7\n", "no header"),

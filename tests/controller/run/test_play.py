@@ -102,6 +102,22 @@ def test_joints_of_a_synthesis_are_played_as_they_are(
     np.testing.assert_allclose(again.make_source(lambda kind, text: None).goal_rad(), wave[0])
 
 
+def test_a_gap_without_midlines_stays_a_gap(tmp_path: Path) -> None:
+    """Frames that a capture left out are not crossed by a line between shapes."""
+    at = np.arange(200)
+    missing = (at > 80) & (at < 130)
+    body = np.linspace(0.0, 1.0, 12)
+    wave = 0.05 * np.sin(2.0 * np.pi * (at[:, None] / 50.0 - body))
+    points = np.stack([np.broadcast_to(-body, wave.shape), wave], axis=-1)
+    points[missing] = np.nan
+    path = tmp_path / "capture.npz"
+    np.savez(path, points=points, rate_hz=50.0)
+    time_s, joints = recorded_joints(str(path), load_robot("yaw16"))
+    assert len(time_s) == len(joints) == 151
+    np.testing.assert_allclose(time_s[[0, 80, 81, -1]], [0.0, 1.6, 2.6, 3.98])
+    assert any("1 gaps, of up to 1 s" in line for line in prepare_playback(str(path)).notes)
+
+
 def test_a_recording_of_which_no_shape_is_used_is_told() -> None:
     """Shapes that only slip are left out; then the walk is not the animal's, and says so."""
     prepared = prepare_walk("flat-slalom")

@@ -10,6 +10,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.plugins import names
+from snakewalk.controller.exchange.joint_motions.ros_joints import motion_of_rows
 from snakewalk.controller.motion.joint_motion import joint_motion, onto_robot
 from snakewalk.controller.run.factory import prepare_playback
 from tests.helpers.command import snakewalk
@@ -34,7 +35,10 @@ def bag(
     *,
     trajectory: bool = False,
     start_s: float = 7.0,
+    publishers: tuple[slice, ...] = (slice(None),),
+    fingers: tuple[float, ...] = (),
 ) -> None:
+    """Write a bag; ``fingers`` are times of messages of a gripper, ahead of all others."""
     from mcap.writer import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -64,11 +68,19 @@ def bag(
         send("/goal", kind, 1.0, types[kind](header(time(1, 0), ""), list(joints), points))
     else:
         kind = "sensor_msgs/msg/JointState"
-        for k, (at, row) in enumerate(zip(TIME_S, ANGLES, strict=True)):
-            order = np.roll(np.arange(len(joints)), k % 2)  # publishers may change the order
-            named = [joints[n] for n in order]
+        for at in fingers:
             stamp = header(time(*parts(start_s + at)), "")
-            send("/joint_states", kind, 7.0 + at, types[kind](stamp, named, row[order], none, none))
+            message = types[kind](stamp, ["finger"], np.full(1, at), none, none)
+            send("/joint_states", kind, 7.0 + at, message)
+        for k, (at, row) in enumerate(zip(TIME_S, ANGLES, strict=True)):
+            for late, part in enumerate(publishers):
+                order = np.arange(len(joints))[part]
+                order = np.roll(order, k % 2)  # publishers may change the order
+                named = [joints[n] for n in order]
+                sent_s = at + 0.002 * late
+                stamp = header(time(*parts(start_s + sent_s)), "")
+                message = types[kind](stamp, named, row[order], none, none)
+                send("/joint_states", kind, 7.0 + sent_s, message)
     writer.finish()
 
 
@@ -182,7 +194,7 @@ def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
     ):
         onto_robot(motion, ROBOT, {}, "a")
     asked = {name: f"m{k}" for k, name in enumerate(NAMES)} | {NAMES[3]: "rest"}
-    joints, lines = onto_robot(motion, ROBOT, asked, "a")
+    _, joints, lines = onto_robot(motion, ROBOT, asked, "a")
     assert not joints[:, 3].any()
     np.testing.assert_array_equal(joints[:, 4], ANGLES[:, 4])
     assert lines[1] == "2 joints of the file are not used, 2 of them move: m3, m16"
@@ -197,10 +209,12 @@ def test_gaps_and_rows_without_a_value_are_counted() -> None:
     angles = ANGLES[kept].copy()
     angles[5, 2] = np.nan
     motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles)
-    assert motion.notes == (
+    time_s, joints, (_, *notes) = onto_robot(motion, ROBOT, {}, "a")
+    assert len(time_s) == len(joints) == 50
+    assert notes == [
         "1 of 51 rows lack a value and are left out",
         "10 rows are missing in 2 gaps of up to 0.5 s",
-    )
+    ]
 
 
 def broken(change: Callable[[str], str]) -> Callable[[Path], None]:
@@ -300,6 +314,44 @@ def test_a_bag_whose_first_stamp_is_zero_has_one_clock(tmp_path: Path) -> None:
     prepared = prepare_playback(str(tmp_path / "b.mcap"))
     np.testing.assert_allclose(prepared.joint_track[0], TIME_S, atol=1e-6)
     assert not [line for line in prepared.notes if "missing" in line]
+
+
+def test_a_bag_of_two_publishers_and_a_gripper_is_complete(tmp_path: Path) -> None:
+    bag(
+        tmp_path / "b.mcap",
+        start_s=0.0,
+        publishers=(slice(0, 8), slice(8, 16)),
+        fingers=(0.0, 0.05),
+    )
+    prepared = prepare_playback(str(tmp_path / "b.mcap"))
+    time_s, joints = prepared.joint_track
+    first = TIME_S[1:-1] if len(time_s) == ROWS - 2 else TIME_S[1:]
+    assert len(time_s) >= ROWS - 2
+    np.testing.assert_allclose(np.diff(time_s), 1.0 / RATE_HZ, atol=1e-6)
+    wanted = 0.3 * np.sin(2.0 * np.pi * (0.5 * first[:, None] - np.arange(len(NAMES)) / 10.0))
+    np.testing.assert_allclose(joints, wanted, atol=4e-3)  # 2 ms between the publishers
+    assert any("1 joints of the file are not used" in line for line in prepared.notes)
+    assert any(line.startswith("other messages have finger, yaw_09") for line in prepared.notes)
+
+
+def test_angles_are_not_interpolated_over_a_gap_of_their_publisher(tmp_path: Path) -> None:
+    names = NAMES[:2]
+    rows = [(at, (names[0],), (at,)) for at in TIME_S.tolist()]
+    rows += [(at, (names[1],), (-at,)) for at in TIME_S.tolist() if not 0.5 < at < 1.5]
+    motion = motion_of_rows(Path("b"), "/j", iter(rows))
+    assert motion.names == names
+    between = (motion.time_s > 0.5) & (motion.time_s < 1.5)
+    np.testing.assert_array_equal(np.isnan(motion.joint_rad[:, 1]), between)
+
+
+def test_decimal_commas_are_read(tmp_path: Path) -> None:
+    table(tmp_path / "a.csv", ["time", *(f"{name}_rad" for name in NAMES)], separator=";")
+    path = tmp_path / "a.csv"
+    path.write_text(path.read_text().replace(".", ","))
+    plays(path)
+    path.write_text('time,a_rad\n"1,000","1,200"\n"2,000","1,300"\n')
+    with pytest.raises(InputError, match="'1,000' has a comma for decimals or for thousands"):
+        plays(path)
 
 
 def test_a_run_logs_the_mapping(tmp_path: Path) -> None:

@@ -219,14 +219,10 @@ def test_a_frame_that_holds_the_robot_freely_is_dropped_whatever_its_name(
     assert noted(made, f"link odom is dropped: it holds l0 by the {kind} joint to_l0")
 
 
-def test_limits_in_the_wrong_order_are_rejected_and_large_ones_may_be_degrees(
-    tmp_path: Path,
-) -> None:
+def test_limits_in_the_wrong_order_are_rejected(tmp_path: Path) -> None:
     text = urdf()
     with pytest.raises(InputError, match=r"joint j0, line \d+: its lower limit of 1.2 is above"):
         imported(tmp_path, text.replace('lower="-1.2" upper="1.2"', 'lower="1.2" upper="-1.2"'))
-    made = imported(tmp_path, text.replace('lower="-1.2" upper="1.2"', 'lower="-90" upper="90"'))
-    assert noted(made, "if the file means degrees, convert its limits to radians")
 
 
 def test_repeated_elements_count_once_and_are_named_with_the_users_lines(tmp_path: Path) -> None:
@@ -479,3 +475,67 @@ def test_the_compiler_is_limited(tmp_path: Path) -> None:
          "2000000000", "10"], capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert "MemoryError" in ended.stderr
+
+
+def test_soft_limits_narrow_the_ranges(tmp_path: Path) -> None:
+    soft = '<safety_controller soft_lower_limit="-0.6" soft_upper_limit="0.6" k_velocity="1"/>'
+    made = imported(tmp_path, urdf(inside=soft))
+    assert made.robot.limit_rad == (0.6,) * 3
+    assert noted(made, "the soft limits of safety_controller count: j0, j1, j2")
+    unstated = imported(tmp_path, urdf(inside='<safety_controller k_velocity="1"/>'))
+    assert unstated.robot.limit_rad == (1.2,) * 3
+    assert not noted(unstated, "soft")
+
+
+def test_limits_that_may_be_degrees_are_asked_for_at_once(tmp_path: Path) -> None:
+    text = urdf().replace('lower="-1.2" upper="1.2"', 'lower="-90" upper="90"')
+    with pytest.raises(InputError) as asked:
+        imported(tmp_path, text)
+    assert len(asked.value.faults) == 4
+    for joint, fault in zip(("j0", "j1", "j2"), asked.value.faults, strict=False):
+        assert f"joint {joint}: turns to 90 rad in the model, 14.3 turns: degrees" in fault
+        assert fault.endswith(f"add --assume {joint}.limit_rad=1.571")
+    assert asked.value.faults[-1].endswith("--assume '*.limit_rad=1.571'")
+    made = imported(tmp_path, text, ".urdf", "*.limit_rad=1.5", "j1.limit_rad=1")
+    assert made.robot.limit_rad == (1.5, 1.0, 1.5)
+
+
+def test_masses_are_asked_for_at_once_and_answered_by_a_pattern(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as asked:
+        imported(tmp_path, urdf(inertial=""))
+    assert [fault.split(": ")[1] for fault in asked.value.faults[:4]] == [
+        f"link l{k}" for k in range(4)
+    ]
+    made = imported(tmp_path, urdf(inertial=""), ".urdf", "*.mass_kg=0.2", "l3.mass_kg=0.1")
+    np.testing.assert_allclose(made.robot.link_masses_kg, [0.1, 0.2, 0.2, 0.2][:: made_way(made)])
+
+
+def made_way(made: ImportedRobot) -> int:
+    """Return 1 if the robot begins with the light link, else -1."""
+    return 1 if made.robot.link_masses_kg[0] < 0.15 else -1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('<link name="l3">', '<link name="l2">', "link l2 is there twice, line 6 and line 7"),
+        ('<joint name="j2"', '<joint name="j1"', "joint j1 is there twice, line 9 and line 10"),
+    ],
+)
+def test_a_repeated_name_is_named_with_both_lines(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        imported(tmp_path, urdf().replace(old, new))
+
+
+def test_a_base_with_a_shape_is_no_part_of_a_robot_that_floats(tmp_path: Path) -> None:
+    before = f"""<link name="cart">{INERTIAL}{SHAPE}</link><joint name="free" type="floating">
+<parent link="cart"/><child link="l0"/></joint>"""
+    made = imported(tmp_path, urdf(before=before))
+    assert made.robot.joint_count == 3
+    assert noted(made, "link cart is dropped: it holds l0 by the floating joint free")
+    second = """<link name="b"/><joint name="again" type="floating">
+<parent link="l3"/><child link="b"/></joint>"""
+    with pytest.raises(InputError, match=r"joint j0, line .*: moves a second body"):
+        imported(tmp_path, urdf(before=before, after=second))
