@@ -1,4 +1,4 @@
-# make run      set everything up and do the main job on the embedded defaults
+# make run      set up what a run and the tutorials need, and do the main job on the embedded defaults
 # make test     set everything up and pass lint, types and the fast tests
 # make quick    the fast tests that the changed files concern, in less than a minute
 # make slow     further cases of the expensive tests; CI runs them
@@ -6,6 +6,7 @@
 PY ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+MAIN := $(VENV)/.main
 STAMP := $(VENV)/.ready
 
 PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
@@ -15,11 +16,16 @@ PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --d
 setup: $(STAMP)
 
 # The versions that are installed are in .ci/locks; `make lock` chooses them again.
-$(STAMP): pyproject.toml $(wildcard .ci/locks/*)
-	$(PY) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
-	$(PY) -m venv $(VENV)
-	.ci/setup $(BIN)
-	.ci/offscreen
+$(MAIN): pyproject.toml $(wildcard .ci/locks/*)
+	@$(PY) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed")'
+	@echo "1 of 3: installing packages in $(VENV), about 1 GB"
+	@$(PY) -m venv $(VENV)
+	@.ci/setup $(BIN) main
+	@.ci/offscreen
+	@touch $(MAIN)
+
+$(STAMP): $(MAIN)
+	.ci/setup $(BIN) dev
 	touch $(STAMP)
 
 lock: setup
@@ -29,8 +35,11 @@ lock: setup
 loops: setup
 	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk tools compile
 
-run: loops
-	PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
+run: $(MAIN)
+	@echo "2 of 3: compiling the loops of runs for this computer"
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk tools compile --runs
+	@echo "3 of 3: snakewalk run: a walk over hills in the simulator, then its report and film"
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/snakewalk run
 
 # The types are checked while the loops are compiled and the tests collected: neither fills two cores.
 test: setup lint

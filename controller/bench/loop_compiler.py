@@ -18,8 +18,19 @@ from snakewalk.controller.console.messages import LOGGER
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.fallbacks import fallbacks_in_use
 
-_SHARES: Final = (("drivers", "sim"), ("controller",))
-"""Packages of each child: they compile about equally long, and no loop of both."""
+ALL: Final = (("drivers", "sim"), ("controller",))
+"""Packages of each child for all loops: they compile about equally long, and no loop of both."""
+FOR_RUNS: Final = (
+    ("drivers", "sim"),
+    tuple(
+        f"controller.{name}"
+        for name in (
+            *("kinematics", "mechanics", "shape", "terrain", "gaits", "motion", "runlog", "walk"),
+            *("runtime", "track", "pose", "metrics", "run"),
+        )
+    ),
+)
+"""Packages of each child whose loops a run in the simulator needs: about half of the work."""
 _COMPILED: Final = "snakewalk.drivers.compiling"
 """A module with a loop imports its decorator from here."""
 
@@ -40,21 +51,25 @@ def loop_modules(package: str) -> list[str]:
     return modules
 
 
-def compile_loops(on_module: Callable[[int, int, str], None]) -> int:
-    """Compile all loops and return the number that was not in the cache.
+def compile_loops(
+    on_module: Callable[[int, int, str], None], shares: tuple[tuple[str, ...], ...] = ALL
+) -> int:
+    """Compile loops and return the number that was not in the cache.
 
-    ``on_module`` is called with the number of finished modules, their total, and a name.
+    Args:
+        on_module: called with the number of finished modules, their total, and a name.
+        shares: packages of each child process; by default those of all loops.
 
     Raises:
         RuntimeError: a child failed; its output is above.
 
     """
-    total = sum(len(loop_modules(f"snakewalk.{package}")) for share in _SHARES for package in share)
+    total = sum(len(loop_modules(f"snakewalk.{package}")) for share in shares for package in share)
     lock = threading.Lock()
     notes: dict[str, None] = {}  # of both children, in the order of arrival
     done = 0
     compiled = 0
-    children = [start_module(__name__, *share) for share in _SHARES]
+    children = [start_module(__name__, *share) for share in shares]
 
     def follow(lines: IO[str] | None) -> None:
         nonlocal done, compiled

@@ -35,13 +35,16 @@ class LogPage:
         records: of one or two logs, by the names that the page gives them.
         host: that the page is served at.
         port: 0 for any that is free.
+        repeats: whether it begins again at the end.
 
     Raises:
         InputError: a log has no control cycle, or nothing can be served there.
 
     """
 
-    def __init__(self, records: Mapping[str, RunRecord], host: str, port: int) -> None:
+    def __init__(
+        self, records: Mapping[str, RunRecord], host: str, port: int, *, repeats: bool = False
+    ) -> None:
         for name, record in records.items():
             if not len(record.cycle.time_s) or not len(record.pose.time_s):
                 raise InputError(
@@ -84,6 +87,7 @@ class LogPage:
             self._shown.append(_Shown(record, scene, board))
         self._shown[0].scene.first_camera()
         self.playing = False
+        self._repeats = repeats
         self.time_s = self._begin_s
         self._curves_s = -np.inf
         self._is_apart: bool | None = None
@@ -105,6 +109,8 @@ class LogPage:
             self._slider.value = round(self.time_s, 2)  # type: ignore[misc]
             if self.time_s >= self._end_s:
                 self.toggle()
+                if self._repeats:
+                    self.toggle()
         curves = now_s - self._curves_s >= _CURVES_S or not self.playing
         self._curves_s = now_s if curves else self._curves_s
         moved = self._lay_out()

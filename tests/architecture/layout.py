@@ -23,6 +23,7 @@ BETWEEN_FEATURES: Final[dict[tuple[str, str], str]] = {
     ("learning", "studies"): "policies are compared by the measures of a sweep",
     ("ros", "exchange"): "a live node and an exported bag have the same messages",
     ("studies", "repertoire"): "a replay begins where the recorded actions begin",
+    ("view", "bench"): "the demonstration compiles the loops while a recorded run plays",
     ("view", "studies"): "a page of several logs shows their comparison",
 }
 """Imports between feature packages, (from, to), each with its reason."""

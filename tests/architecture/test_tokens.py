@@ -71,7 +71,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
     "controller.pose": (8100, "0253-a-pose-is-measured-while-it-agrees.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
-    "controller.view": (9300, "0242-code-of-one-importer.md"),
+    "controller.view": (9550, "0275-a-recorded-run-first.md"),
     "controller.run": (22_100, "0242-code-of-one-importer.md"),
     "controller.metrics": (6_000, "0260-references-without-the-value-under-test.md"),
 }

@@ -1,16 +1,27 @@
 """``snakewalk tools compile``: compile all loops in advance."""
 
 import importlib.util
+from typing import Annotated
+
+import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.bench.loop_compiler import compile_loops
+from snakewalk.controller.bench.loop_compiler import ALL, FOR_RUNS, compile_loops
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, show
 from snakewalk.controller.console.progress import ProgressBar
 
 
-@command("tools compile", examples=("tools compile", "tools compile --json"))
-def compile_all(as_json: Json = False) -> None:
+@command("tools compile", examples=("tools compile", "tools compile --runs"))
+def compile_all(
+    runs: Annotated[
+        bool,
+        typer.Option(
+            "--runs", help="only the loops of runs and gaits: half of the time; others follow later"
+        ),
+    ] = False,
+    as_json: Json = False,
+) -> None:
     """Compile all loops once, after installation, so that no later command waits for it."""
     if importlib.util.find_spec("numba") is None:
         raise InputError("compile: numba is not installed, and loops run uncompiled")
@@ -19,5 +30,5 @@ def compile_all(as_json: Json = False) -> None:
         def on_module(done: int, total: int, name: str) -> None:
             bar.update(done, total, note=name.rpartition(".")[2])
 
-        count = compile_loops(on_module)
+        count = compile_loops(on_module, FOR_RUNS if runs else ALL)
     show({"compiled_loops": count}, as_json)

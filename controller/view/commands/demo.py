@@ -1,0 +1,65 @@
+"""``snakewalk demo``: a recorded run in the browser at once, then the same run live."""
+
+import importlib.util
+import os
+import select
+import sys
+from pathlib import Path
+from typing import Final
+
+from snakewalk.config.extras import require_extra
+from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_loops
+from snakewalk.controller.console.child_process import child_environ, start
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import VIEW_AT, ViewAt
+from snakewalk.controller.console.progress import ProgressBar
+from snakewalk.controller.runlog.reader import read_log
+from snakewalk.controller.view.live_view import host_and_port
+from snakewalk.controller.view.log_page import LogPage, play
+from snakewalk.drivers.clock import WallClock
+
+RECORDED: Final = Path(__file__).resolve().parents[1] / "demonstration.mcap"
+"""Log of ``snakewalk run`` on its defaults; it is part of the program."""
+_LIVE: Final = "snakewalk run --view"
+_NICE: Final = 10
+"""Loops are compiled behind the page (ours)."""
+
+
+@command("demo", examples=("demo", "demo --view-at 0.0.0.0:8080"))
+def demo(view_at: ViewAt = VIEW_AT) -> None:
+    """Show a recorded run in the browser at once; then offer the same run live.
+
+    The loops are compiled while it plays. Needs no servo. ^C ends it.
+    """
+    require_extra("the page needs", "viser")
+    record = read_log(RECORDED).from_torque_on()
+    page = LogPage({"walk": record}, *host_and_port(view_at), repeats=True)
+    page.toggle()
+    print(f"{page.url}  (a recorded run; ^C ends)", flush=True)
+    compiler = start(_compile_behind, daemon=True)
+    offers = (line for line in (f"{_LIVE}  runs the same live; Enter does it now",))
+
+    def wants_live() -> bool:
+        if compiler.is_alive():
+            return False
+        for line in offers:
+            print(line, flush=True)
+        return sys.stdin.isatty() and bool(select.select([sys.stdin], [], [], 0.0)[0])
+
+    play(page, WallClock(), wants_live)
+    page.server.stop()
+    words = [*_LIVE.split(), "--view-at", view_at]
+    code = "from snakewalk.controller.cli.main import main; main()"
+    os.execve(sys.executable, [sys.executable, "-c", code, *words[1:]], child_environ())
+
+
+def _compile_behind() -> None:
+    """In a child: compile the loops of runs at a low priority."""
+    if importlib.util.find_spec("numba") is None:
+        return
+    os.nice(_NICE)
+    with ProgressBar("compiling loops") as bar:
+        compile_loops(
+            lambda done, total, name: bar.update(done, total, note=name.rpartition(".")[2]),
+            FOR_RUNS,
+        )
