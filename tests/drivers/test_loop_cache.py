@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from snakewalk.drivers.loop_cache import _Temporary
+
 PROGRAM = """
 import os
 from snakewalk.drivers.compilation import observe_compilation
@@ -49,6 +51,18 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "loops.py").write_text(PROGRAM)
     (tmp_path / "tmp").mkdir()
     return tmp_path
+
+
+def test_the_folder_for_temporary_files_is_of_one_account(tmp_path: Path) -> None:
+    """Whoever writes there chooses what numba executes."""
+    locator = _Temporary(start, __file__)
+    locator.folder = str(tmp_path / "loops")
+    mask = os.umask(0)
+    try:
+        locator.ensure_cache_path()
+    finally:
+        os.umask(mask)
+    assert (tmp_path / "loops").stat().st_mode & 0o777 == 0o700
 
 
 @pytest.mark.slow

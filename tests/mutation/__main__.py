@@ -104,6 +104,7 @@ def try_every(modules: list[str]) -> tuple[list[str], list[str]]:
     for module in track(modules, "modules", console=Console(stderr=True)):
         source = path_of(module).read_text(encoding="utf-8")
         every = list(mutants(source))
+        print_stale(module, every)
         drivers = ROOT / "tests" / "drivers"
         files = [str(file) for name in TARGETS[module] for file in drivers.rglob(name)]
         if not survives(module, ast.parse(source), files):
@@ -141,6 +142,14 @@ def explanations(module: str) -> Mapping[str, str]:
     return found
 
 
+def print_stale(module: str, every: list[Mutant]) -> None:
+    """Report the explanations of a module that name no mutant, because its code has changed."""
+    known = explanations(module)
+    names = {mutant.name for mutant in every} if known else set()
+    for name in known.keys() - names:
+        print(f"explained.toml: {module}: no mutant has this name: {name}", file=sys.stderr)
+
+
 def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]]:
     """Try a sample of each drawn module; yield it, its row of the page, and if it passes.
 
@@ -150,7 +159,9 @@ def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]
         if names and package not in names and module not in names:
             continue
         source = path_of(f"snakewalk.{module}").read_text(encoding="utf-8")
-        drawn = sample(list(mutants(source)), count)
+        every = list(mutants(source))
+        print_stale(f"snakewalk.{module}", every)
+        drawn = sample(every, count)
         if not drawn:
             yield module, f"| `{package}` | `{module}` | 0 | 0 | 0 | |", True
             continue

@@ -23,6 +23,9 @@ FURTHER_FILES: Final = 12
 ALWAYS: Final = ("controller.images.silhouette", "controller.track.analysis")
 """Modules whose evidence once was in expensive tests only."""
 
+ELSEWHERE: Final = ("sim.batch.kernels", "sim.batch.warp_bodies")
+"""Modules that need Warp, whose tests run in an environment of their own (``make warp``)."""
+
 
 @cache
 def _imports() -> nx.DiGraph:
@@ -36,7 +39,8 @@ def drawn_modules() -> Iterator[tuple[str, str]]:
     large = [
         module
         for module in sources()
-        if (file := ROOT / (module.replace(".", "/") + ".py")).is_file()
+        if module not in ELSEWHERE
+        and (file := ROOT / (module.replace(".", "/") + ".py")).is_file()
         and len(file.read_text(encoding="utf-8").splitlines()) > LINES
     ]
     for package in (package for order in ORDER.values() for package in order):

@@ -75,6 +75,12 @@ def test_intervals_contain_the_true_friction(along: float) -> None:
         assert bool(used) == last.differs == (along != 0.1)
 
 
+def test_the_ratio_of_the_frictions_shows_after_three_windows() -> None:
+    found, _ = estimated(sliding(FrictionConfig(along=0.3, across=0.7), 13.0), 0)
+    assert len(found) == 3
+    assert found[-1].friction.across / found[-1].friction.along == pytest.approx(7 / 3, rel=0.2)
+
+
 def test_time_without_poses_shows_nothing() -> None:
     """A window without poses leaves the file in force, and widens no claim."""
     views = sliding(FrictionConfig(along=0.3, across=0.7), 9.0)

@@ -452,8 +452,9 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
 ) -> None:
     bus = servo_bus("1-4")
     (tmp_path / "quartet.toml").write_text(ROBOT)
-    words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
+    words = ["gait", "run", "lateral-undulation", "--seconds", "1000"]
     words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += ["--set", "run.safety.lost_observer=warn"]  # a busy machine silences the page
     words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
     with run(tmp_path, *words) as child, browsed(child) as page:
         button = page.get_by_role("button", name="E-STOP")
@@ -495,8 +496,9 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
 ) -> None:
     bus = servo_bus("1-4")
     (tmp_path / "quartet.toml").write_text(ROBOT)
-    words = ["gait", "run", "lateral-undulation", "--seconds", "100"]
+    words = ["gait", "run", "lateral-undulation", "--seconds", "1000"]
     words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += ["--set", "run.safety.lost_observer=warn"]  # a busy machine silences the page
     words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
     proxies: list[Proxy] = []
 
@@ -550,7 +552,7 @@ FAKE_PAD = """
 @IN_A_BROWSER
 def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    words = ["gait", "run", "lateral-undulation", "--seconds", "300"]
+    words = ["gait", "run", "lateral-undulation", "--seconds", "1000"]
     with run(tmp_path, *words) as child, browsed(child, script=FAKE_PAD) as page:
         page.get_by_role("tab", name="gamepad").click()
         page.get_by_text("No gamepad. Press a button").wait_for()

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.heightfield import HeightField
-from snakewalk.sim.physics.tangent_planes import PLANES, touch
+from snakewalk.sim.physics.tangent_planes import PLANES, lay_planes, touch
 from tests.helpers.physics import Floats
 
 RADIUS_M = 0.03
@@ -47,6 +48,32 @@ def test_on_a_plane_there_is_one_contact_and_its_normal_is_the_planes(
         assert len(met) == 1
         np.testing.assert_allclose(met[0][0], normal, atol=1e-9)
         assert met[0][1] == pytest.approx(RADIUS_M - depth, abs=1e-12)
+
+
+def test_at_the_border_there_is_no_contact_with_what_is_at_the_other_border() -> None:
+    x = np.tile(np.arange(-5, 6) * 0.02, (11, 1))
+    ground = field(1.5 * x, 0.02)
+    normal = np.array([-1.5, 0.0, 1.0]) / np.sqrt(3.25)
+    foot = np.array([x[0, 0] + 0.02, 0.003, 1.5 * (x[0, 0] + 0.02)])
+    ((found, _),) = contacts(ground, foot + 0.99 * RADIUS_M * normal)
+    np.testing.assert_allclose(found, normal, atol=1e-9)
+
+
+def test_a_plane_is_turned_from_the_vertical_to_the_normal() -> None:
+    y, x = np.mgrid[-5:6, -5:6] * 0.02
+    ground = field(0.4 * x - 0.3 * y, 0.02)
+    normal = np.array([-0.4, 0.3, 1.0]) / np.sqrt(1.25)
+    places = np.vstack([0.99 * RADIUS_M * normal, np.zeros((PLANES, 3))])
+    turns = np.zeros((1 + PLANES, 4))
+    planes = np.arange(1, 1 + PLANES, dtype=np.int32)[None]
+    corner = ground.x0_m, ground.y0_m, ground.spacing_m
+    balls, radii = np.zeros(1, dtype=np.int32), np.full(1, RADIUS_M)
+    lay_planes(places, balls, radii, ground.z_m, corner, planes, places, turns)
+    (k,) = np.flatnonzero(turns[:, 0])
+    np.testing.assert_allclose(places[k], 0.0, atol=1e-9)
+    up = Rotation.from_quat(turns[k, [1, 2, 3, 0]]).apply([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(up, normal, atol=1e-9)
+    assert turns[k, 3] == 0.0  # about no vertical
 
 
 def test_the_deepest_contact_is_the_nearest_point_of_the_surface() -> None:

@@ -6,7 +6,16 @@ import pytest
 
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
-from snakewalk.sim.rendering.looks import AHEAD, BACK, EYE, HIDDEN, Marks, Scene, dressed_model
+from snakewalk.sim.rendering.looks import (
+    AHEAD,
+    BACK,
+    EYE,
+    HIDDEN,
+    PUPIL,
+    Marks,
+    Scene,
+    dressed_model,
+)
 
 ROBOT = load_robot("yaw16")
 CAPSULE, CYLINDER, SPHERE = (
@@ -66,6 +75,16 @@ def test_two_eyes_look_to_both_sides_of_the_front() -> None:
     np.testing.assert_allclose(one * [1.0, -1.0, 1.0], other, atol=1e-12)
     assert (one > 0.0).all()
     assert one[1] < ROBOT.link_radii_m[0]
+    pupils = of_colours(model, SPHERE, PUPIL)
+    assert len(pupils) == 2
+    for pupil, eye in zip(
+        sorted(pupils, key=lambda k: -model.geom_pos[k, 1]), (left, right), strict=True
+    ):
+        off = model.geom_pos[pupil] - model.geom_pos[eye]
+        small, large = model.geom_size[[pupil, eye], 0]
+        assert small < large
+        assert large - small < np.linalg.norm(off) < large, "it shows, and does not come off"
+        assert off[0] > 0.0
 
 
 @pytest.mark.parametrize("hollow", [False, True])
@@ -76,6 +95,7 @@ def test_a_waypoint_is_a_pole_on_the_ground_in_a_ring(hollow: bool) -> None:
     assert int(pole.type[0]) == CYLINDER
     assert pole.pos[2] == pytest.approx(pole.size[1])  # from the ground on
     assert 0.2 < 2.0 * pole.size[1] < 0.5
+    assert 0.0 < pole.size[0] < 0.02
     np.testing.assert_allclose(pole.pos[:2], (1.0, 2.0))
     np.testing.assert_allclose(pole.rgba, HIDDEN if hollow else AHEAD, atol=1e-6)
     part = model.geom("waypoint0ring0")
