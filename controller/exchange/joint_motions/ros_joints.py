@@ -138,11 +138,11 @@ def motion_of_rows(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
     others = [name for name in by_joint if name not in main]
     if others:
         notes.append(f"other messages have {', '.join(others)}: interpolated to these times")
-    columns = [_at(time, np.array(sorted(angles.items()))) for angles in by_joint.values()]
+    columns = [_values_at(time, np.array(sorted(angles.items()))) for angles in by_joint.values()]
     return joint_motion(path, time, list(by_joint), np.stack(columns, axis=1), notes)
 
 
-def _at(time: Floats, rows: Floats) -> Floats:
+def _values_at(time: Floats, rows: Floats) -> Floats:
     """Angles at times (T,) from rows (N, 2) of time and angle; NaN in gaps and beyond the ends."""
     if len(rows) < 2:
         return np.where(time == rows[0, 0], rows[0, 1], np.nan)
