@@ -155,6 +155,14 @@ class RegisterRow(Strict):
     range: tuple[int, int] | None = Field(
         None, description="lowest and highest value that a host may write; default: read-only"
     )
+    mark: str | None = Field(
+        None,
+        pattern="^(set|fixed|usual|kept|ignored: .+)$",
+        description="treatment by a run: set, fixed (another value than `initial` forbids a "
+        "start), usual (doctor reports another value), kept, or ignored with a reason; default: "
+        "kept in the EEPROM, set in the RAM",
+    )
+    bits: int = Field(-1, description="mask of the bits that a fixed register compares")
 
     @model_validator(mode="after")
     def _values_fit(self) -> Self:
@@ -367,6 +375,19 @@ class ServoModel(Strict):
     def is_feetech(self) -> bool:
         """Whether the servo speaks Feetech's protocol."""
         return self.protocol == "feetech"
+
+    def mark_of(self, name: str) -> str:
+        """First word of a register's mark; ``read`` for a read-only one."""
+        row = self.registers[name]
+        if row.mark is not None:
+            return row.mark.partition(":")[0]
+        if row.range is None:
+            return "read"
+        return "kept" if row.address < self.ram_from else "set"
+
+    def marked(self, *marks: str) -> tuple[str, ...]:
+        """Names of the registers with one of some marks."""
+        return tuple(name for name in self.registers if self.mark_of(name) in marks)
 
     @property
     def measures_current(self) -> bool:

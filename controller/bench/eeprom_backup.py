@@ -5,7 +5,7 @@ already.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from pydantic import Field
@@ -15,6 +15,7 @@ from snakewalk.config.base import Strict
 from snakewalk.config.loader import checked
 from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
+from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.errors import ChainError, ServoError
@@ -114,8 +115,11 @@ def load_backup(path: Path) -> BackupFile:
 def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange, ...]:
     """Registers that differ from the backup, in the order of their addresses; reads only.
 
+    Read-only registers of the backup are left out: another firmware has other values there.
+
     Raises:
-        ChainError: the servo is of another model, or the backup has a register that it lacks.
+        ChainError: the servo is of another model, or it lacks a register or rejects a value of the
+            backup; all faults at once.
         BusError: the servo does not answer.
 
     """
@@ -124,17 +128,73 @@ def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange,
             f"ID {backup.id}: is a {bus.table.model}, the backup's is a {backup.model}"
         )
     now = _eeprom(bus, backup.id)
-    strange = sorted(set(backup.registers) - set(now))
-    if strange:
-        raise ChainError(f"ID {backup.id}: has no {', '.join(strange)} to restore")
+    rows = bus.table.facts.registers
+    wanted = {n: v for n, v in backup.registers.items() if n in now or n not in rows}
+    wanted |= {n: v for n, v in backup.registers.items() if n in rows and rows[n].range}
+    strange = sorted(set(wanted) - set(now))
+    faults = [f"has no {', '.join(strange)} to restore"] if strange else []
+    for name in now.keys() & wanted.keys():
+        span = rows[name].range
+        if span is not None and not span[0] <= wanted[name] <= span[1]:
+            faults.append(f"{name}: {wanted[name]} is not within {span[0]} to {span[1]}")
+    low, high = (wanted.get(f"{end} Position Limit", 0) for end in ("Min", "Max"))
+    if low > high:
+        faults.append(f"Min Position Limit {low} is above Max Position Limit {high}")
+    if faults:
+        raise ChainError([f"ID {backup.id}: {fault}" for fault in faults])
     changes = [
-        SettingChange(name, now[name], backup.registers[name], "")
+        SettingChange(name, now[name], wanted[name], "")
         for name in now
-        if name in backup.registers and now[name] != backup.registers[name]
+        if name in wanted and now[name] != wanted[name]
     ]
     if changes and bus.read(backup.id, "Torque Enable"):
         changes.insert(0, SettingChange("Torque Enable", 1, 0, "the EEPROM is locked while on"))
     return tuple(changes)
+
+
+def plan_all(
+    buses: Mapping[int, DynamixelBus], servos: Mapping[int, ServoBackup]
+) -> dict[int, tuple[SettingChange, ...]]:
+    """Plans by ID of the servos that differ; raises as ``plan_restore``, with the faults of all."""
+    plans = {}
+    faults: list[str] = []
+    for servo_id, bus in buses.items():
+        try:
+            plans[servo_id] = plan_restore(bus, servos[servo_id])
+        except ChainError as error:
+            faults += error.faults
+    if faults:
+        raise ChainError(faults)
+    return {servo_id: changes for servo_id, changes in plans.items() if changes}
+
+
+class RestoreJournal:
+    """Former values of the servos of an unfinished restore, itself a backup."""
+
+    def __init__(self, backup: Path) -> None:
+        name = backup.name.removesuffix(".json").removesuffix(".undo")
+        self.path = backup.with_name(f"{name}.undo.json")
+
+    def note(self, plans: Mapping[int, Sequence[SettingChange]], models: Mapping[int, str]) -> None:
+        """Store the values that ``plans`` change, on disk, unless an earlier try stored them.
+
+        Raises:
+            OSError: it cannot be written.
+
+        """
+        old = {s.id: s for s in load_backup(self.path).servos} if self.path.exists() else {}
+        servos = {}
+        for servo_id, changes in plans.items():
+            before = {c.register: c.before for c in changes if c.register != "Torque Enable"}
+            before |= old[servo_id].registers if servo_id in old else {}
+            servos[servo_id] = ServoBackup(id=servo_id, model=models[servo_id], registers=before)
+        with atomic_write(self.path) as part:
+            text = backup_text(BackupFile(servos=tuple({**old, **servos}.values())))
+            part.write_text(text, encoding="utf-8")
+
+    def remove(self) -> None:
+        """Forget the former values: every servo has those of the backup."""
+        self.path.unlink(missing_ok=True)
 
 
 def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
@@ -142,9 +202,14 @@ def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
     registers = sorted(
         (bus.table[name] for name in bus.table), key=lambda sorted_register: sorted_register.address
     )
+    facts = bus.table.facts
+    rows = facts.registers
+    states_ranges = any(row.range is not None for row in rows.values())
     values = {}
     for register in registers:
-        if register.address < bus.table.facts.ram_from and register.name not in _IDENTITY:
+        if register.address >= facts.ram_from or register.name in _IDENTITY:
+            continue
+        if rows[register.name].range is not None or not states_ranges:
             try:
                 values[register.name] = bus.read(servo_id, register.name)
             except ServoError:

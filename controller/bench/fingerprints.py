@@ -10,7 +10,7 @@ from snakewalk.controller.bench.servo_settings import SettingChange
 from snakewalk.controller.console.finding import Finding
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
-from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, fingerprint_of
+from snakewalk.drivers.chain.fingerprint import Fingerprint, fingerprint_of, fingerprint_registers
 from snakewalk.drivers.chain.fingerprint_file import (
     FingerprintFile,
     changes,
@@ -49,12 +49,12 @@ def read_fingerprints(bus: DynamixelBus, servo_ids: Iterable[int]) -> dict[int, 
     """
     fingerprints: dict[int, Fingerprint] = {}
     for servo_id in servo_ids:
-        table = bus.table_of(servo_id)
+        facts = bus.table_of(servo_id).facts
         try:
-            registers = bus.read_each(servo_id, [name for name in FINGERPRINT if name in table])
+            registers = bus.read_each(servo_id, fingerprint_registers(facts))
         except BusError:
             continue
-        fingerprints[servo_id] = fingerprint_of(registers)
+        fingerprints[servo_id] = fingerprint_of(registers, facts)
     return fingerprints
 
 

@@ -15,6 +15,12 @@ from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
+from snakewalk.drivers.chain.fingerprint import (
+    COMPARED,
+    SET_REGISTER,
+    fixed_faults,
+    present,
+)
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import (
     ALL_REPLY,
@@ -44,34 +50,8 @@ _GAINS = (
     "Feedforward 2nd Gain",
 )
 _PROFILE = ("Profile Acceleration", "Profile Velocity")
-_READ = (
-    "Status Return Level",
-    "Secondary(Shadow) ID",
-    "Homing Offset",
-    "Drive Mode",
-    "Operating Mode",
-    "Startup Configuration",
-    "Shutdown",
-    "PWM Limit",
-    "Current Limit",
-    "Goal PWM",
-    *_GAINS,
-    *_PROFILE,
-    IDENTITY,
-    "Bus Watchdog",
-    "Present Position",
-    "Min Position Limit",
-    "Max Position Limit",
-    "Velocity Limit",
-    "Temperature Limit",
-    "Min Voltage Limit",
-    "Max Voltage Limit",
-    "Registered Instruction",
-    "Goal Current",
-    "Torque Enable",
-    "Present Current",
-    "Present Velocity",
-)
+_READ = ("Present Position", "Registered Instruction", "Present Current", "Present Velocity")
+"""Registers read besides the marked ones."""
 _SECONDARY_SERVO = 0x02
 """Bit of Drive Mode(10): the servo follows another one by a sync cable."""
 _IDLE_A = 0.1
@@ -96,7 +76,8 @@ def read_registers(bus: DynamixelBus, robot: RobotConfig, servo_id: int) -> Serv
         PortError: the port is gone.
 
     """
-    names = [name for name in _READ if name in bus.table_of(servo_id)]
+    facts = bus.table_of(servo_id).facts
+    names = [*present(_READ, facts), *facts.marked("set", *COMPARED)]
     values = bus.read_each(servo_id, names, names)
     return ServoRegisters(servo_id, robot.servo_ids.index(servo_id), values)
 
@@ -137,6 +118,7 @@ class _Checks:
             shutdown = feetech.shutdown_alarms(facts)
         return [
             self._pose(),
+            self._fixed(),
             self._exchanged(),
             self._secondary(),
             self._current_limit(),
@@ -184,6 +166,30 @@ class _Checks:
             self._unusual("gains", _GAINS),
             self._unusual("profile", _PROFILE),
             *self._watchdog(),
+            *self._usual(),
+        ]
+
+    def _fixed(self) -> Finding | None:
+        """Registers that must have one value for the scale and the direction of positions."""
+        faults = [
+            f"{self._robot.joint_label(servo.joint)}: {fault}"
+            for servo in self._servos
+            for fault in fixed_faults(servo.values, self._robot.servo_records[servo.joint])
+        ]
+        return (
+            Finding("position scale", "fail", "; ".join(faults), SET_REGISTER) if faults else None
+        )
+
+    def _usual(self) -> list[Finding | None]:
+        """Other registers that shape the motion or protect a servo, against a new servo's."""
+        names = dict.fromkeys(
+            name
+            for servo in self._servos
+            for name in self._robot.servo_records[servo.joint].marked("usual")
+        )
+        return [
+            self._not_factory(name.lower(), name, f"as meant? else {SET_REGISTER}")
+            for name in names
         ]
 
     def _at(self, name: str) -> str:
@@ -238,16 +244,6 @@ class _Checks:
                     < units.limits_raw[servo.joint][1]
                 ),
                 f"position limits ({low}, {high}) within the joint's range",
-            ),
-            self._not_factory("velocity limit", "Velocity Limit", "another program slowed it?"),
-            self._not_factory(
-                "temperature limit", "Temperature Limit", "higher: unprotected; lower: early alarms"
-            ),
-            self._not_factory(
-                "voltage limits", "Min Voltage Limit", "do they fit the supply? alarms come beyond"
-            ),
-            self._not_factory(
-                "voltage limits", "Max Voltage Limit", "do they fit the supply? alarms come beyond"
             ),
             self._weak(
                 "goal current",
@@ -358,14 +354,15 @@ class _Checks:
 
     def _secondary(self) -> Finding | None:
         shadows = [
-            f"{self._robot.joint_label(servo.joint)} obeys ID "
-            f"{servo.values['Secondary(Shadow) ID']} as well"
+            f"{self._robot.joint_label(servo.joint)} obeys ID {servo.values[name]} as well"
             for servo in self._servos
-            if servo.values.get("Secondary(Shadow) ID", 255) <= SECONDARY_ID_LIMIT
+            for name in ("Secondary(Shadow) ID", "Secondary ID")
+            if servo.values.get(name, 255) <= SECONDARY_ID_LIMIT
+            and servo.values[name] != servo.servo_id
         ]
         if not shadows:
             return None
-        remedy = "a run sets Secondary ID(12) to 255; until then it moves with the other's goals"
+        remedy = "a run switches it off; until then it moves with the other's goals"
         return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
 
     def _current_limit(self) -> Finding | None:

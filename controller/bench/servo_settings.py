@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import FeetechBus
 from snakewalk.drivers.bus.feetech_scan import identify
-from snakewalk.drivers.errors import BusError, NoAnswerError
+from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_of
 from snakewalk.drivers.protocol.packet import MAX_ID
@@ -50,6 +50,8 @@ class SettingsRequest:
     voltage_min_v: float | None = None
     voltage_max_v: float | None = None
     return_delay_us: float | None = None
+    registers: tuple[str, ...] = ()
+    """Other registers, ``NAME=VALUE``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +190,12 @@ def _raw(
             bus.table[register].encode(values[register][0])
         except (InputError, ValueError, OverflowError) as error:
             faults.append(f"{option} {value:g}: {error}")
+    for text in request.registers:
+        name, _, value = text.partition("=")
+        try:
+            values[name.strip()] = (_register(bus, name.strip(), value), "")
+        except (InputError, ControlTableError) as error:
+            faults.append(f"--register {text}: {error}")
     if request.new_id is not None:
         values["ID"] = (request.new_id, f"answers to {request.new_id}")
         if not 0 <= request.new_id <= MAX_ID:
@@ -199,6 +207,25 @@ def _raw(
         except InputError as error:
             faults.append(f"--new-baud {error}")
     return values
+
+
+def _register(bus: DynamixelBus, name: str, text: str) -> int:
+    """Value of a setting that its option gives as text."""
+    address = bus.table.register(name).address
+    facts = bus.table.facts
+    row = facts.registers[name]
+    if row.range is None or address >= facts.ram_from:
+        raise InputError("is not a setting: it is read-only, or lost at power-off")
+    if row.mark == "ignored: address":
+        raise InputError("use --new-id or --new-baud")
+    low, high = row.range
+    try:
+        value = int(text)
+    except ValueError:
+        value = high + 1
+    if not low <= value <= high:
+        raise InputError(f"must be a whole number from {low} to {high}")
+    return value
 
 
 def _limit(bus: DynamixelBus, register: str, value: float) -> int:

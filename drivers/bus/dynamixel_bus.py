@@ -354,7 +354,7 @@ class DynamixelBus:
             raise ControlTableError(
                 f"{name} lies apart ({places}): such servos cannot share a group packet"
             )
-        return next(iter(registers.values()), self.table.register(name))
+        return next(iter(registers.values())) if registers else self.table.register(name)
 
     def _retry(self, once: Callable[[], T], tries: int | None = None) -> T:
         """Run a transaction, and again after silence or damage; a refusal is final."""

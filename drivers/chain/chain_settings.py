@@ -17,7 +17,7 @@ from snakewalk.drivers.protocol.registers import (
 
 STARTUP = "Startup Configuration"
 """A firmware before 45 has none."""
-FEETECH_SETTINGS = ("Lock", "Acceleration", "Goal Velocity")
+FEETECH_SETTINGS = ("Lock", "Secondary ID", "Acceleration", "Goal Velocity", "Kp", "Kd", "Ki")
 """Registers that only a chain of Feetech servos sets."""
 
 
@@ -85,6 +85,8 @@ def _feetech_settings(
     shutdown = feetech.shutdown_alarms(facts)
     return (
         ChainSetting("Lock", 1),
+        # as its own ID it is without effect
+        ChainSetting("Secondary ID", robot.servo_ids[joint], usual=False),
         ChainSetting("Return Delay Time", 0),
         ChainSetting("Operating Mode", feetech.POSITION_MODE),
         ChainSetting("Shutdown", shutdown, shutdown, usual=False),
@@ -93,6 +95,10 @@ def _feetech_settings(
         ChainSetting("Position P Gain", robot.position_p_gains[joint]),
         ChainSetting("Position I Gain", robot.position_i_gains[joint]),
         ChainSetting("Position D Gain", robot.position_d_gains[joint]),
+        # HLS servos use copies in the RAM
+        ChainSetting("Kp", robot.position_p_gains[joint]),
+        ChainSetting("Ki", robot.position_i_gains[joint]),
+        ChainSetting("Kd", robot.position_d_gains[joint]),
         ChainSetting("Acceleration", 0),
         # 0 is the highest speed of some servos, and no motion of others (Phase, bit 3)
         ChainSetting("Goal Velocity", round(speed)),

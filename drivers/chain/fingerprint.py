@@ -1,24 +1,11 @@
 """Fingerprint: EEPROM settings of a servo for zero, direction, limits and protection."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.protocol.registers import REVERSE
 
-PROTECTION = (
-    "PWM Limit",
-    "Current Limit",
-    "Velocity Limit",
-    "Temperature Limit",
-    "Min Voltage Limit",
-    "Max Voltage Limit",
-    "Protection Current",
-    "Over-current Time",
-    "Overload Torque",
-    "Protection Time",
-    "Protective Torque",
-)
-"""Registers that decide when a servo protects itself; the last five are those of Feetech servos."""
 FINGERPRINT = (
     "Homing Offset",
     "Drive Mode",
@@ -26,16 +13,52 @@ FINGERPRINT = (
     "Shutdown",
     "Min Position Limit",
     "Max Position Limit",
-    *PROTECTION,
+    "PWM Limit",
+    "Current Limit",
+    "Velocity Limit",
+    "Temperature Limit",
+    "Min Voltage Limit",
+    "Max Voltage Limit",
 )
-"""Registers of it; a model may lack some."""
+"""Registers of it that come first; a model may lack some, and its file marks others."""
+COMPARED = ("kept", "usual", "fixed")
+"""Marks of the others."""
 Fingerprint = Mapping[str, int]
 """Values of these registers of one servo."""
 
 
-def fingerprint_of(registers: Mapping[str, int]) -> dict[str, int]:
+def fingerprint_registers(facts: ServoModel) -> list[str]:
+    """Names of the registers of a model's fingerprint."""
+    return list(dict.fromkeys((*present(FINGERPRINT, facts), *facts.marked(*COMPARED))))
+
+
+def present(names: Iterable[str], facts: ServoModel) -> list[str]:
+    """Names from a list that a model has."""
+    return [name for name in names if name in facts.registers]
+
+
+def fingerprint_of(registers: Mapping[str, int], facts: ServoModel) -> dict[str, int]:
     """The fingerprint among registers of a servo."""
-    return {name: registers[name] for name in FINGERPRINT if name in registers}
+    return {name: registers[name] for name in fingerprint_registers(facts) if name in registers}
+
+
+SET_REGISTER = "snakewalk bus set --id ID --register 'NAME=VALUE'"
+"""Remedy for an unexpected register that no run sets."""
+
+
+def fixed_faults(registers: Mapping[str, int], facts: ServoModel) -> list[str]:
+    """Texts on registers without the value that the driver's units need."""
+    faults = []
+    for name in facts.marked("fixed"):
+        row = facts.registers[name]
+        value = registers.get(name, row.initial)
+        if (value ^ row.initial) & row.bits:
+            right = value & ~row.bits | row.initial & row.bits
+            faults.append(
+                f"{name}({row.address}) is {value}, not {right}: scale or direction of its "
+                "positions differs"
+            )
+    return faults
 
 
 def register_change(name: str, before: int, now: int, rad_per_position: float) -> str:

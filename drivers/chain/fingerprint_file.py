@@ -11,9 +11,9 @@ from pathlib import Path
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.chain.fingerprint import (
-    FINGERPRINT,
-    PROTECTION,
+    COMPARED,
     Fingerprint,
+    fingerprint_registers,
     register_change,
 )
 from snakewalk.drivers.errors import ChainError
@@ -129,13 +129,15 @@ def changes(
     lines = []
     for joint, servo_id in enumerate(robot.servo_ids):
         old, new = before.get(servo_id, {}), now.get(servo_id, {})
-        for name in _KEPT:
+        facts = robot.servo_records[joint]
+        for name in fingerprint_registers(facts):
             if name not in old or name not in new:
                 continue
-            mask = REVERSE if name == "Drive Mode" else -1
+            mask = -1 if facts.mark_of(name) in COMPARED else 0
+            if name == "Drive Mode":
+                mask = REVERSE
             if (old[name] ^ new[name]) & mask:
-                unit_rad = robot.servo_records[joint].rad_per_position
-                change = register_change(name, old[name], new[name], unit_rad)
+                change = register_change(name, old[name], new[name], facts.rad_per_position)
                 lines.append(f"{robot.joint_label(joint)}: {change}")
     return lines
 
@@ -144,17 +146,14 @@ def missing_registers(
     expected: Mapping[int, Fingerprint], reported: Mapping[int, Fingerprint]
 ) -> list[str]:
     """Registers that the file lacks for its servos."""
-    missing = {
+    missing = [
         name
         for servo_id, values in reported.items()
         if servo_id in expected
-        for name in values.keys() - expected[servo_id].keys()
-    }
-    return [name for name in FINGERPRINT if name in missing]
-
-
-_KEPT = ("Homing Offset", "Drive Mode", *PROTECTION)
-"""Registers that no start sets; of Drive Mode the direction."""
+        for name in values
+        if name not in expected[servo_id]
+    ]
+    return list(dict.fromkeys(missing))
 
 
 def _parse(text: str) -> dict[int, dict[str, int]]:
@@ -163,7 +162,7 @@ def _parse(text: str) -> dict[int, dict[str, int]]:
         if not (key.isdigit() and isinstance(table, dict)):
             raise ValueError(f"{key}: a table for each servo ID is expected")
         for name, value in table.items():
-            if name not in FINGERPRINT or type(value) is not int:
+            if type(value) is not int:
                 raise ValueError(f"{key}: {name}: a register with a number is expected")
         fingerprints[int(key)] = dict(table)
     return fingerprints

@@ -10,7 +10,7 @@ from functools import partial
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
-from snakewalk.drivers.chain.fingerprint import FINGERPRINT, Fingerprint, register_change
+from snakewalk.drivers.chain.fingerprint import Fingerprint, register_change
 from snakewalk.drivers.chain.goal_check import GoalCheck
 from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.chain.start_up import (
@@ -76,7 +76,8 @@ class LivenessCheck:
         self._identity = next(iter(checks([IDENTITY], configured)), None)
         self._settings = checks(RAM_SETTINGS, configured)
         self._shaping = checks(SHAPING_SETTINGS, configured)
-        self._fingerprint = checks(FINGERPRINT, fingerprints)
+        compared = dict.fromkeys(name for values in fingerprints.values() for name in values)
+        self._fingerprint = checks(compared, fingerprints)
         self._missed: list[RegisterCheck] = []
         """Not all servos replied to these; the oldest first."""
 

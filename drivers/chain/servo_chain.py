@@ -32,6 +32,7 @@ from snakewalk.drivers.chain.start_up import (
     configure,
     inspect,
     let_reply,
+    taken_over,
 )
 from snakewalk.drivers.chain.temperature_sensors import TemperatureSensors
 from snakewalk.drivers.chain.torque_off import TorqueOff
@@ -170,7 +171,8 @@ class ServoChain:
             self._imu.find()
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
-        for line in limitations(self.robot):
+        moving = taken_over(self.inspection.servos, self.robot, self._units)
+        for line in (*limitations(self.robot), *moving):
             self.on_event(line)
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
         if self._file is not None:

@@ -22,13 +22,22 @@ from snakewalk.drivers.chain.chain_settings import (
     ChainSetting,
     chain_settings,
 )
-from snakewalk.drivers.chain.fingerprint import FINGERPRINT, PROTECTION, Fingerprint, fingerprint_of
+from snakewalk.drivers.chain.fingerprint import (
+    SET_REGISTER,
+    Fingerprint,
+    fingerprint_of,
+    fingerprint_registers,
+    fixed_faults,
+    present,
+)
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.errors import BusError, ChainError, ChainFault, FaultCause
 from snakewalk.drivers.protocol import feetech
 from snakewalk.drivers.protocol.control_table import model_numbers
 from snakewalk.drivers.protocol.registers import (
+    CURRENT_POSITION_MODE,
     NO_SECONDARY_ID,
+    POSITION_MODE,
     RETURN_DELAY_UNIT_S,
     REVERSE,
     VOLTAGE_UNIT_V,
@@ -58,8 +67,9 @@ _REPORTED = (
     "Torque Enable",
     "Present Temperature",
     "Present Input Voltage",
+    "Present Velocity",
 )
-_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position", *FINGERPRINT)
+_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position")
 """Registers read as well, for comparisons of a servo with its earlier state."""
 _SETTINGS = (
     "Torque Enable",
@@ -70,17 +80,15 @@ _SETTINGS = (
     "Drive Mode",
     STARTUP,
     "Shutdown",
-    "Homing Offset",
-    *PROTECTION,
-    "Min Position Limit",
-    "Max Position Limit",
     "Goal Current",
     "Goal PWM",
     "Position P Gain",
     *SHAPING_SETTINGS,
     IDENTITY,
 )
-"""Registers that ``configure`` checks."""
+"""Registers that ``configure`` checks besides those of the fingerprint."""
+_TURNING_RAD_S = 0.2
+"""Velocity of a servo that does not hold its position (ours)."""
 _FEW = 3
 """Up to this number of servos of another model, each has a line of its own (ours)."""
 ALL_REPLY = 2
@@ -172,6 +180,10 @@ def inspect(
                 "remove the cause and reboot it"
             )
             faults.append(ChainFault(FaultCause.ALARM, text))
+        faults += [
+            ChainFault(FaultCause.OTHER_SETTINGS, f"{joint}: {text}; {SET_REGISTER}")
+            for text in fixed_faults(report.registers, table.facts)
+        ]
     for (name, model), ids in others.items():
         if len(ids) <= _FEW:
             labels = (robot.joint_label(robot.servo_ids.index(joint_id)) for joint_id in ids)
@@ -190,6 +202,23 @@ def _replying_model(number: int, expected: ServoModel) -> str:
     return names.get(number, f"number {number}")
 
 
+def taken_over(servos: Iterable[ServoReport], robot: RobotConfig, units: JointUnits) -> list[str]:
+    """Lines on servos that another program drives: those in another mode, or in motion."""
+    lines = []
+    for servo in servos:
+        joint = robot.servo_ids.index(servo.servo_id)
+        is_feetech = robot.servo_records[joint].is_feetech
+        usual = (feetech.POSITION_MODE,) if is_feetech else (POSITION_MODE, CURRENT_POSITION_MODE)
+        mode = servo.operating_mode
+        speed = servo.registers["Present Velocity"] * units.rad_s_per_velocity[joint]
+        if servo.torque_on and (mode not in usual or abs(speed) > _TURNING_RAD_S):
+            lines.append(
+                f"{robot.joint_label(joint)}: another program drives it at "
+                f"{speed:+.2f} rad/s, Operating Mode {mode}; this run sets it up anew"
+            )
+    return lines
+
+
 def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
     """Read the registers of a report; changes nothing.
 
@@ -199,11 +228,8 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
     """
     table = bus.table_of(servo_id)
     feetech_names = FEETECH_SETTINGS if table.facts.is_feetech else ()
-    names = [
-        register_name
-        for register_name in (*_REPORTED, *_COMPARED, *feetech_names)
-        if register_name in table
-    ]
+    names = present((*_REPORTED, *_COMPARED, *feetech_names), table.facts)
+    names += fingerprint_registers(table.facts)
     values = bus.read_each(servo_id, names)
     return ServoReport(
         servo_id=servo_id,
@@ -288,7 +314,10 @@ def _configure_joint(
     if pwm_limit == 0:
         raise ChainError(f"{name}: PWM Limit is 0: it cannot move; set it to {full}")
     settings = list(chain_settings(robot, units, joint, pwm_limit))
-    if units.current_mode[joint]:
+    # an HLS servo with Goal Current 0 has no torque in position mode
+    if units.current_mode[joint] or (
+        robot.servo_records[joint].is_feetech and "Goal Current" in read_values
+    ):
         settings.append(_current_setting(robot, units, joint, read_values["Current Limit"]))
     settings.append(ChainSetting(IDENTITY, identity(joint)))
     values = _apply(bus, robot, joint, settings, read_values, on_event)
@@ -313,7 +342,7 @@ def _configure_joint(
         for register_name in kept
         if register_name in set_here and register_name in values
     }
-    return ServoSettings(ram, fingerprint_of(values))
+    return ServoSettings(ram, fingerprint_of(values, robot.servo_records[joint]))
 
 
 def identity(joint: int) -> int:
@@ -333,11 +362,11 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
 
 def _read_settings(bus: ChainBus, servo_id: int) -> dict[str, int]:
     """Values of the registers of ``configure`` that the model has."""
-    table = bus.table_of(servo_id)
-    names: tuple[str, ...] = _SETTINGS
-    if table.facts.is_feetech:
-        names = (*_SETTINGS, *FEETECH_SETTINGS)
-    return bus.read_each(servo_id, [name for name in names if name in table], (STARTUP,))
+    facts = bus.table_of(servo_id).facts
+    names = (*_SETTINGS, *FEETECH_SETTINGS) if facts.is_feetech else _SETTINGS
+    return bus.read_each(
+        servo_id, [*present(names, facts), *fingerprint_registers(facts)], (STARTUP,)
+    )
 
 
 def _apply(

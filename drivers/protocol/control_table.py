@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -87,8 +88,9 @@ class ControlTable:
         try:
             return self.registers[name]
         except KeyError:
-            near = [n for n in self.registers if n.lower() == name.lower()]
-            hint = f"; you mean {near[0]}" if near else ""
+            lower = {n.lower(): n for n in self.registers}
+            near = [lower[n] for n in get_close_matches(name.lower(), lower, 3)]
+            hint = f"; did you mean {', '.join(near)}?" if near else ""
             raise ControlTableError(f"{self.model}: has no register {name!r}{hint}") from None
 
     def __getitem__(self, name: str) -> Register:

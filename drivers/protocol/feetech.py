@@ -33,6 +33,21 @@ CALIBRATE_MIDDLE = 128
 """Torque Enable(40)."""
 
 
+class Phase(IntFlag):
+    """Bits of Phase(18) that affect scale and direction (memory tables)."""
+
+    DRIVE = 0x01
+    """Direction of the motor, STS and SCS."""
+    HLS_DRIVE = 0x04
+    """Direction of the motor, HLS."""
+    FINE_VELOCITY = 0x04
+    """A velocity unit is 0.0146 rev/min, STS; else 0.732."""
+    ALL_TURNS = 0x10
+    """Positions count turns."""
+    SENSOR = 0x80
+    """Direction of the positions; without the same change of the motor the servo runs away."""
+
+
 class FeetechInstruction(IntEnum):
     """Instructions of a host."""
 

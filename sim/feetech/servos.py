@@ -13,6 +13,7 @@ from snakewalk.drivers.protocol.feetech import (
     MAX_ID,
     TORQUE_DAMPING,
     FeetechAlarm,
+    Phase,
 )
 from snakewalk.sim.ax12.alarms import Ax12Alarms
 from snakewalk.sim.feetech.registers import FeetechRegisters
@@ -78,6 +79,10 @@ _PUSH_GAIN = 1e-9
 """Gain of a motor that only pushes: its goal is far away."""
 _FULL = 1000.0
 """Goal PWM, PWM Limit, Present Load and open-loop PWM of full output."""
+_COARSE = 50.0
+"""Velocity units of STS servos without ``Phase.FINE_VELOCITY``: 0.732 over 0.0146 rev/min."""
+_INTEGRAL_LIMIT_UNIT = 4.0
+"""Integral Limit(25): output in units of 0.1 % (memory table)."""
 
 
 class FeetechServos(SimulatedServos):
@@ -117,6 +122,8 @@ class FeetechServos(SimulatedServos):
         self._step_goal = np.full(servos, np.nan)
         """(S,) goals of servos in step mode, positions of all turns; NaN before the first step."""
         self._was_on = np.zeros(servos, bool)
+        self._integral = np.zeros(servos)
+        """(S,) output of the integral part, units of 0.1 %."""
         for row, servo_id in enumerate(ids):
             registers.put(row, "Lock", 0)
             registers.put(row, "ID", servo_id)
@@ -144,7 +151,8 @@ class FeetechServos(SimulatedServos):
             if name == "Goal Position" and self._mode()[row] == STEP and self._has_steps():
                 from_ticks = self._step_goal[row]
                 from_ticks = self._ticks()[row] if np.isnan(from_ticks) else from_ticks
-                self._step_goal[row] = from_ticks + int(self["Goal Position"][row])
+                steps = self["Goal Position"][row] * self._resolution()[row]
+                self._step_goal[row] = from_ticks + int(steps)
         return 0
 
     def register_write(self, row: int, address: int, data: bytes) -> int:
@@ -202,19 +210,23 @@ class FeetechServos(SimulatedServos):
         """Write all present values into the registers."""
         facts = self.facts
         free = ~self._on() | (self._mode() == VELOCITY) | (self._mode() == PUSH)
+        free &= ~self._phase(Phase.ALL_TURNS)
         self._turns = np.where(free, self._turn(), self._turns)
         position = self._ticks() - self._offset() - self._turns * facts.units.positions_per_turn
         if self._has_steps():
             left = np.nan_to_num(self._step_goal - self._ticks())
             position = np.where(self._mode() == STEP, left, position)
         _, last = facts.registers["Goal Position"].range or (0, 0)
-        self["Present Position"][:] = np.clip(np.rint(position), -last, last)
-        speed = self._mounting.sign * self.plant.velocity_rad_s / facts.rad_s_per_velocity
+        position = np.rint(position / self._resolution())
+        self["Present Position"][:] = np.clip(position, -last, last)
+        sign = self._mounting.sign
+        speed = self._sensor_sign() * sign * self.plant.velocity_rad_s / self._velocity_unit()
         self["Present Velocity"][:] = np.clip(np.rint(speed), -32767, 32767)
-        pwm = self._mounting.sign * self.blocked_shaft.pwm()
+        sign = self._drive_sign() * sign
+        pwm = sign * self.blocked_shaft.pwm()
         self["Present Load"][:] = np.clip(np.rint(pwm * _FULL), -1000, 1000)
         if "Present Current" in facts.registers:
-            amps = self._mounting.sign * self.blocked_shaft.current_a()
+            amps = sign * self.blocked_shaft.current_a()
             self["Present Current"][:] = np.clip(
                 np.rint(amps / (facts.units.current_a or np.inf)), -32767, 32767
             )
@@ -247,10 +259,33 @@ class FeetechServos(SimulatedServos):
             return self["Homing Offset"]
         return np.zeros(len(self), np.int64)
 
+    def _phase(self, bit: int) -> Bools:
+        """(S,) whether a bit of Phase(18) differs from a new servo's."""
+        return np.asarray((self["Phase"] ^ self.registers.initial("Phase")) & bit != 0)
+
+    def _sensor_sign(self) -> Floats:
+        return np.where(self._phase(Phase.SENSOR), -1.0, 1.0)
+
+    def _drive_sign(self) -> Floats:
+        bit = Phase.HLS_DRIVE if "Goal Current" in self.facts.registers else Phase.DRIVE
+        return np.where(self._phase(bit), -1.0, 1.0)
+
+    def _velocity_unit(self) -> Floats:
+        """(S,) rad/s of one unit of a velocity."""
+        coarse = self._has_steps() & self._phase(Phase.FINE_VELOCITY)
+        return np.where(coarse, _COARSE, 1.0) * self.facts.rad_s_per_velocity
+
+    def _resolution(self) -> NDArray[np.int64]:
+        """(S,) sensor steps of one position."""
+        if "Angular Resolution" in self.facts.registers:
+            return self["Angular Resolution"]
+        return np.ones(len(self), np.int64)
+
     def _servo_rad(self) -> Floats:
-        """(S,) servo angles from their middle."""
+        """(S,) sensor angles from their middle."""
         mounting = self._mounting
-        return np.asarray(mounting.sign * self.plant.position_rad + mounting.zero_rad)
+        shaft = mounting.sign * self.plant.position_rad + mounting.zero_rad
+        return np.asarray(self._sensor_sign() * shaft)
 
     def _ticks(self) -> Floats:
         """(S,) positions of all turns, without offset."""
@@ -282,14 +317,37 @@ class FeetechServos(SimulatedServos):
         damping = (registers["Torque Enable"] == TORQUE_DAMPING) & self.powered
         drive.torque_on[:] = on | damping
         drive.p_gain_per_rad[:] = np.where(damping, 0.0, np.where(closed, gain, _PUSH_GAIN))
-        aim = np.where(closed, self._trajectory.position, push / _PUSH_GAIN)
+        error = self._trajectory.position - shaft
+        wished = np.where(positions, self._output(seconds, gain, error), gain * error)
+        aim = np.where(closed, shaft + wished / np.maximum(gain, _PUSH_GAIN), push / _PUSH_GAIN)
         mounting = self._mounting
         shift = np.where(closed, mounting.zero_rad, 0.0)
-        drive.goal_rad[:] = mounting.sign * (aim - shift)
+        sensor = self._sensor_sign()
+        motor = self._drive_sign()
+        drive.p_gain_per_rad[:] *= np.where(closed, sensor * motor, 1.0)
+        drive.goal_rad[:] = mounting.sign * (np.where(closed, sensor, motor) * aim - shift)
         drive.pwm_limit[:] = np.where(self._no_output, 0.0, limit)
         drive.current_limit_a[:] = limit_a
         self.blocked_shaft.hold()
         self._was_on = on
+
+    def _output(self, seconds: float, gain: Floats, error: Floats) -> Floats:
+        """(S,) output of position control for errors, rad: dead zones, least output, integral."""
+        registers = self.registers
+        positions = error * self.facts.positions_per_rad
+        zone = np.where(error > 0.0, registers["CW Dead Zone"], registers["CCW Dead Zone"])
+        active = np.abs(positions) > zone * self._resolution()
+        least = np.where(active, registers["Minimum Startup Force"] / _FULL, 0.0)
+        output = np.where(active, gain * error, 0.0)
+        output = np.copysign(np.maximum(np.abs(output), least), error)
+        i_gain = registers["Position I Gain" if "Ki" not in self.facts.registers else "Ki"]
+        most = np.full(len(self), _FULL)
+        if "Integral Limit" in self.facts.registers:
+            limit = registers["Integral Limit"] * _INTEGRAL_LIMIT_UNIT
+            most = np.where(limit > 0.0, limit, most)
+        grown = self._integral + np.where(active, i_gain * positions * seconds, 0.0)
+        self._integral = np.where((i_gain > 0) & self._on(), np.clip(grown, -most, most), 0.0)
+        return np.asarray(output + self._integral / _FULL)
 
     def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:
         """Advance the trajectories to the goals, or at the goal velocities."""
@@ -301,13 +359,15 @@ class FeetechServos(SimulatedServos):
         low, high = registers["Min Position Limit"], registers["Max Position Limit"]
         many_turns = (low == 0) & (high == 0)
         goal = np.where(many_turns, goal, np.clip(goal, low, high))
-        ticks = goal + self._offset() + self._turns * facts.units.positions_per_turn
+        ticks = goal * self._resolution() + self._offset()
+        ticks = ticks + self._turns * facts.units.positions_per_turn
         goal_rad = (ticks - facts.units.zero_position) / facts.positions_per_rad
         if self._has_steps():
             steps = self._mode() == STEP
             goal = (self._step_goal - facts.units.zero_position) / facts.positions_per_rad
             goal_rad = np.where(steps, np.where(np.isnan(goal), path.goal, goal), goal_rad)
-        velocity = np.abs(registers["Goal Velocity"]).astype(np.float64)
+        velocity = np.abs(registers["Goal Velocity"]) * self._velocity_unit()
+        velocity = velocity / facts.rad_s_per_velocity
         timed = np.zeros(len(self), bool)
         if "Goal Time" in facts.registers:
             timed = (velocity == 0.0) & (registers["Goal Time"] > 0)
@@ -317,7 +377,7 @@ class FeetechServos(SimulatedServos):
             ramp = registers["Acceleration"].astype(np.float64)
         path.set_goals(np.where(positions, goal_rad, path.goal), velocity, ramp, timed)
         path.advance(seconds, positions)
-        speed = registers["Goal Velocity"] * facts.rad_s_per_velocity
+        speed = registers["Goal Velocity"] * self._velocity_unit()
         ahead = path.position + speed * seconds
         path.position[wheels] = np.clip(ahead, shaft - 0.5, shaft + 0.5)[wheels]
         path.goal[wheels] = path.position[wheels]

@@ -10,7 +10,7 @@ from rich.table import Table
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
 from snakewalk.controller.bench.commands.bus_options import Baud, DryRun, Yes, confirmed
-from snakewalk.controller.bench.eeprom_backup import load_backup, plan_restore
+from snakewalk.controller.bench.eeprom_backup import RestoreJournal, load_backup, plan_all
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import apply
 from snakewalk.controller.console.command import command
@@ -32,7 +32,10 @@ def restore(
     yes: Yes = False,
     as_json: Json = False,
 ) -> None:
-    """Write the values of a backup that differ; shows them and asks first."""
+    """Write the values of a backup that differ; shows them and asks first.
+
+    Checks all values before the first write. After an interruption the same command continues.
+    """
     servos = {servo.id: servo for servo in load_backup(file).servos}
     chosen_ids = servo_id or list(servos)
     missing = [str(restored_id) for restored_id in chosen_ids if restored_id not in servos]
@@ -42,11 +45,7 @@ def restore(
         )
     with open_lines(port, baud) as lines:
         buses = {restored_id: lines.open_servo(restored_id) for restored_id in chosen_ids}
-        plans = {
-            restored_id: plan_restore(buses[restored_id], servos[restored_id])
-            for restored_id in chosen_ids
-        }
-        changed = {restored_id: changes for restored_id, changes in plans.items() if changes}
+        changed = plan_all(buses, servos)
         if not as_json:
             table = Table("ID", "register", "now", "then", box=None)
             for restored_id, changes in changed.items():
@@ -60,9 +59,14 @@ def restore(
             and not dry_run
             and (yes or confirmed("bus restore", "write this?", as_json=as_json))
         )
+        journal = RestoreJournal(file)
         if written:
+            journal.note(changed, {servo_id: buses[servo_id].table.model for servo_id in changed})
+            typer.echo(f"if interrupted, undo: snakewalk bus restore {journal.path}", err=True)
             for changed_id, changes in changed.items():
                 apply(buses[changed_id], changed_id, changes)
+        if not dry_run and (written or not changed):
+            journal.remove()
     if as_json:
         shown = {
             str(restored_id): {c.register: [c.before, c.after] for c in changes}

@@ -28,6 +28,7 @@ from snakewalk.drivers.protocol.registers import BAUDS
     examples=(
         "bus set --id 1 --baud 57600 --new-id 7 --new-baud 1000000 --dry-run",
         "bus set --id 7 --return-delay 0 --yes",
+        "bus set --id 7 --register 'Angular Resolution=1'",
     ),
 )
 def bus_set(
@@ -49,6 +50,10 @@ def bus_set(
     voltage_min: Annotated[float | None, typer.Option(help="lower voltage limit in V")] = None,
     voltage_max: Annotated[float | None, typer.Option(help="upper voltage limit in V")] = None,
     return_delay: Annotated[float | None, typer.Option(help="return delay time in us")] = None,
+    register: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="raw value of another setting; may be repeated"),
+    ] = None,
     robot: Annotated[
         str | None, typer.Option(help="robot whose fingerprint file to update")
     ] = None,
@@ -69,6 +74,7 @@ def bus_set(
         voltage_min_v=voltage_min,
         voltage_max_v=voltage_max,
         return_delay_us=return_delay,
+        registers=tuple(register or ()),
     )
     file = None if robot is None else fingerprint_file(robot, "--robot")
     with open_lines(port, baud) as lines:

@@ -11,25 +11,32 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.bench.eeprom_backup import RestoreJournal, load_backup, plan_all
+from snakewalk.controller.bench.servo_settings import apply, open_servo
 from snakewalk.controller.cli.command_line import app
 from snakewalk.drivers.errors import NoAnswerError
 from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.serve.servo_bus import ServoBus
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 
 Call = Callable[..., tuple[int, str, BaseException | None]]
 
 
+def open_as_port(line: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    line.latency_s = 0.0  # type: ignore[attr-defined]
+
+    @contextmanager
+    def opened(device: str, baud: int) -> Iterator[object]:
+        yield line
+
+    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
+
+
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
     made = SimLine(ServoBank([7, 3], ["XM430-W350", "XL330-M288"]), BenchPlant(2))
-    made.latency_s = 0.0  # type: ignore[attr-defined]
-
-    @contextmanager
-    def opened(device: str, baud: int) -> Iterator[SimLine]:
-        yield made
-
-    monkeypatch.setattr("snakewalk.drivers.port.network_port.open_port", opened)
+    open_as_port(made, monkeypatch)
     return made
 
 
@@ -100,6 +107,83 @@ def test_a_file_that_is_not_of_these_servos_is_refused_before_anything_is_writte
     file.write_text(text)
     assert "has no ID 9; it has 3, 7" in str(call("restore", file, "--id", 9)[2])
     assert line.bank["Homing Offset"].tolist() == [5, 5]
+
+
+def test_all_values_are_checked_before_the_first_write(
+    tmp_path: Path, line: SimLine, call: Call
+) -> None:
+    """A bad value at the second servo left the first one changed; a crossed limit was written."""
+    file = tmp_path / "servos.json"
+    call("backup", "-o", file)
+    line.bank["Homing Offset"][:] = 5
+    before = line.bank.table.copy()
+    data = json.loads(file.read_text())
+    by_id = {servo["id"]: servo["registers"] for servo in data["servos"]}
+    by_id[3]["Temperature Limit"] = 900
+    by_id[7]["Min Position Limit"] = 3000
+    by_id[7]["Max Position Limit"] = 1000
+    file.write_text(json.dumps(data))
+    fault = call("restore", file, "--yes")[2]
+    assert isinstance(fault, InputError)
+    assert fault.faults == (
+        "ID 3: Temperature Limit: 900 is not within 0 to 100",
+        "ID 7: Min Position Limit 3000 is above Max Position Limit 1000",
+    )
+    assert (line.bank.table == before).all()
+
+
+def test_an_interrupted_restore_is_continued_or_undone(
+    tmp_path: Path, line: SimLine, call: Call
+) -> None:
+    file = tmp_path / "servos.json"
+    undo = tmp_path / "servos.undo.json"
+    line.bank["Homing Offset"][:] = 100, -200
+    call("backup", "-o", file)
+    line.bank["Homing Offset"][:] = 5, 6
+    servos = {servo.id: servo for servo in load_backup(file).servos}
+    buses = {servo_id: open_servo(line, servo_id, 0.0) for servo_id in servos}
+
+    def interrupt() -> None:
+        plans = plan_all(buses, servos)
+        RestoreJournal(file).note(plans, {i: bus.table.model for i, bus in buses.items()})
+        apply(buses[3], 3, plans[3])
+        assert line.bank["Homing Offset"].tolist() == [5, -200]
+
+    interrupt()
+    assert call("restore", undo, "--yes")[0] == 0
+    assert line.bank["Homing Offset"].tolist() == [5, 6]
+    assert not undo.exists()
+    interrupt()
+    assert call("restore", file, "--yes")[0] == 0
+    assert line.bank["Homing Offset"].tolist() == [100, -200]
+    assert not undo.exists()
+
+
+def test_a_backup_of_feetech_servos_suits_another_firmware(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Read-only registers were in the backup, were written first, and ended the restore."""
+    bus = ServoBus("1-2:STS3215")
+    open_as_port(bus.line, monkeypatch)
+    file = tmp_path / "servos.json"
+
+    def call(*words: object) -> int:
+        result = CliRunner().invoke(app, ["bus", *map(str, words), "--port", "any"])
+        return result.exit_code
+
+    assert call("backup", "-o", file, "--baud", 1_000_000) == 0
+    data = json.loads(file.read_text())
+    assert "Byte Order" not in data["servos"][0]["registers"]
+    assert "Angular Resolution" in data["servos"][0]["registers"]
+    data["servos"][0]["registers"]["Firmware Minor Version"] = 9  # as older backups have it
+    file.write_text(json.dumps(data))
+    bus.set("Phase", 140)
+    bus.set("CW Dead Zone", 9)
+    bus.line.bank["Firmware Minor Version"][:] = 11
+    assert call("restore", file, "--yes", "--baud", 1_000_000) == 0
+    assert bus["Phase"].tolist() == [12, 12]
+    assert bus["CW Dead Zone"].tolist() == [1, 1]
+    assert bus["Firmware Minor Version"].tolist() == [11, 11]
 
 
 def test_a_reboot_clears_an_alarm_and_asks_first(line: SimLine, call: Call) -> None:

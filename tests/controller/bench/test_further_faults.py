@@ -226,7 +226,7 @@ FURTHER = [
     Kind(
         "a voltage limit that was changed",
         set_register("Min Voltage Limit", 60),
-        "voltage limits",
+        "min voltage limit",
         "Min Voltage Limit 60, factory 95",
     ),
     Kind("a joint that is moved meanwhile", turning, "motion", "joint yaw_03 (ID 3) moves while"),

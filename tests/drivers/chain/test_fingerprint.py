@@ -3,6 +3,7 @@
 import pytest
 
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.drivers.chain.fingerprint import (
     FINGERPRINT,
     fingerprint_faults,
@@ -15,8 +16,9 @@ UNIT_RAD = 0.0015
 
 def test_a_fingerprint_has_its_registers_only_and_those_that_a_model_has() -> None:
     registers = {"Homing Offset": 3, "Shutdown": 0, "Position P Gain": 800}
-    assert fingerprint_of(registers) == {"Homing Offset": 3, "Shutdown": 0}
-    assert set(fingerprint_of(dict.fromkeys(FINGERPRINT, 1))) == set(FINGERPRINT)
+    facts = servo_model("XM430-W350")
+    assert fingerprint_of(registers, facts) == {"Homing Offset": 3, "Shutdown": 0}
+    assert set(fingerprint_of(dict.fromkeys(FINGERPRINT, 1), facts)) == set(FINGERPRINT)
 
 
 @pytest.mark.parametrize("unit_rad", [UNIT_RAD, -UNIT_RAD])

@@ -92,7 +92,7 @@ def test_names_in_any_spelling(spelling: str) -> None:
 def test_what_is_unknown_is_named() -> None:
     with pytest.raises(ControlTableError, match=r"XM999: no such servo model; similar are XM"):
         load_control_table("XM999")
-    with pytest.raises(InputError, match="no register 'goal position'; you mean Goal Position"):
+    with pytest.raises(InputError, match="no register 'goal position'; did you mean Goal Position"):
         XM430.register("goal position")
     with pytest.raises(ControlTableError, match="4242"):
         model_of(4242)
