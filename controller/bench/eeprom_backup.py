@@ -129,23 +129,22 @@ def plan_restore(bus: DynamixelBus, backup: ServoBackup) -> tuple[SettingChange,
         )
     now = _eeprom(bus, backup.id)
     rows = bus.table.facts.registers
-    wanted = {n: v for n, v in backup.registers.items() if n in now or n not in rows}
-    wanted |= {n: v for n, v in backup.registers.items() if n in rows and rows[n].range}
-    strange = sorted(set(wanted) - set(now))
+    values = backup.registers.items()
+    stored = {n: v for n, v in values if n in now or n not in rows or rows[n].range}
+    strange = sorted(set(stored) - set(now))
     faults = [f"has no {', '.join(strange)} to restore"] if strange else []
-    for name in now.keys() & wanted.keys():
+    then = {**now, **stored}
+    for name in now:
         span = rows[name].range
-        if span is not None and not span[0] <= wanted[name] <= span[1]:
-            faults.append(f"{name}: {wanted[name]} is not within {span[0]} to {span[1]}")
-    low, high = (wanted.get(f"{end} Position Limit", 0) for end in ("Min", "Max"))
+        if span is not None and not span[0] <= then[name] <= span[1]:
+            faults.append(f"{name}: {then[name]} is not within {span[0]} to {span[1]}")
+    low, high = (then.get(f"{end} Position Limit", 0) for end in ("Min", "Max"))
     if low > high:
         faults.append(f"Min Position Limit {low} is above Max Position Limit {high}")
     if faults:
         raise ChainError([f"ID {backup.id}: {fault}" for fault in faults])
     changes = [
-        SettingChange(name, now[name], wanted[name], "")
-        for name in now
-        if name in wanted and now[name] != wanted[name]
+        SettingChange(name, now[name], then[name], "") for name in now if now[name] != then[name]
     ]
     if changes and bus.read(backup.id, "Torque Enable"):
         changes.insert(0, SettingChange("Torque Enable", 1, 0, "the EEPROM is locked while on"))

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.servo_model import ServoModel
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
@@ -28,7 +27,6 @@ from snakewalk.drivers.chain.start_up import (
     identity_fault,
     pose_faults,
 )
-from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol import feetech
 from snakewalk.drivers.protocol.registers import (
     CURRENT_POSITION_MODE,
@@ -40,7 +38,6 @@ from snakewalk.drivers.protocol.registers import (
     TORQUE_ON_BY_GOAL,
     WATCHDOG_TRIPPED,
 )
-from snakewalk.sim.servo.register_rules import registers_of
 
 _GAINS = (
     "Position P Gain",
@@ -102,7 +99,6 @@ class _Checks:
         self._servos = servos
         self._robot = robot
         self._units = units
-        self._factory = [_factory_values(facts) for facts in robot.servo_records]
         self._full = units.full_pwm.tolist()
         first = servos[0].joint if servos else 0
         self._facts = robot.servo_records[first]
@@ -276,7 +272,7 @@ class _Checks:
             f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}"
             for servo in self._servos
             if (value := servo.values.get(register)) is not None
-            and (usual := self._factory[servo.joint].get(register, value)) != value
+            and (usual := self._factory(servo, register, value)) != value
         ]
         return Finding(check, "warn", "; ".join(servos), remedy) if servos else None
 
@@ -425,26 +421,22 @@ class _Checks:
             run = {s.register: s for s in self._settings(servo)}
             for name in registers:
                 value = servo.values.get(name)
-                usual = {self._factory[servo.joint].get(name, value)}
+                if value is None:
+                    continue
+                usual = {self._factory(servo, name, value)}
                 usual |= {run[name].value} if name in run else set()
                 if check == "operating mode":
                     usual |= {POSITION_MODE, CURRENT_POSITION_MODE}
-                if value is not None and value not in usual:
+                if value not in usual:
                     unusual_values.append(f"{self._robot.joint_label(servo.joint)}: {name} {value}")
         return (
             Finding(check, "warn", "; ".join(unusual_values), _BY_A_RUN) if unusual_values else None
         )
 
+    def _factory(self, servo: ServoRegisters, name: str, value: int) -> int:
+        """Value of a new servo's register; ``value`` if the model's file does not give it."""
+        facts = self._robot.servo_records[servo.joint]
+        return value if facts.motor is None else facts.registers[name].initial
+
     def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:
         return chain_settings(self._robot, self._units, servo.joint, self._full[servo.joint])
-
-
-def _factory_values(facts: ServoModel) -> dict[str, int]:
-    """Initial values of the registers; empty if the model's file does not give them."""
-    if facts.is_feetech:
-        return {name: row.initial for name, row in facts.registers.items()}
-    try:
-        rules = registers_of(facts).rules
-    except ControlTableError:
-        return {}
-    return {name: rule.initial for name, rule in rules.items()}

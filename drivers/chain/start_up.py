@@ -214,7 +214,7 @@ def taken_over(servos: Iterable[ServoReport], robot: RobotConfig, units: JointUn
         if servo.torque_on and (mode not in usual or abs(speed) > _TURNING_RAD_S):
             lines.append(
                 f"{robot.joint_label(joint)}: another program drives it at "
-                f"{speed:+.2f} rad/s, Operating Mode {mode}; this run sets it up anew"
+                f"{speed:+.2f} rad/s, Operating Mode {mode}; this run sets it up"
             )
     return lines
 

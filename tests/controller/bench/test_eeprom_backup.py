@@ -140,6 +140,7 @@ def test_an_interrupted_restore_is_continued_or_undone(
     line.bank["Homing Offset"][:] = 100, -200
     call("backup", "-o", file)
     line.bank["Homing Offset"][:] = 5, 6
+    line.bank["Min Position Limit"][1] = 100  # the journal has only one end of the range
     servos = {servo.id: servo for servo in load_backup(file).servos}
     buses = {servo_id: open_servo(line, servo_id, 0.0) for servo_id in servos}
 

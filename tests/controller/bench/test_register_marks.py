@@ -68,9 +68,9 @@ def test_the_doctor_names_each_compared_register(model: str, name: str) -> None:
     units = JointUnits.of(robot, [ServoUnits.of(facts) for facts in robot.servo_records])
 
     def named() -> bool:
-        found = register_findings([read_registers(servos, robot, 2)], robot, units)
-        spoken = {"Homing Offset": "zero is moved", "PWM Limit": "move: PWM Limit"}
-        return any(spoken.get(name, name) in each.found for each in found if each.grade != "ok")
+        findings = register_findings([read_registers(servos, robot, 2)], robot, units)
+        texts = {"Homing Offset": "zero is moved", "PWM Limit": "move: PWM Limit"}
+        return any(texts.get(name, name) in each.found for each in findings if each.grade != "ok")
 
     assert not named()
     bus.line.bank[name][1] = other_value(model, name)
@@ -121,11 +121,13 @@ def motion(name: str, value: int, *, i_gain: int = 0, goal: int = 2400) -> Float
     line = bus.line
     assert isinstance(line, FeetechLine)
     line.servos.write(0, 42, goal.to_bytes(2, "little"))
-    seen = []
+    samples = []
     for _ in range(25):
         line.clock.advance(0.01)
-        seen.append([float(line.servos.plant.position_rad[0]), float(bus["Present Position"][0])])
-    return np.array(seen)
+        samples.append(
+            [float(line.servos.plant.position_rad[0]), float(bus["Present Position"][0])]
+        )
+    return np.array(samples)
 
 
 OBEYED = [
@@ -187,7 +189,7 @@ def test_a_servo_that_another_program_turns_is_reported_before_it_is_taken_over(
     took = [line for line in events if "another program" in line]
     assert took == [
         "joint pitch_02 (ID 2): another program drives it at +0.74 rad/s, Operating Mode 1; "
-        "this run sets it up anew"
+        "this run sets it up"
     ]
     assert bus["Operating Mode"].tolist() == [0, 0]
 
