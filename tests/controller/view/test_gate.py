@@ -141,6 +141,7 @@ def test_the_server_has_the_gate_in_front_of_files_and_sockets(
 def test_the_address_is_read() -> None:
     assert host_and_port("0.0.0.0:9000") == ("0.0.0.0", 9000)
     assert host_and_port("robot") == ("robot", 8080)
-    for wrong in ("", ":80", "robot:", "robot:x", "robot:70000"):
+    assert host_and_port("robot:65535") == ("robot", 65535)
+    for wrong in ("", ":80", "robot:", "robot:x", "robot:65536"):
         with pytest.raises(InputError, match="expected HOST"):
             host_and_port(wrong)
