@@ -45,6 +45,11 @@ class PoseConfig(Strict):
         max_length=100,
         description="frame that each pose must name; default: that of the first pose",
     )
+    sender: str | None = Field(
+        None,
+        max_length=100,
+        description="address of the only host whose poses are used; default: the first sender",
+    )
     noise_m: float = Field(
         0.01, ge=1e-4, le=1.0, description="standard deviation of a position without a covariance"
     )

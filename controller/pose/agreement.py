@@ -46,6 +46,8 @@ UNIT: Final = 20.0
 """A swing that is this many times larger than expected has another unit (ours)."""
 WINDOWS: Final = 5
 """Windows before the scale is judged on hills, or its accuracy stated (ours)."""
+ENDS: Final = 8
+"""Samples at each end of a window whose mean is a place."""
 SCALE_SD: Final = 0.02
 """Least standard deviation of the scale (ours)."""
 SCALE_FLAT: Final = 0.05
@@ -69,6 +71,8 @@ class Agreement:
         self._named: str | None = None
         self.scale_sd = self._allowed
         """Standard deviation of the source's scale, over 1."""
+        self._aside_m = 0j
+        self._summed_s = -np.inf
         self.has_agreed = False
         """Whether the source ever agreed with the joints."""
 
@@ -90,6 +94,14 @@ class Agreement:
     def is_confirmed(self) -> bool:
         """Whether the source has agreed with the joints, and does not contradict them since."""
         return self.has_agreed and self._doubt_s < NAMED_S
+
+    @property
+    def aside_m(self) -> float:
+        """How far the poses went aside in all, though the joints did not; 0 on hills.
+
+        A body on a floor goes aside by at most 3 cm in a window; a source may drift.
+        """
+        return abs(self._aside_m)
 
     @property
     def is_cautious(self) -> bool:
@@ -147,7 +159,13 @@ class Agreement:
         off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(reckoned_rad))
         slow_rad = off_rad - _detrended(off_rad, line)
         steps = np.diff(reckoned_m) * np.exp(1j * slow_rad[:-1])
-        swing = _detrended(np.concatenate([[0.0], np.cumsum(steps)]), line)
+        way_m = np.concatenate([[0.0], np.cumsum(steps)])
+        swing = _detrended(way_m, line)
+        if self._is_level and times[-1] - self._summed_s >= WINDOW_S:
+            self._summed_s = times[-1]
+            ahead_m = _travel(way_m)
+            off = (_travel(measured_m) - ahead_m) / (ahead_m or 1.0)
+            self._aside_m += 1j * off.imag * ahead_m
         shape = _detrended(measured_m, line)
         named = _mirrored(related, shape, swing)
         swings = related > SHARE and float(np.sqrt(np.mean(np.abs(swing) ** 2))) >= LEAST_SWING_M
@@ -215,6 +233,11 @@ def _mirrored(related: float, shape: Floats, swing: Floats) -> str | None:
             "right-handed frame, z up"
         )
     return None
+
+
+def _travel(places_m: Floats) -> complex:
+    """Return the way from the first places (n,) to the last ones, without most of their noise."""
+    return complex(np.mean(places_m[-ENDS:]) - np.mean(places_m[:ENDS]))
 
 
 def _size(a: Floats, b: Floats) -> float:

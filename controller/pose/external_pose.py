@@ -4,6 +4,7 @@ An unusable pose is named and left out; dead reckoning bridges it with growing u
 ``max_age_s`` without a usable pose, ``fault`` has the reason and the run holds.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Final, NamedTuple
@@ -161,6 +162,7 @@ class ExternalPose:
         self._clock = SenderClock()
         self._check = Agreement(is_level=is_level)
         self._start_m: Floats | None = None
+        self._start_off = 0.0, 0.0
         self._relocation = Relocation()
         self._has_slid = False
         self._latency = LatencyEstimate(config.latency_s)
@@ -206,12 +208,22 @@ class ExternalPose:
     def position_sd_m(self) -> float:
         """Standard deviation of the head's position, with errors that agreement cannot show.
 
-        A wrong scale moves a body that is far from its start more than one that is near it.
+        A wrong scale or a turned frame moves a body more that is far from its start. Nothing shows
+        whether robot or frame was off at the start: half of the difference is a standard deviation.
         """
         if self._start_m is None:
             return self._filter.position_sd_m
-        away_m = np.hypot(*(self._filter.head_m - self._start_m)[:2])
-        return float(np.hypot(self._filter.position_sd_m, self._check.scale_sd * away_m))
+        check = self._check
+        away_m = float(np.hypot(*(self._filter.head_m - self._start_m)[:2]))
+        off_m, turned_rad = self._start_off
+        parts = (
+            self._filter.position_sd_m,
+            check.scale_sd * away_m,
+            0.5 * turned_rad * away_m,
+            0.5 * off_m,
+            check.aside_m,
+        )
+        return math.hypot(*parts)
 
     def fault(self) -> str | None:
         """Return why the pose cannot be trusted any more; None while it can."""
@@ -326,6 +338,7 @@ class ExternalPose:
         config = self._config
         self._start_m = placed.position_m.copy()
         away_m = float(np.hypot(*(placed.position_m[:2] - placed.odometry_m)))
+        self._start_off = away_m, placed.turn_rad
         turned_deg = float(np.degrees(placed.turn_rad))
         if away_m <= config.start_m and abs(turned_deg) <= config.start_deg:
             return
@@ -356,8 +369,10 @@ class ExternalPose:
         if arrived.sender == self._sender:
             return True
         assert self._newest is not None
-        same_host = arrived.sender.rpartition(":")[0] == self._sender.rpartition(":")[0]
-        if same_host and arrived.arrival_s - self._newest.arrival_s > RESTART_S:
+        if (
+            arrived.host == self._newest.host
+            and arrived.arrival_s - self._newest.arrival_s > RESTART_S
+        ):
             self._restart(f"another sender on the same host, {arrived.sender}")
             self._sender = arrived.sender
             return True

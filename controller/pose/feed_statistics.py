@@ -52,12 +52,21 @@ class FeedStatistics:
         """The newest pose."""
         return self._poses[-1][2] if self._poses else None
 
+    @property
+    def samples(self) -> list[PoseSample]:
+        """The newest poses."""
+        return [sample for _, _, sample in self._poses]
+
     def faults(self) -> list[str]:
         """Return contradictions among the messages, one line each."""
         problems = []
         if not self._poses:
             problems.append(self.last_fault or "nothing arrived; start the sender")
-        if len(self.senders) > 1:
+        host = self._config.sender
+        if host is not None:
+            others = [sender for sender in self.senders if sender.rpartition(":")[0] != host]
+            problems += [f"sender {other} is not {host} (pose.sender)" for other in others]
+        elif len(self.senders) > 1:
             problems.append(f"two senders: {', '.join(self.senders)}; stop one of them")
         if len(self.frames) > 1:
             problems.append(f"wrong frame: poses name {', '.join(self.frames)}; send one frame")
@@ -100,14 +109,14 @@ class FeedStatistics:
 
     def _noise_m(self) -> float | None:
         """Standard deviation of a coordinate; slow motion does not count."""
-        positions = np.array([sample.position_m for _, _, sample in self._poses])
+        positions = np.array([sample.position_m for sample in self.samples])
         if len(positions) < 10:
             return None
         return _rounded(np.sqrt(np.mean(np.diff(positions, 2, axis=0) ** 2) / 6.0))
 
     def _noise_deg(self) -> float | None:
         """Standard deviation of an angle; slow motion does not count."""
-        rotations = [sample.rotation for _, _, sample in self._poses]
+        rotations = [sample.rotation for sample in self.samples]
         if len(rotations) < 10:
             return None
         steps = np.array([rotation_vector(two @ before.T) for before, two in pairwise(rotations)])

@@ -78,9 +78,16 @@ def _watched(
     while clock.now_s() < until_s:
         clock.sleep_until_s(clock.now_s() + LOOK_S)
         arrived += feed.arrived(clock.now_s())
-    samples = [m.sample for m in arrived if isinstance(m.sample, PoseSample)]
+    fault = drift_fault([m.sample for m in arrived if isinstance(m.sample, PoseSample)])
+    if fault is not None:
+        raise InputError(f"pose {source}: {fault}")
+    return arrived[-1:]
+
+
+def drift_fault(samples: list[PoseSample]) -> str | None:
+    """Return how fast the poses of a robot at rest move; None if they rest, too."""
     if len(samples) < 2 * BLOCKS:
-        return arrived[-1:]
+        return None
     time_s = np.array([sample.time_s for sample in samples])
     place_m = np.array([sample.position_m for sample in samples])
     blocks = np.array_split(np.arange(len(samples)), BLOCKS)
@@ -91,12 +98,12 @@ def _watched(
     off_m = mean_m - np.outer(at_s, drift_m_s)
     sd_m_s = float(np.sqrt(np.sum(off_m**2) / (3 * (BLOCKS - 2)) / spread_s2))
     speed_m_s = float(np.linalg.norm(drift_m_s))
-    if speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
-        raise InputError(
-            f"pose {source}: the robot rests, and its pose moves by {100.0 * speed_m_s:.1f} cm/s; "
-            "leave the robot alone, or wait until the source does not drift"
-        )
-    return arrived[-1:]
+    if not speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
+        return None  # also if the stamps are equal
+    return (
+        f"the robot rests, and its pose moves by {100.0 * speed_m_s:.1f} cm/s; leave the robot "
+        "alone, or wait until the source does not drift"
+    )
 
 
 def start_fault(
@@ -105,6 +112,7 @@ def start_fault(
     config: PoseConfig,
     start_m: tuple[float, float],
     ground_m: Callable[[float, float], float],
+    straight_rad: float | None = None,
 ) -> str | None:
     """Return why a pose cannot be that of the robot at the start of a run, or None.
 
@@ -114,6 +122,8 @@ def start_fault(
         config: its tracked body.
         start_m: where the head starts.
         ground_m: height of the ground at a place.
+        straight_rad: heading of a straight body at the start; None: only place and axes are judged,
+            because the joints are not known.
 
     """
     if config.frame is not None and sample.frame != config.frame:
@@ -138,10 +148,20 @@ def start_fault(
             f"wrong frame: the link's up axis points along {axis} of the world"
             f"{hint if axis == 'y' else ''}; correct pose.world_deg or pose.offset_deg"
         )
-    if away_m > reach_m:
+    turned_deg = 0.0
+    where = f"at {_places(link_m[:2])}"
+    if straight_rad is not None:
+        turned_deg = np.degrees(np.angle(complex(*link[:2, 0]) * np.exp(-1j * straight_rad)))
+        off = complex(*(link_m[:2] - start_m)) * np.exp(-1j * straight_rad)
+        where = (
+            f"{abs(off.real):.2f} m {'ahead of' if off.real > 0.0 else 'behind'} its start and "
+            f"{abs(off.imag):.2f} m to the {'left' if off.imag > 0.0 else 'right'}, turned by "
+            f"{turned_deg:+.0f} degrees if its body is straight"
+        )
+    if away_m > reach_m or abs(turned_deg) > config.start_deg:
         return (
-            f"the robot is at {_places(link_m[:2])}, {away_m:.2f} m from the start of the run at "
-            f"{start}; put it there, or correct pose.world_m"
+            f"the robot is {where}, {away_m:.2f} m from the start of the run at {start}; put it "
+            "there, or correct pose.world_m and pose.world_deg"
         )
     over_m = float(link_m[2]) - ground_m(float(link_m[0]), float(link_m[1]))
     if abs(over_m) > HEIGHT_M:

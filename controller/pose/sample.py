@@ -44,6 +44,11 @@ class ArrivedPose:
     """Address of the sender, for messages."""
     sample: PoseSample | UnusablePoseError
 
+    @property
+    def host(self) -> str:
+        """Address of the sender without its port."""
+        return self.sender.rpartition(":")[0]
+
 
 class PoseFeed(Protocol):
     """Where poses of a source arrive."""

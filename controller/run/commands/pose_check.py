@@ -16,7 +16,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import VIEW_AT, Json, Robot, View, ViewAt, console, show
 from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.pose.feed_statistics import FeedStatistics
-from snakewalk.controller.pose.first_pose import WAIT_S, start_fault
+from snakewalk.controller.pose.first_pose import WAIT_S, drift_fault, start_fault
 from snakewalk.controller.pose.sample import PoseFeed, PoseSample
 from snakewalk.controller.run.external.external_source import ExternalSource, ground_height
 from snakewalk.controller.run.external.pose_check_page import PoseCheckPage, feed_words
@@ -63,7 +63,7 @@ def check(
     if view and run is None:
         raise InputError("--view: the page needs a robot and its ground; add --run NAME")
     prepared = None if run is None else prepare_job(run, robot=robot)
-    config, judge = _expected(robot, prepared)
+    config, judge = expected_pose(robot, prepared)
     clock = WallClock()
     with ExitStack() as stack:
         page = None
@@ -72,7 +72,7 @@ def check(
         feed = stack.enter_context(closing(plugin.open_feed(argument, clock)))
         on_line = (lambda line: None) if as_json else _print
         statistics = watch(feed, clock, seconds, config, on_line, page=page, judge=judge)
-    faults = _faults(statistics, judge)
+    faults = start_faults(statistics, judge)
     mount = {"link": config.link, "offset_m": list(config.offset_m)}
     show({**statistics.facts(), "mount": mount, "faults": faults}, as_json)
     if faults:
@@ -108,13 +108,19 @@ def watch(
             due_s += LINE_S
             on_line(_line(statistics))
             if page is not None:
-                page.report(clock.now_s() - start_s, statistics.facts(), _faults(statistics, judge))
+                page.report(
+                    clock.now_s() - start_s, statistics.facts(), start_faults(statistics, judge)
+                )
     return statistics
 
 
-def _faults(statistics: FeedStatistics, judge: Judge) -> list[str]:
-    fault = None if statistics.newest is None else judge(statistics.newest)
-    return [*statistics.faults(), *([] if fault is None else [fault])]
+def start_faults(statistics: FeedStatistics, judge: Judge) -> list[str]:
+    """Return the faults of the messages, and of the newest pose at the start of a run."""
+    faults = statistics.faults()
+    if statistics.newest is not None:
+        more = judge(statistics.newest), drift_fault(statistics.samples)
+        faults += [fault for fault in more if fault is not None]
+    return faults
 
 
 @contextmanager
@@ -145,7 +151,8 @@ def _print(line: str) -> None:
     console.print(line)
 
 
-def _expected(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConfig, Judge]:
+def expected_pose(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConfig, Judge]:
+    """Return the tracked body, and a judge of the first pose of a run."""
     if prepared is None:
         body = None if robot is None else load_robot(robot)
         config = PoseConfig() if body is None or body.pose is None else body.pose
@@ -153,5 +160,10 @@ def _expected(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConf
     config = prepared.robot.pose or PoseConfig()
     height_m = ground_height(prepared.ground)
     return config, lambda sample: start_fault(
-        sample, prepared.robot, config, prepared.run.start_m, height_m
+        sample,
+        prepared.robot,
+        config,
+        prepared.run.start_m,
+        height_m,
+        prepared.start_heading_rad,
     )

@@ -1,7 +1,7 @@
 """External pose sources: another program sends the poses."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from typing import Protocol
 
@@ -14,7 +14,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.pose.external_pose import ExternalPose
 from snakewalk.controller.pose.first_pose import await_first_pose, start_fault
-from snakewalk.controller.pose.sample import PoseFeed
+from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed
 from snakewalk.controller.pose.udp_feed import UdpFeed, parse_address
 from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
 from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
@@ -91,13 +91,17 @@ class ExternalSource(ABC):
         config = robot.pose or PoseConfig()
         rehearsed = context.backend.poses
         opened = rehearsed if rehearsed is not None else self.open_feed(context.argument, clock)
-        with closing(_Feed(opened)) as feed:
+
+        def on_event(text: str) -> None:
+            context.on_event("pose", text)
+
+        with closing(_Feed(opened, config.sender, on_event)) as feed:
             pose = ExternalPose(
                 robot,
                 config,
                 feed,
                 context.reckoning,
-                lambda text: context.on_event("pose", text),
+                on_event,
                 is_level=prepared.ground is None,
             )
             early = await_first_pose(
@@ -114,11 +118,24 @@ class ExternalSource(ABC):
 
 
 class _Feed:
-    """A feed whose ``close`` may be missing."""
+    """A feed whose ``close`` may be missing, with the poses of one host if a file names it."""
 
-    def __init__(self, feed: PoseFeed) -> None:
-        self.arrived = feed.arrived
+    def __init__(self, feed: PoseFeed, host: str | None, on_event: Callable[[str], None]) -> None:
+        self._feed = feed
+        self._host = host
+        self._on_event = on_event
+        self._others = set[str]()
         self.close: Callable[[], None] = getattr(feed, "close", lambda: None)
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived; each other sender is reported once."""
+        arrived = self._feed.arrived(now_s)
+        if self._host is None:
+            return arrived
+        for sender in {pose.sender for pose in arrived if pose.host != self._host} - self._others:
+            self._others.add(sender)
+            self._on_event(f"{sender} is ignored: it is not {self._host} (pose.sender)")
+        return [pose for pose in arrived if pose.host == self._host]
 
 
 def ground_height(ground: HeightField | None) -> Callable[[float, float], float]:

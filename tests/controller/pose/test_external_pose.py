@@ -153,6 +153,35 @@ def test_the_accuracy_grows_with_the_distance_from_the_start() -> None:
     assert scene.pose.position_sd_m > 1.3 * near
 
 
+def test_a_turn_at_the_start_makes_the_accuracy_worse() -> None:
+    """Nothing shows whether the robot lies turned, or its source's frame is."""
+    turn = turned((0.0, 0.0, 10.0))
+
+    def in_turned_frame(time_s: float, sample: PoseSample) -> list[PoseSample]:
+        place_m = turn @ sample.position_m
+        return [replace(sample, position_m=place_m, rotation=turn @ sample.rotation)]
+
+    sound, wrong = Scene(), Scene()
+    sound.run(12.0)
+    wrong.run(12.0, in_turned_frame)
+    assert wrong.pose.fault() is None
+    assert wrong.errors_m[-1] < 2.0 * wrong.pose.position_sd_m
+    assert wrong.pose.position_sd_m > 1.5 * sound.pose.position_sd_m
+
+
+def test_drift_in_motion_makes_the_accuracy_worse() -> None:
+    """A source that drifts to the side by 2 cm/s from 6 s on."""
+
+    def drifting(time_s: float, sample: PoseSample) -> list[PoseSample]:
+        return [moved(sample, [0.0, 0.02 * max(time_s - 6.0, 0.0), 0.0])]
+
+    scene = Scene()
+    scene.run(26.0, drifting)
+    assert scene.pose.fault() is None
+    assert scene.errors_m[-1] > 0.3
+    assert scene.errors_m[-1] < 2.0 * scene.pose.position_sd_m
+
+
 def test_a_good_source_is_never_called_wrong() -> None:
     scene = Scene(PoseConfig(), noise_m=0.02, delay_s=0.2)
     scene.run(7.0)

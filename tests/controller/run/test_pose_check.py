@@ -1,13 +1,16 @@
 """``pose check`` on poses in simulated time, and its answer."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from snakewalk.config.pose import PoseConfig
 from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
-from snakewalk.controller.run.commands.pose_check import watch
+from snakewalk.controller.run.commands.pose_check import expected_pose, start_faults, watch
+from snakewalk.controller.run.factory import prepare_job
 from snakewalk.drivers.attitude import rotation_by
 from snakewalk.sim.line.clock import SimClock
 from tests.helpers.command import snakewalk
@@ -59,6 +62,27 @@ def test_the_seconds_begin_with_the_first_pose() -> None:
     assert found.facts()["poses"] == pytest.approx(100, abs=8)
 
 
+def test_drift_and_heading_are_compared_as_in_a_run() -> None:
+    """Millimetres of drift and a frame that is turned by 90 degrees."""
+
+    class Drifting(Tracker):
+        def arrived(self, now_s: float) -> list[ArrivedPose]:
+            drift_m = np.array([0.02 * now_s, 0.0, 0.0])
+            return [
+                replace(each, sample=replace(pose, position_m=pose.position_m + drift_m))
+                for each in super().arrived(now_s)
+                if isinstance(pose := each.sample, PoseSample)
+            ]
+
+    _, judge = expected_pose(None, prepare_job("flat-slalom", start_m=(1.0, 1.6)))
+    still = watch(Tracker(), SimClock(), 5.0, PoseConfig(), lambda line: None)
+    (said,) = start_faults(still, judge)
+    assert re.match(r"the robot is 0\.40 m behind its start and 0\.0\d m to the left", said)
+    assert re.search(r"turned by \+17\d degrees if its body is straight", said)
+    found = watch(Drifting(), SimClock(), 5.0, PoseConfig(), lambda line: None)
+    assert re.search(r"its pose moves by 2\.\d cm/s", start_faults(found, lambda sample: None)[0])
+
+
 class Wrong:
     def arrived(self, now_s: float) -> list[ArrivedPose]:
         one = PoseSample(0, now_s, np.zeros(3), np.eye(3), "lab")
@@ -75,6 +99,8 @@ def test_two_senders_and_frames_are_faults() -> None:
     found = watch(Wrong(), SimClock(), 0.1, PoseConfig(), lambda line: None)
     assert [text.partition(":")[0] for text in found.faults()] == ["two senders", "wrong frame"]
     assert found.invalid > 0
+    named = watch(Wrong(), SimClock(), 0.1, PoseConfig(sender="a"), lambda line: None)
+    assert named.faults()[0] == "sender b:1 is not a (pose.sender)"
 
 
 def test_without_a_sender_the_command_ends_with_1() -> None:
