@@ -7,7 +7,7 @@ from tests.architecture.layout import ORDER
 from tests.architecture.tokens import by_package, sizes, tokens
 
 DECISIONS: Final = Path(__file__).resolve().parents[2] / "docs/decisions"
-MOST: Final = 467_900
+MOST: Final = 468_400
 """Tokens of all packages."""
 LIMITS: Final = {
     "config": 19550,
@@ -69,10 +69,10 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "config": (20_100, "0270-one-reader-of-text-tables.md"),
     "controller.exchange": (17_700, "0270-one-reader-of-text-tables.md"),
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
-    "controller.pose": (8100, "0253-a-pose-is-measured-while-it-agrees.md"),
+    "controller.pose": (8300, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (9550, "0275-a-recorded-run-first.md"),
-    "controller.run": (22_100, "0242-code-of-one-importer.md"),
+    "controller.run": (22_150, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
     "controller.metrics": (6_000, "0260-references-without-the-value-under-test.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""
