@@ -27,7 +27,7 @@ from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
-from snakewalk.drivers.errors import DriverError
+from snakewalk.drivers.errors import DriverError, notes_of
 from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.physics.plant import MujocoPlant
 
@@ -154,8 +154,14 @@ def walked(seed: int, *, is_planted: bool = False) -> dict[str, Any]:
     try:
         with on_its_back(roll_rad), planted(plan):
             result = run_robot(RunRequest(walk, stoppable=False))
-    except DriverError as error:  # before torque: a body that rolls while it is limp
-        return row | {"trip": None, "duration_s": 0.0, "refused": str(error)}
+    except DriverError as error:
+        # before torque, a body that rolls while it is limp; afterwards a silent servo
+        text = " ".join([str(error), *notes_of(error)])
+        row |= {"trip": None, "duration_s": 0.0, "refused": text}
+        if is_planted:
+            label = walk.robot.joint_label(joint)
+            row |= {"fault": name, "joint": joint, "at_s": at_s, "found": label in text}
+        return row
     row |= {"trip": result.outcome.tripped, "duration_s": round(result.outcome.duration_s, 2)}
     if is_planted:
         label = walk.robot.joint_label(joint)
@@ -184,9 +190,8 @@ def table(rows: list[dict[str, Any]]) -> str:
         return "\n".join(lines)
     lines = ["| walks | n | s of motion | stopped by a load | false trips |"]
     lines += ["| --- | ---: | ---: | ---: | ---: |"]
-    rows = [row for row in rows if "refused" not in row]
     for kind in KINDS:
-        of = [row for row in rows if row["kind"] == kind]
+        of = [row for row in rows if row["kind"] == kind and "refused" not in row]
         false = sum(map(is_false, of))
         loads = sum(row["trip"] is not None for row in of) - false
         seconds = sum(row["duration_s"] for row in of)

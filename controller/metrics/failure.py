@@ -103,6 +103,13 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
                 f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path, which "
                 f"climbs by {np.degrees(steep_rad):.0f} deg there",
             )
+        slid_m, fall_rad = _slide(record, rows)
+        if slid_m > PROGRESS_SHARE * travelled and fall_rad > _holds_rad(record):
+            return Failure(
+                "slip",
+                f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg while it "
+                f"advanced {travelled:.1f} m",
+            )
         error = path_error_m(record)[rows]
         return Failure(
             "steering",
@@ -110,6 +117,29 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
             f"up to {np.nanmax(error):.2f} m off it",
         )
     return Failure("time", f"out of time with {remaining[-1]:.1f} m of path left")
+
+
+def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
+    """Distance that the body moved otherwise than along itself, and how steep the ground falls.
+
+    The slope is the mean under the body's centre, over a quarter of its length in the direction of
+    the slide; 0 without a ground.
+    """
+    pose = record.pose
+    along = pose.links_m[rows, 0, :2] - pose.links_m[rows, -1, :2]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    speed_m_s = pose.speed_m_s[rows, None] * along
+    steps_s = np.diff(pose.time_s[rows])[:, None]
+    centre_m = pose.centre_m[rows, :2]
+    slide_m = centre_m[-1] - centre_m[0] - (speed_m_s[:-1] * steps_s).sum(axis=0)
+    slid_m = float(np.linalg.norm(slide_m))
+    ground = record.header.ground
+    if ground is None or slid_m < 1e-6:
+        return slid_m, 0.0
+    half_m = 0.125 * record.header.robot.length_m
+    ahead_m, behind_m = (centre_m + sign * half_m * slide_m / slid_m for sign in (1.0, -1.0))
+    fall_m = ground.elevation_m(*behind_m.T) - ground.elevation_m(*ahead_m.T)
+    return slid_m, float(np.arctan(np.mean(fall_m) / (2.0 * half_m)))
 
 
 def _up_rad(links_m: Floats) -> Floats:

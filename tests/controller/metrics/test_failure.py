@@ -163,7 +163,9 @@ def test_roll_beyond_a_right_angle(record: RunRecord, roll_deg: float) -> None:
     assert np.degrees(roll_rad(rotation)) == pytest.approx([roll_deg])
 
 
-@pytest.mark.parametrize(("slope_deg", "cause"), [(18.0, "climb"), (10.0, "steering")])
+@pytest.mark.parametrize(
+    ("slope_deg", "cause"), [(18.0, "climb"), (10.0, "slip"), (4.0, "steering")]
+)
 def test_a_path_too_steep_to_climb_is_no_fault_of_steering(
     record: RunRecord, slope_deg: float, cause: str
 ) -> None:
@@ -175,3 +177,29 @@ def test_a_path_too_steep_to_climb_is_no_fault_of_steering(
     header = dataclasses.replace(log.header, ground=ground)
     found = failure(dataclasses.replace(log, header=header))
     assert found.cause == cause
+
+
+@pytest.mark.parametrize(
+    ("fall_deg", "cause"), [(14.0, "slip"), (7.0, "slip"), (5.0, "steering"), (-14.0, "steering")]
+)
+def test_a_slide_to_the_side_is_judged_by_the_slope_under_the_body(
+    record: RunRecord, fall_deg: float, cause: str
+) -> None:
+    """A path along a hillside is level, and the body slides off it downhill."""
+    y_m = np.arange(-20.0, 20.0, 0.5)
+    height_m = np.tile(-np.tan(np.radians(fall_deg)) * y_m[:, None], (1, 66))
+    log = made(record)
+    aside_m = np.zeros((len(log.pose.time_s), 1, 3))
+    aside_m[:, 0, 1] = 0.2 * log.pose.time_s
+    stuck_m = np.full(len(aside_m), 1.0)
+    pose = dataclasses.replace(
+        log.pose,
+        links_m=log.pose.links_m + aside_m,
+        centre_m=log.pose.centre_m + aside_m[:, 0],
+        path_s_m=stuck_m,
+    )
+    header = dataclasses.replace(log.header, ground=HeightField(height_m, 0.5, -1.0, -20.0))
+    found = failure(dataclasses.replace(log, header=header, pose=pose))
+    assert found is not None
+    assert found.cause == cause
+    assert (f"down a slope of {fall_deg:.0f} deg" in found.text) == (cause == "slip")
