@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import threading
+import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
@@ -396,6 +397,30 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     assert shown_at(1.6, colour // 2).mean() < 0.6 * first.mean()  # type: ignore[union-attr]
     assert cv2 is not None
     view.page._server.stop()
+
+
+def test_a_picture_is_sent_once_before_the_next_pose() -> None:
+    pytest.importorskip("cv2")
+    view = View()
+    view.on_picture(np.zeros((48, 64, 3), dtype=np.uint8), 1.0)
+    sent = []
+    for _ in range(2):
+        view.on_row("/pose", b"{}")
+        view.page._end.ask()
+        view.end.pump()
+        sent.append([topic for topic, _ in view.page._end.rows(1.0)])
+    view.page._server.stop()
+    assert sent == [["/picture", "/pose"], ["/pose"]]
+
+
+@pytest.mark.costs("starts the process of a page")
+def test_a_page_is_served_at_its_url() -> None:
+    with LiveView("127.0.0.1:0") as view:
+        address, _, token = view.url.partition("?token=")
+        assert address.startswith("http://127.0.0.1:")
+        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        with browser.open(view.url, timeout=PATIENCE_S) as answer:
+            assert (answer.status, len(token) > 20) == (200, True)
 
 
 def moved_by_a_browser(panel: GaitPanel, name: str, value: object) -> None:
