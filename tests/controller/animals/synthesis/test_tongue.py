@@ -10,7 +10,12 @@ from hypothesis import strategies as st
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.rig import Rig, posed_m
 from snakewalk.controller.animals.mesh.skin import Weights
-from snakewalk.controller.animals.synthesis.synthesis_skin import bones_with_tongue, rig_with_tongue
+from snakewalk.controller.animals.synthesis.synthesis_skin import (
+    LENGTH,
+    RADIUS,
+    bones_with_tongue,
+    rig_with_tongue,
+)
 from snakewalk.controller.animals.synthesis.tongue import (
     HeightChain,
     Tongue,
@@ -21,6 +26,7 @@ from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import from_points
 
 CHAIN = HeightChain(flicks())
+FLIP = np.array([1.0, -1.0, 1.0])
 
 
 def test_rows_of_seen_pairs_are_probabilities() -> None:
@@ -135,3 +141,26 @@ def test_the_tongue_of_the_skin_is_as_far_out_as_its_height() -> None:
     red = texture[int((1.0 - rig.mesh.uv[-1, 1]) * len(texture))]
     assert red[0, 0] > 150
     assert red[0, 1] < 60
+
+
+@pytest.mark.parametrize("length_m", [0.5, 2.0])
+def test_a_tongue_is_a_round_stem_with_two_mirrored_tips(length_m: float) -> None:
+    mesh = Mesh(
+        vertices=np.zeros((3, 3)),
+        normals=np.eye(3),
+        uv=np.zeros((3, 2)),
+        faces=np.eye(3, dtype=int),
+    )
+    held = Weights(np.zeros((3, 3), dtype=np.int64), np.tile([0.0, 1.0, 0.0], (3, 1)))
+    rig, _ = rig_with_tongue(Rig(mesh, held, np.zeros((5, 3)), np.arange(5) - 1), length_m, None)
+    corners_m = rig.mesh.vertices[3:] / length_m
+    front, root = corners_m[:, 0].max(), corners_m[:, 0].min()
+    assert front == pytest.approx(-2.0 * RADIUS)
+    assert front - root == pytest.approx(LENGTH)
+    ordered = [np.round(c[np.lexsort(np.round(c, 9).T)], 9) for c in (corners_m, corners_m * FLIP)]
+    np.testing.assert_array_equal(*ordered)
+    for x in (root, front - 0.35 * LENGTH):  # both ends of the stem
+        ring = corners_m[np.abs(corners_m[:, 0] - x) < 1e-9]
+        assert np.abs(ring[:, 2]).max() == pytest.approx(RADIUS)
+    tips = corners_m[np.abs(corners_m[:, 0] - front) < 1e-9]
+    assert np.abs(tips[:, 1]).min() > RADIUS, "they are apart"
