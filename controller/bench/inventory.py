@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from itertools import cycle
 
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
@@ -75,6 +76,8 @@ def robot_skeleton(
     name: str,
     entries: Sequence[InventoryEntry],
     segments: Sequence[tuple[str, Sequence[int]]] = (),
+    *,
+    axes: str,
 ) -> str:
     """A robot's file of the servos found, in the order of their IDs; axes are for a person to say.
 
@@ -82,6 +85,7 @@ def robot_skeleton(
         name: of the robot.
         entries: at one baud rate, that of most servos.
         segments: port and IDs of each segment, where there are several.
+        axes: of the joints from the head, ``y`` or ``p``; a short word repeats.
 
     Raises:
         ConfigError: these servos make no robot, such as one of Protocol 1.0.
@@ -95,9 +99,9 @@ def robot_skeleton(
     if volts:
         servo["supply_v"] = volts[len(volts) // 2]
     joints: list[dict[str, object]] = []
-    for entry in chain:
+    for entry, axis in zip(chain, cycle(axes), strict=False):
         model_key = {} if entry.found.model == model else {"model": entry.found.model}
-        joints.append({"axis": "y", "id": entry.found.servo_id, **model_key})
+        joints.append({"axis": axis, "id": entry.found.servo_id, **model_key})
     chosen = {entry.found.servo_id for entry in chain}
     ports = [
         {"port": port, "ids": ids}
@@ -110,6 +114,6 @@ def robot_skeleton(
         robot,
         f"{len(chain)} servos as snakewalk bus inventory found them. Not known, and assumed:\n"
         "- the order: by ID from the head; snakewalk bus calibrate finds it, and signs and zeros;\n"
-        '- axes: "y" = yaw everywhere; write axis = "p" for joints that lift;\n'
+        f'- axes: "{axes}" from the head, repeated: y turns about the vertical, p lifts;\n'
         "- links: link_length_m, link_mass_kg, body_radius_m, or [[links]]; as by default.",
     )

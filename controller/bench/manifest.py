@@ -15,6 +15,7 @@ PLUGINS = (
     ("command", "bus sniff", "Decode a live or recorded exchange packet by packet.", "snakewalk.controller.bench.commands.bus_sniff:sniff"),
     ("command", "doctor", "Examine adapter, bus and servos; list every fault with its remedy.", "snakewalk.controller.bench.commands.doctor:doctor"),
     ("command", "robot power", "Compute the voltage of each servo under a load, and where to inject power.", "snakewalk.controller.bench.commands.cable_drop:power"),
+    ("command", "setup", "Set up a new chain of servos, step by step, up to its first motion.", "snakewalk.controller.bench.commands.setup:setup"),
     ("command", "stop", "Stop a run at once; without a run, switch off the servos of a port.", "snakewalk.controller.bench.commands.stop:stop"),
     ("command", "tools compile", "Compile all loops once, after installation, so that no later command waits for it.", "snakewalk.controller.bench.commands.compile_all:compile_all"),
 )

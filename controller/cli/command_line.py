@@ -21,7 +21,19 @@ EVERY_DAY: Final = "Every day"
 SUBJECTS: Final = "By subject"
 OTHERS: Final = "Other packages"
 """Groups of ``snakewalk --help``; a command of another package may name its own."""
-VERBS: Final = ("demo", "init", "list", "plan", "run", "play", "stop", "view", "doctor", "trials")
+VERBS: Final = (
+    "demo",
+    "setup",
+    "init",
+    "list",
+    "plan",
+    "run",
+    "play",
+    "stop",
+    "view",
+    "doctor",
+    "trials",
+)
 """First words of the group ``EVERY_DAY``, in their order."""
 FAMILIES: Final = {
     "trials": "Many runs",

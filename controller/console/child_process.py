@@ -49,6 +49,21 @@ def start_module(module: str, *arguments: str) -> "subprocess.Popen[str]":
     )
 
 
+def run_command(words: Sequence[str]) -> int:
+    """Run a command of this program in the same terminal and return its exit code.
+
+    Ctrl-C is left to the command, which ends as it would alone.
+    """
+    code = "from snakewalk.controller.cli.main import main; main()"
+    before = signal.getsignal(signal.SIGINT)
+    with subprocess.Popen([sys.executable, "-c", code, *words], env=child_environ()) as child:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            return child.wait()
+        finally:
+            signal.signal(signal.SIGINT, before)
+
+
 def run_code(
     code: str, *arguments: str, folder: Path | None = None, timeout_s: float | None = None
 ) -> "subprocess.CompletedProcess[str]":

@@ -20,7 +20,7 @@ from snakewalk.controller.console.result_files import atomic_write
 
 @command(
     "bus inventory",
-    examples=("bus inventory", "bus inventory --baud 1000000 -o mine.toml"),
+    examples=("bus inventory", "bus inventory --axes yp -o mine.toml"),
     results=("out",),
 )
 def bus_identify(
@@ -29,12 +29,21 @@ def bus_identify(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="write a first robot file here (.toml)")
     ] = None,
+    axes: Annotated[
+        str,
+        typer.Option(
+            help="axes of the joints from the head: y turns about the vertical, p lifts; a short "
+            "word repeats, e.g. yp"
+        ),
+    ] = "y",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """List the servos on the wire: models, IDs, firmware, faults; suggest a robot file."""
     if out is not None and out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
+    if not axes or set(axes) - {"y", "p"}:
+        raise InputError(f"--axes {axes}: expected the letters y and p, e.g. yp")
     scan.check_bauds(baud or ())
     with open_lines(port, baud[0] if baud else DEFAULT_BAUD) as lines:
         entries = [
@@ -54,7 +63,7 @@ def bus_identify(
             for line, _ in lines.lines
         ]
         text = inventory.robot_skeleton(
-            out.stem, [entry for _, entry in entries], segments if lines.several else ()
+            out.stem, [entry for _, entry in entries], segments if lines.several else (), axes=axes
         )
         with atomic_write(out) as part:
             part.write_text(text, encoding="utf-8")
@@ -78,5 +87,5 @@ def bus_identify(
     console.print(table)
     if out is not None:
         console.print(
-            f"robot {out}: set its joint_axes, then: snakewalk bus calibrate --robot {out}"
+            f"robot {out}: check its joint_axes, then: snakewalk bus calibrate --robot {out}"
         )

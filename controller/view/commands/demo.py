@@ -9,7 +9,7 @@ from typing import Final
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_loops
-from snakewalk.controller.console.child_process import child_environ, start
+from snakewalk.controller.console.child_process import run_command, start
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
 from snakewalk.controller.console.progress import ProgressBar
@@ -48,9 +48,7 @@ def demo(view_at: ViewAt = VIEW_AT) -> None:
 
     play(page, WallClock(), wants_live)
     page.server.stop()
-    words = [*_LIVE.split(), "--view-at", view_at]
-    code = "from snakewalk.controller.cli.main import main; main()"
-    os.execve(sys.executable, [sys.executable, "-c", code, *words[1:]], child_environ())
+    raise SystemExit(run_command([*_LIVE.split()[1:], "--view-at", view_at]))
 
 
 def _compile_behind() -> None:

@@ -1,0 +1,205 @@
+"""The way from a new chain of servos to its first motion, step by step."""
+
+import importlib.util
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import typer
+
+from snakewalk.config.archive import read_json_object
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.result_files import atomic_write
+
+_GAIT: Final = "lateral-undulation"
+_GENTLE: Final = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
+"""Options of the first motion: slow, and with little torque (ours)."""
+_DEAD_RECKONED: Final = 3
+"""Exit code of a run that did what it should, without a measured pose."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFiles:
+    """The files of one robot, its port, its pose source and its axes."""
+
+    folder: Path
+    port: str
+    axes: str = ""
+    pose: str = ""
+
+    @property
+    def first_robot(self) -> Path:
+        """Robot file of the servos on the bus."""
+        return self.folder / "found.toml"
+
+    @property
+    def robot(self) -> Path:
+        """Robot file with order, directions and zeros."""
+        return self.folder / "robot.toml"
+
+    def on_port(self, *words: str) -> list[str]:
+        """Return words of a command on the robot's port."""
+        return [*words, "--port", self.port]
+
+
+@dataclass(frozen=True, slots=True)
+class SetupStep:
+    """One step: its purpose, and the command that does it."""
+
+    name: str
+    purpose: str
+    words: Callable[[RobotFiles], list[str]]
+    if_skipped: str = ""
+    """The assumption that replaces this step."""
+
+
+def _find(files: RobotFiles) -> list[str]:
+    axes = ("--axes", files.axes) if files.axes else ()
+    return files.on_port("bus", "inventory", *axes, "-o", str(files.first_robot), "--force")
+
+
+def _examine(files: RobotFiles) -> list[str]:
+    return files.on_port("doctor", "--robot", str(files.first_robot))
+
+
+def _calibrate(files: RobotFiles) -> list[str]:
+    begun = files.robot.with_name(f"{files.robot.name}.part").exists()
+    again = "--resume" if begun else "--force"
+    robot = ("--robot", str(files.first_robot), "-o", str(files.robot), again)
+    return files.on_port("bus", "calibrate", *robot)
+
+
+def _limits(files: RobotFiles) -> list[str]:
+    return ["gait", "show", _GAIT, "--robot", str(files.robot)]
+
+
+def _motion(files: RobotFiles, folder: str) -> list[str]:
+    robot = ("--robot", str(files.robot), "--seconds", "10", *_GENTLE)
+    return ["gait", "run", _GAIT, *robot, "-o", str(files.folder / folder), "--force", "--no-film"]
+
+
+def _rehearse(files: RobotFiles) -> list[str]:
+    return _motion(files, "rehearsal")
+
+
+def _pose(files: RobotFiles) -> list[str]:
+    return ["pose", "check", files.pose, "--robot", str(files.robot)] if files.pose else []
+
+
+def _move(files: RobotFiles) -> list[str]:
+    page = ["--view"] if importlib.util.find_spec("viser") else []
+    return [*files.on_port(*_motion(files, "first-motion")), *page]
+
+
+STEPS: Final = (
+    SetupStep("find", "Find the servos: models, IDs, baud rates. Changes nothing.", _find),
+    SetupStep("examine", "Examine adapter, bus and servos. Changes nothing.", _examine),
+    SetupStep(
+        "calibrate",
+        "Find order, directions and zeros. HANG THE BODY UP: each servo moves weakly.",
+        _calibrate,
+        "the order of the joints is that of the IDs, every direction is +1, every zero is 0",
+    ),
+    SetupStep("limits", "Compute angles and speeds of the first motion. Nothing moves.", _limits),
+    SetupStep("rehearse", "The same motion with simulated servos and real packets.", _rehearse),
+    SetupStep("pose", "Check the external pose. Nothing moves.", _pose),
+    SetupStep(
+        "move",
+        "FIRST MOTION: 10 s, slow, little current. Hang the body up; a hand on the supply's "
+        "switch. Ctrl-C or `snakewalk stop` switches torque off.",
+        _move,
+    ),
+)
+
+
+class GuidedSetup:
+    """Asks before each step, runs its command, and remembers in the folder which are done."""
+
+    def __init__(
+        self,
+        folder: Path,
+        port: str | None,
+        ask: Callable[[str], str],
+        run: Callable[[Sequence[str]], int],
+    ) -> None:
+        """Read the state of an earlier setup.
+
+        Args:
+            folder: of the robot's files; it is created.
+            port: of the servos; None: that of the earlier setup, or of a question.
+            ask: asks a person and returns the answer.
+            run: runs a command of this program and returns its exit code.
+
+        """
+        self._ask, self._run = ask, run
+        self._file = folder / "setup.json"
+        state = read_json_object(self._file) if self._file.exists() else {}
+        self._done = list(state.get("done", ()))
+        device = port or state.get("port") or ask("port of the servos, e.g. /dev/ttyUSB0")
+        self.files = RobotFiles(folder, device)
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def carry_on(self) -> None:
+        """Do the steps that are left.
+
+        Raises:
+            SystemExit: the person stops; with the exit code of the last command of the step.
+            InputError: a step was skipped that the others need.
+
+        """
+        for number, step in enumerate(STEPS, 1):
+            if step.name in self._done:
+                continue
+            typer.echo(f"\n{number} of {len(STEPS)}  {step.purpose}")
+            if step.name == "pose":
+                question = "source, e.g. udp:9870 or ros:/pose; Enter: none, dead reckoning"
+                self.files = replace(self.files, pose=self._ask(question))
+            if step.name == "find":
+                self.files = replace(self.files, axes=self._axes())
+            self._do(step)
+            self._done.append(step.name)
+            text = json.dumps({"port": self.files.port, "done": self._done})
+            with atomic_write(self._file) as part:
+                part.write_text(f"{text}\n", encoding="utf-8")
+
+    def _do(self, step: SetupStep) -> None:
+        """Run the step's command until it succeeds, is skipped, or the person stops."""
+        code = 0
+        words = step.words(self.files)
+        while words:
+            typer.echo(f"  snakewalk {' '.join(words)}")
+            answer = self._ask("Enter: run it; s: skip; q: stop here").lower()
+            if answer.startswith("q"):
+                typer.echo(f"snakewalk setup {self.files.folder} goes on with this step", err=True)
+                raise SystemExit(code)
+            if answer.startswith("s"):
+                self._skip(step)
+                return
+            code = self._run(words)
+            if code in (0, _DEAD_RECKONED):
+                return
+            typer.echo(f"  exit code {code}: correct the faults above, then try again")
+            words = step.words(self.files)
+
+    def _skip(self, step: SetupStep) -> None:
+        first = self.files.first_robot
+        if step.name == "find" and not first.exists():
+            raise InputError(f"{first}: the other steps need this file; run this step first")
+        if step.name == "calibrate" and not self.files.robot.exists():
+            shutil.copyfile(first, self.files.robot)
+        if step.if_skipped:
+            typer.echo(f"  assumed: {step.if_skipped}")
+
+    def _axes(self) -> str:
+        """Ask for the axes, which no servo knows."""
+        while True:
+            word = self._ask(
+                "axes from the head: y turns about the vertical, p lifts; a short word repeats, "
+                "e.g. yp; Enter: all y"
+            )
+            if set(word) <= {"y", "p"}:
+                return word
+            typer.echo(f"  '{word}': only the letters y and p")

@@ -1,0 +1,173 @@
+"""``snakewalk setup``: its steps, its questions, and how it goes on after a stop."""
+
+import os
+import pty
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
+from snakewalk.controller.bench.guided_setup import STEPS, GuidedSetup, RobotFiles
+from snakewalk.sim.serve.servo_bus import ServoBus
+from tests.helpers.command import snakewalk
+
+COMMAND = "from snakewalk.controller.cli.main import main; main()"
+
+
+class Bench:
+    """A person who answers, and the commands that the setup ran."""
+
+    def __init__(self, folder: Path) -> None:
+        self.ran: list[list[str]] = []
+        self.answers: list[str] = []
+        self.codes: list[int] = []
+        self.folder = folder
+
+    def _run(self, words: Sequence[str]) -> int:
+        self.ran.append(list(words))
+        if list(words[:2]) == ["bus", "inventory"]:
+            (self.folder / "found.toml").write_text('name = "found"\njoint_axes = "ypyp"\n')
+        return self.codes.pop(0) if self.codes else 0
+
+    def sets_up(self, *answers: str) -> list[str]:
+        """First words of the commands that were run for these answers."""
+        self.ran.clear()
+        self.answers = list(answers)
+        GuidedSetup(
+            self.folder, "/dev/ttyUSB7", lambda question: self.answers.pop(0), self._run
+        ).carry_on()
+        assert not self.answers
+        return [" ".join(words[:2]) for words in self.ran]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path / "snake")
+
+
+WHOLE = ["bus inventory", "doctor --robot", "bus calibrate", "gait show", "gait run"]
+
+
+def test_it_leads_from_the_bus_to_a_motion(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ran = bench.sets_up("yp", "", "", "", "", "", "udp:9870", "", "")
+    assert ran == [*WHOLE, "pose check", "gait run"]
+    assert bench.ran[0][2:4] == ["--axes", "yp"]
+    said = capsys.readouterr().out
+    for words in bench.ran:  # what is run is what is shown
+        assert f"snakewalk {' '.join(words)}" in said
+    for words in bench.ran:
+        if words[0] in ("bus", "doctor") or words is bench.ran[-1]:
+            assert words[words.index("--port") + 1] == "/dev/ttyUSB7"
+    rehearsal = bench.ran[4]
+    assert "--port" not in rehearsal
+    assert bench.sets_up() == []  # all of it is done
+
+
+def test_it_stops_at_any_question_and_goes_on_there(bench: Bench) -> None:
+    with pytest.raises(SystemExit) as stop:
+        bench.sets_up("", "", "", "q")
+    assert stop.value.code == 0
+    assert bench.sets_up("", "", "", "", "s") == ["bus calibrate", "gait show", "gait run"]
+
+
+def test_a_command_that_fails_is_tried_again_or_left(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.codes = [0, 1, 0]
+    with pytest.raises(SystemExit):
+        bench.sets_up("", "", "", "", "q")
+    assert [words[0] for words in bench.ran] == ["bus", "doctor", "doctor"]
+    bench.codes = [2]
+    with pytest.raises(SystemExit) as stop:
+        bench.sets_up("", "q")
+    assert stop.value.code == 2
+    assert "exit code 2: correct the faults above" in capsys.readouterr().out
+
+
+def test_a_skipped_calibration_says_what_is_assumed(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.sets_up("", "", "s", "s", "s", "s", "", "s")
+    assert "assumed: the order of the joints is that of the IDs" in capsys.readouterr().out
+    assert load_robot(str(bench.folder / "robot.toml")).joint_axes == "ypyp"
+
+
+def test_an_interrupted_calibration_is_resumed(bench: Bench) -> None:
+    bench.folder.mkdir()
+    (bench.folder / "robot.toml.part").write_text("")
+    bench.sets_up("", "", "s", "", "s", "s", "", "s")
+    assert bench.ran[1][-3:] == ["--resume", "--port", "/dev/ttyUSB7"]
+
+
+def test_wrong_axes_are_asked_again_and_a_missing_file_ends_it(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(InputError, match="the other steps need this file"):
+        bench.sets_up("yaw", "y", "s")
+    assert "'yaw': only the letters y and p" in capsys.readouterr().out
+
+
+def test_without_a_terminal_it_says_so(tmp_path: Path) -> None:
+    code, _, said = snakewalk("setup", str(tmp_path))
+    assert code == 2
+    assert "a terminal is missing" in said
+
+
+def test_each_command_of_it_exists() -> None:
+    state = RobotFiles(Path("snake"), "/dev/ttyUSB7", pose="udp:9870")
+    for step in STEPS:
+        words = step.words(state)
+        group = " ".join(words[: 1 if words[0] == "doctor" else 2])
+        code, help_text, _ = snakewalk(*group.split(), "--help")
+        assert code == 0
+        for word in words:
+            if word.startswith("-"):
+                assert word in help_text, shlex.join(words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("servos", ["11-14:XL330-M288"])
+def test_a_chain_with_ids_of_its_own(
+    servos: str, tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus(servos)
+    answers = ["", "", "s", "s", "", "", "", "q"]
+    text, code = typed(tmp_path, ["setup", "snake", "--port", bus.path], answers)
+    assert code == 0, text
+    assert "7 of 7" in text
+    assert load_robot(str(tmp_path / "snake" / "robot.toml")).servo_ids == (11, 12, 13, 14)
+    assert (tmp_path / "snake" / "rehearsal" / "report.html").exists()
+    assert bus["Torque Enable"].tolist() == [0] * 4
+
+
+def typed(folder: Path, words: list[str], answers: list[str]) -> tuple[str, int]:
+    """Run the program in a terminal, answer its questions, and return its text and exit code."""
+    ours, theirs = pty.openpty()
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "dumb"}
+    environment |= {"XDG_RUNTIME_DIR": str(folder)}
+    streams: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
+    text = ""
+    asked = 0
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *words], cwd=folder, env=environment, **streams
+    ) as child:
+        os.close(theirs)
+        while True:
+            try:
+                text += os.read(ours, 4096).decode(errors="replace")
+            except OSError:  # the program has ended
+                break
+            if text[asked:].endswith(": ") and answers:
+                asked = len(text)
+                os.write(ours, f"{answers.pop(0)}\n".encode())
+        code = child.wait()
+    os.close(ours)
+    return text, code
