@@ -17,7 +17,7 @@ from rich.table import Table
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.pose import TrackerConfig
-from snakewalk.controller.pose.sample import ArrivedPose, PoseSample
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, quaternion_of, rotation_of
 from snakewalk.controller.rehearsal import rehearsal
 from snakewalk.drivers.attitude import rotation_by
 
@@ -73,9 +73,69 @@ def mirrored(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample
     return replace(sample, position_m=place_m, rotation=mirror @ sample.rotation @ mirror)
 
 
+def exchanged(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
+    """X and y exchanged in places and attitudes."""
+    swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    rotation = swap @ sample.rotation @ swap
+    return replace(sample, position_m=swap @ sample.position_m, rotation=rotation)
+
+
 def identity(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
     """The attitude of the first pose in all poses."""
     return replace(sample, rotation=first.rotation)
+
+
+def rotated(about: list[float], angle_deg: float, *, places: bool = True) -> Change:
+    """A frame that is turned about an axis; ``places`` False: of the attitudes only."""
+    turn = rotation_by(np.radians(angle_deg) * np.array(about))
+
+    def change(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
+        place_m = turn @ sample.position_m if places else sample.position_m
+        return replace(sample, position_m=place_m, rotation=turn @ sample.rotation)
+
+    return change
+
+
+def of_quaternion(order: Callable[[list[float]], list[float]]) -> Change:
+    """Attitudes whose quaternion (w, x, y, z) is changed."""
+
+    def change(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
+        wxyz = order(list(quaternion_of(sample.rotation)))
+        return replace(sample, rotation=rotation_of(wxyz))
+
+    return change
+
+
+def flipping(axis: list[float], angle_deg: float, share: float) -> Change:
+    """A share of the attitudes is turned about an axis of the body, in runs of 0.2 s."""
+    turn = rotation_by(np.radians(angle_deg) * np.array(axis))
+
+    def change(sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
+        if np.random.default_rng(int(5.0 * time_s)).random() > share:
+            return sample
+        return replace(sample, rotation=sample.rotation @ turn)
+
+    return change
+
+
+def stamped(stamp_s: Callable[[float, float], float]) -> Change:
+    """Other stamps, of the true one and the time since the first."""
+    return lambda sample, first, time_s: replace(sample, time_s=stamp_s(sample.time_s, time_s))
+
+
+@dataclass
+class FrozenAfter:
+    """The same pose again and again from a time on."""
+
+    after_s: float
+    kept: PoseSample | None = None
+
+    def __call__(self, sample: PoseSample, first: PoseSample, time_s: float) -> PoseSample:
+        """Return the pose that is sent."""
+        if time_s < self.after_s:
+            return sample
+        self.kept = self.kept or sample
+        return replace(self.kept, sequence=sample.sequence, time_s=sample.time_s)
 
 
 @dataclass
@@ -115,7 +175,63 @@ KINDS: Final[dict[str, Callable[[], Change]]] = {
     "one attitude": lambda: identity,
     "another body": lambda: StillAfter(0.0),
     "a marker falls off": lambda: StillAfter(FALL_S),
+    "y axis up": lambda: rotated([1.0, 0.0, 0.0], -90.0),
+    "y axis up, of attitudes only": lambda: rotated([1.0, 0.0, 0.0], -90.0, places=False),
+    "x and y exchanged": lambda: exchanged,
+    "quaternion x, y, z, w": lambda: of_quaternion(lambda q: [q[1], q[2], q[3], q[0]]),
+    "inverse quaternion": lambda: of_quaternion(lambda q: [q[0], -q[1], -q[2], -q[3]]),
+    "y of the quaternion inverted": lambda: of_quaternion(lambda q: [q[0], q[1], -q[2], q[3]]),
+    "tag flips, 1 of 5": lambda: flipping([1.0, 0.0, 0.0], 40.0, 0.2),
+    "tag flips by 180, 1 of 20": lambda: flipping([1.0, 0.0, 0.0], 180.0, 0.05),
+    "times 0.6": lambda: scaled(0.6),
+    "times 1.6": lambda: scaled(1.6),
+    "scale grows by 1 % a second": lambda: (
+        lambda sample, first, time_s: scaled(1.0 + 0.01 * time_s)(sample, first, time_s)
+    ),
+    "1 cm to the side": lambda: moved(lambda time_s: [0.0, 0.01, 0.0]),
+    "0.2 m to the side": lambda: moved(lambda time_s: [0.0, 0.2, 0.0]),
+    "17 m too high": lambda: moved(lambda time_s: [0.0, 0.0, 17.0]),
+    "3 cm off by place": lambda: (
+        lambda sample, first, time_s: replace(
+            sample, position_m=sample.position_m + 0.03 * np.sin(4.0 * sample.position_m[::-1])
+        )
+    ),
+    "frozen after 12 s": lambda: FrozenAfter(FALL_S),
+    "huge numbers after 12 s": lambda: moved(lambda time_s: [4e27 * (time_s > FALL_S), 0.0, 0.0]),
+    "stamps in milliseconds": lambda: stamped(lambda stamp_s, time_s: 1000.0 * stamp_s),
+    "one stamp": lambda: stamped(lambda stamp_s, time_s: stamp_s - time_s),
+    "stamps 1 % fast": lambda: stamped(lambda stamp_s, time_s: stamp_s + 0.01 * time_s),
 }
+_GITHUB = "https://github.com/"
+REPORTS: Final[dict[str, str]] = {
+    "turned by 90.0": f"{_GITHUB}USC-ACTLab/crazyswarm/issues/21",
+    "times 0.6": f"{_GITHUB}rpng/open_vins/issues/113",
+    "times 1.6": f"{_GITHUB}rpng/open_vins/issues/113",
+    "times 1.1": f"{_GITHUB}ethz-asl/rovio/issues/194",
+    "times 1000.0": f"{_GITHUB}MOCAP4ROS2-Project/mocap4ros2_vicon/pull/17",
+    "scale grows by 1 % a second": f"{_GITHUB}raulmur/ORB_SLAM2/issues/71",
+    "drift of 2 cm/s": f"{_GITHUB}pushrax/OpenVR-SpaceCalibrator/issues/41",
+    "drift of 2 cm/s after 10 s": f"{_GITHUB}collabora/libsurvive/issues/362",
+    "a step of 0.2 m": f"{_GITHUB}ValveSoftware/steamvr_unity_plugin/issues/1013",
+    "1 cm to the side": f"{_GITHUB}ValveSoftware/SteamVR-for-Linux/issues/167",
+    "17 m too high": f"{_GITHUB}asymingt/libsurvive_ros2/issues/20",
+    "left-handed": f"{_GITHUB}crigroup/optitrack/issues/1",
+    "y axis up": f"{_GITHUB}ros-drivers/mocap_optitrack/pull/56",
+    "y axis up, of attitudes only": f"{_GITHUB}tud-phi/ros2-mocap_optitrack/issues/9",
+    "x and y exchanged": f"{_GITHUB}MOCAP4ROS2-Project/mocap4ros2_optitrack/issues/39",
+    "quaternion x, y, z, w": f"{_GITHUB}DFKI-NI/mobipick/issues/4",
+    "inverse quaternion": f"{_GITHUB}ethz-asl/ethzasl_msf/issues/132",
+    "y of the quaternion inverted": f"{_GITHUB}ros-drivers/mocap_optitrack/issues/33",
+    "tag flips, 1 of 5": f"{_GITHUB}AprilRobotics/apriltag/issues/71",
+    "tag flips by 180, 1 of 20": f"{_GITHUB}UbiquityRobotics/fiducials/issues/223",
+    "3 cm off by place": f"{_GITHUB}AprilRobotics/apriltag_ros/issues/160",
+    "frozen after 12 s": f"{_GITHUB}styly-dev/STYLY-NetSync/pull/474",
+    "huge numbers after 12 s": f"{_GITHUB}NVIDIA-ISAAC-ROS/isaac_ros_visual_slam/issues/9",
+    "stamps in milliseconds": f"{_GITHUB}USC-ACTLab/libmotioncapture/pull/4",
+    "one stamp": f"{_GITHUB}ros-drivers/mocap_optitrack/issues/22",
+    "stamps 1 % fast": f"{_GITHUB}KTH-SML/motion_capture_system/issues/3",
+}
+"""Public reports of such errors."""
 
 
 class WrongSource:
