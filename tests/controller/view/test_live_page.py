@@ -134,6 +134,16 @@ class View:
 
     _end = property(lambda self: self.end)
 
+    def close(self) -> None:
+        self.page._server.stop()
+
+    def sent(self) -> Iterator[tuple[str, Any]]:
+        """Rows that the page receives when it asks."""
+        end = self.page._end
+        end.ask()
+        self.end.pump()
+        return end.rows(1.0)
+
     def shown(self, what: str) -> str:
         return re.sub("<[^>]*>", " ", getattr(self.page._dashboard, what).content)
 
@@ -164,7 +174,7 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
         )
     )
     view.page.step()
-    view.page._server.stop()
+    view.close()
     assert finished.outcome.tripped == "stop requested by E-STOP of the page"
     assert len(seen) == 41  # the cycle in which it latched
     said = view.page._stop._state
@@ -203,7 +213,7 @@ def test_what_is_set_in_the_page_changes_the_gait(
             on_progress=on_progress,
         )
     )
-    view.page._server.stop()
+    view.close()
     said = [event.text for event in finished.record.events if event.kind == "operator"]
     assert said == ["frequency_hz = 0.3"]
 
@@ -244,7 +254,7 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
             on_progress=on_progress,
         )
     )
-    view.page._server.stop()
+    view.close()
     assert finished.outcome.tripped == "stop requested by E-STOP of a gamepad"
     events = [each for each in finished.record.events if each.kind == "operator"]
     let_go, held = "let go: it stands in its shape", "held: it moves"
@@ -307,7 +317,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
             on_progress=on_progress,
         )
     )
-    view.page._server.stop()
+    view.close()
     assert finished.outcome.complete
     assert finished.outcome.waypoints == 2
     record = finished.record
@@ -381,9 +391,7 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     def shown_at(time_s: float, image: Image) -> Image | None:
         view.on_picture(image[..., ::-1], time_s)
         view.on_row("/pose", b"{}")
-        view.page._end.ask()
-        view.end.pump()
-        for topic, row in view.page._end.rows(1.0):
+        for topic, row in view.sent():
             if topic == "/picture":
                 view.page._take(topic, row)
         assert view.page._dashboard is not None
@@ -396,7 +404,7 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     assert np.array_equal(shown_at(1.3, colour // 2), first)
     assert shown_at(1.6, colour // 2).mean() < 0.6 * first.mean()  # type: ignore[union-attr]
     assert cv2 is not None
-    view.page._server.stop()
+    view.close()
 
 
 def test_a_picture_is_sent_once_before_the_next_pose() -> None:
@@ -406,10 +414,8 @@ def test_a_picture_is_sent_once_before_the_next_pose() -> None:
     sent = []
     for _ in range(2):
         view.on_row("/pose", b"{}")
-        view.page._end.ask()
-        view.end.pump()
-        sent.append([topic for topic, _ in view.page._end.rows(1.0)])
-    view.page._server.stop()
+        sent.append([topic for topic, _ in view.sent()])
+    view.close()
     assert sent == [["/picture", "/pose"], ["/pose"]]
 
 
