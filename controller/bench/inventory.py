@@ -97,7 +97,7 @@ def robot_skeleton(
     volts = sorted(entry.report.voltage_v for entry in chain if entry.report is not None)
     servo: dict[str, object] = {"model": model, "baud": baud}
     if volts:
-        servo["supply_v"] = volts[len(volts) // 2]
+        servo["supply_v"] = round(volts[len(volts) // 2], 3)
     joints: list[dict[str, object]] = []
     for entry, axis in zip(chain, cycle(axes), strict=False):
         model_key = {} if entry.found.model == model else {"model": entry.found.model}

@@ -116,9 +116,7 @@ def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
     if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
         return Finding("response time", "ok", response_text)
     response_text += ": each cycle of a run is longer by that time"
-    remedy = (
-        "the adapter's latency timer, a USB hub, a serial server in between; or a busy computer"
-    )
+    remedy = "set the adapter's latency timer to 1 ms; else a USB hub, a server or a busy computer"
     return Finding("response time", "warn", response_text, remedy)
 
 

@@ -105,10 +105,11 @@ def _missing_remedy(
             f"if servo {others[0]} is meant: snakewalk bus set --port {port} --id {others[0]} "
             f"--new-id {missing[0]}"
         )
-    if len(others) >= len(missing):
+    if len(others) >= len(missing) or (others and len(missing) == len(expected)):
         return (
-            f"{shown_subject(others, 'reply')} instead: this chain is not calibrated; snakewalk "
-            f"bus calibrate --port {port} -o my-robot.toml finds the joint of each servo"
+            f"{shown_subject(others, 'reply')} instead: snakewalk bus inventory --port {port} -o "
+            "my-robot.toml writes a robot file with their IDs, and bus calibrate finds the joint "
+            "of each"
         )
     if len(missing) == len(expected):
         return "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"

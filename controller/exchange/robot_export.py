@@ -197,6 +197,10 @@ def mjcf_text(
 
     world = WorldConfig(name="floor")
     root = ET.fromstring(body.mjcf(robot, world, None, plant.FLOOR_STEP_S))  # our own text
+    limits = dict(zip(robot.joint_names, robot.limit_rad, strict=True))
+    for joint in root.iter("joint"):  # the simulator's stops are beyond the limits
+        if (name := joint.get("name")) in limits:
+            joint.set("range", f"{-limits[name]!r} {limits[name]!r}")
     _add_friction(root, robot, world.friction, contact)
     if actuators is not None:
         _add_dc_motors(root, robot)

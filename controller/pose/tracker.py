@@ -17,6 +17,10 @@ from snakewalk.drivers.types import BodyPose
 FRAME = "world"
 
 
+_KEPT_S = 1.0
+"""Longest time for which a datagram waits for its reader (ours)."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sent:
     """A datagram of a tracker."""
@@ -69,6 +73,8 @@ class SimulatedTracker:
             FRAME,
             self._covariance(),
         )
+        while self._outgoing and self._outgoing[0].due_s < now_s - _KEPT_S:
+            self._outgoing.popleft()  # nothing asks for them
         self._outgoing.append(Sent(now_s + delay_s, encode_pose(sample)))
         return sequence, now_s + delay_s
 

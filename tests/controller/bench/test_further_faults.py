@@ -361,8 +361,8 @@ def test_a_chain_with_other_ids_is_sent_to_calibrate() -> None:
     line = TestLine()
     moved_ids(line)
     remedy = check(doctor(line), "servo IDs").remedy
-    assert "not calibrated" in remedy
-    assert "snakewalk bus calibrate --port simulated line -o my-robot.toml" in remedy
+    assert "snakewalk bus inventory --port simulated line -o my-robot.toml" in remedy
+    assert "bus calibrate" in remedy
     assert "cable" not in remedy
 
 

@@ -19,8 +19,9 @@ MODELS = {21: "XM430-W350", 7: "XM430-W350", 3: "XM430-W210"}
 
 
 @pytest.fixture
-def line(monkeypatch: pytest.MonkeyPatch) -> SimLine:
-    made = SimLine(ServoBank(list(MODELS), list(MODELS.values())), BenchPlant(3))
+def line(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> SimLine:
+    models = getattr(request, "param", MODELS)
+    made = SimLine(ServoBank(list(models), list(models.values())), BenchPlant(len(models)))
     made.latency_s = 0.0  # type: ignore[attr-defined]
 
     @contextmanager
@@ -69,3 +70,11 @@ def test_an_empty_wire_is_told(monkeypatch: pytest.MonkeyPatch, line: SimLine) -
     error = call().exception
     assert isinstance(error, InputError)
     assert "nobody answers" in str(error)
+
+
+@pytest.mark.parametrize("line", [{1: "XL430-W250", 2: "XL430-W250"}], indirect=True)
+def test_a_voltage_has_the_digits_that_the_servo_measures(line: SimLine, tmp_path: Path) -> None:
+    """It was 11.100000000000001."""
+    file = tmp_path / "mine.toml"
+    assert call("-o", file).exit_code == 0
+    assert "supply_v = 11.1\n" in file.read_text()

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.loader import load_robot
+from snakewalk.config.loader import load_robot, shipped
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
@@ -123,6 +123,22 @@ def test_what_is_exported_comes_back(tmp_path: Path, robot: RobotConfig) -> None
         np.testing.assert_allclose(made.robot.link_lengths_m, robot.link_lengths_m, atol=1e-9)
         np.testing.assert_allclose(made.robot.link_masses_kg, robot.link_masses_kg, atol=1e-9)
         assert made.kinematics_error_m < 1e-9
+
+
+CHAINS = [robot for robot in map(load_robot, shipped("robots")) if not robot.limbs]
+
+
+@pytest.mark.parametrize("robot", CHAINS, ids=lambda each: each.name)
+def test_a_shipped_robot_keeps_its_limits_through_a_file(
+    tmp_path: Path, robot: RobotConfig
+) -> None:
+    """The stops of the simulator, 0.1 rad beyond the limits, were in the file."""
+    limits = robot.limit_rad
+    file = tmp_path / "model.xml"
+    for _ in range(2):
+        file.write_text(mjcf_text(robot))
+        robot = import_robot(file, robot.name, robot.servo.model).robot
+        np.testing.assert_allclose(robot.limit_rad, limits, atol=1e-6)
 
 
 def test_anchors_beside_the_line_but_on_their_axes_make_no_difference(tmp_path: Path) -> None:
