@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
-from snakewalk.config.loader import load
+from snakewalk.config.loader import checked, load
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.faults.fault_player import FaultPlayer
+from snakewalk.sim.feetech.decode import decoder_for
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain, parse_imu
 from snakewalk.sim.serve.pty import PtyServer
@@ -22,6 +23,7 @@ from snakewalk.sim.serve.register_access import (
     set_load,
     set_register,
 )
+from snakewalk.sim.sniff.decode import DecodedPacket
 
 _BUSY_MS = 10.0
 """Lateness that a client with short time-outs notices (ours)."""
@@ -32,7 +34,7 @@ class ServoBus:
 
     def __init__(
         self,
-        servos: str = "1-4",
+        servos: str | Sequence[int] = "1-4",
         *,
         baud: int = 1_000_000,
         faults: str | Path | FaultPlan | None = None,
@@ -40,11 +42,17 @@ class ServoBus:
         imu: str | None = None,
     ) -> None:
         device = None if imu is None else parse_imu(imu)
-        self.line = bench_line(parse_chain(servos), baud, start_rad, device)
+        chain = parse_chain(servos if isinstance(servos, str) else ",".join(map(str, servos)))
+        self.line = bench_line(chain, baud, start_rad, device)
         """The bus as a port in simulated time."""
-        if faults is not None:
-            plan = faults if isinstance(faults, FaultPlan) else load(Path(faults), FaultPlan)
-            FaultPlayer(self.line, plan)
+        plan = load(Path(faults), FaultPlan) if isinstance(faults, str | Path) else faults
+        self._faults = None if plan is None else FaultPlayer(self.line, plan)
+        self.packets: list[DecodedPacket] = []
+        """Requests and replies so far, decoded."""
+        records = dict(zip(chain.ids, chain.records(), strict=True))
+        decoder = decoder_for(records[chain.ids[0]], records)
+        self.line.taps.append(lambda at_s, _, data: self.packets.extend(decoder.feed(at_s, data)))
+        self._baud = baud
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -100,12 +108,34 @@ class ServoBus:
         """
         self._do(lambda: set_load(self.line, self._rows(ids), load_n_m))
 
+    def fault(self, kind: str, **keys: object) -> None:
+        """Begin a fault of a fault file now: ``fault("mute", ids=[3], for_s=2.0)``.
+
+        Raises:
+            ConfigError: the kind or a key is unknown, or the bus lacks a servo.
+
+        """
+        plan = checked(FaultPlan, {"fault": [{"kind": kind, **keys}]}, "fault")
+
+        def begin() -> None:
+            if self._faults is None:
+                self._faults = FaultPlayer(self.line, FaultPlan())
+            self._faults.add(plan, "fault")
+
+        self._do(begin)
+
     @property
     def lateness(self) -> str | None:
         """Delay of the bus as one line; None before ``path`` was read."""
         server = self._server
         if server is None:
             return None
+        rate = self.line.getBaudRate()
+        if rate != self._baud:
+            return (
+                f"bus.path: the client uses {rate} baud, the servos {self._baud}; open the port at "
+                f"{self._baud}, or make the bus by servo_bus(..., baud={rate})"
+            )
         late_ms = server.latest_s * 1e3
         text = f"bus.path: served up to {late_ms:.0f} ms late; {server.missed_s:.2f} s left out"
         if late_ms < _BUSY_MS:

@@ -2,16 +2,19 @@
 
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.drivers.errors import ControlTableError
+from snakewalk.drivers.protocol.packet import InstructionPacket, encode_instruction
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import IDLE_S, LATE_S, PtyServer
 from snakewalk.sim.serve.pytest_plugin import _BUSES, pytest_runtest_makereport
@@ -105,6 +108,7 @@ def test_the_report_of_a_failed_test_states_how_late_the_bus_was(late_s: float) 
         server.latest_s = late_s
         item = SimpleNamespace(stash=pytest.Stash())
         item.stash[_BUSES] = [bus]
+        item.listchain = lambda: [item]
         report = SimpleNamespace(when="call", failed=True, sections=[])
         hook = pytest_runtest_makereport(item)  # type: ignore[arg-type]
         next(hook)
@@ -156,3 +160,63 @@ def test_the_fixture_imports_only_packages_of_the_light_install() -> None:
         "snakewalk.sim.serve.pytest_plugin",
     ]
     assert set(known) <= LIGHT
+
+
+@pytest.mark.parametrize("model", ["XM430-W350", "STS3215", "AX-12A"])
+def test_a_fault_begins_in_the_middle_of_a_test_and_ends(servo_bus: MakeBus, model: str) -> None:
+    bus = servo_bus(f"1-2:{model}")
+    bus.line.clock.advance(0.5)
+
+    def replies() -> bool:
+        instruction = bytes([0xFF, 0xFF, 2, 2, 1, 0xFA])
+        if model == "XM430-W350":
+            instruction = encode_instruction(InstructionPacket(2, 1))
+        bus.line.writePort(instruction)
+        bus.line.clock.advance(0.01)
+        return bool(bus.line.readPort(30))
+
+    assert replies()
+    bus.fault("mute", ids=[2], for_s=0.2)
+    assert not replies()
+    bus.line.clock.advance(0.3)
+    assert replies()
+    with pytest.raises(ConfigError, match="fault"):
+        bus.fault("mutes")
+
+
+def test_packets_are_recorded_and_reported(servo_bus: MakeBus) -> None:
+    bus = servo_bus([3, 5])
+    bus.line.writePort(encode_instruction(InstructionPacket(5, 2, bytes([11, 0, 1, 0]))))
+    bus.line.clock.advance(0.01)
+    bus.line.readPort(30)
+    assert [(p.kind, p.servo_id, p.values) for p in bus.packets] == [
+        ("question", 5, {"Operating Mode": "?"}),
+        ("answer", 5, {"Operating Mode": 3}),
+    ]
+
+
+def test_the_report_names_a_client_with_another_baud_rate(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1", baud=57_600)
+    assert bus.path
+    bus.line.setBaudRate(115_200)
+    assert bus.lateness is not None
+    assert "the client uses 115200 baud, the servos 57600" in bus.lateness
+
+
+def test_a_module_shares_its_bus(module_servo_bus: MakeBus) -> None:
+    assert module_servo_bus("1-2")["ID"].tolist() == [1, 2]
+
+
+PAGE = (Path(__file__).resolve().parents[3] / "docs/start/ci.md").read_text(encoding="utf-8")
+FIVE = next(part.partition("```")[0] for part in PAGE.split("```python") if "PacketHandler" in part)
+
+
+@pytest.mark.parametrize("name", re.findall(r"^def (test_\w+)", FIVE, re.MULTILINE))
+def test_the_tests_of_the_page_pass(servo_bus: MakeBus, name: str) -> None:
+    names: dict[str, Callable[[MakeBus], None]] = {}
+    exec(FIVE, names)
+    names[name](servo_bus)
+
+
+def test_the_page_has_five_tests() -> None:
+    assert FIVE.count("def test_") == 5
