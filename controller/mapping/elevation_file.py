@@ -99,6 +99,11 @@ def _question(finite: Floats, value: float, per_value_m: float, why: str, key: s
     )
 
 
+_FEW_SHARE: Final = 0.2
+"""Share of points that may be outliers (ours)."""
+_SAME_PLACE: Final = 1e-7
+_EVEN_STEP: Final = 0.01
+"""Shares of a length in which places, and of a step in which steps, are the same (ours)."""
 LASERS: Final = (".las", ".laz")
 CLOUDS: Final = (".pcd", ".ply", ".xyz", *LASERS)
 MESHES: Final = (".obj", ".stl", ".glb")
@@ -286,17 +291,18 @@ def _of_points(
             points_m = points_m[finite]
     if len(points_m) == 0:
         raise InputError(f"{file}: holds no point")
+    if faces is None and options.classes is None:
+        points_m = _without_outliers(file, points_m, options.assumed, notes)
     _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
     placed, low, high = _cropped(file, points_m, options.crop, is_mesh=faces is not None)
     size = high - low
     kind = "points" if faces is None else "triangles"
     spacing_m = options.spacing_m
     if spacing_m is None:
-        per_cell = math.sqrt(_POINTS_A_CELL * float(size.prod()) / len(placed))
-        spacing_m = options.scale * (per_cell if faces is None else size.max() / _MESH_SAMPLES)
-        if spacing_m <= 0.0:
-            raise InputError(f"{file}: its points lie on a line, and span no ground")
-        spacing_m = float(f"{spacing_m:.2g}")
+        step_m = None if faces is not None else _grid_step(placed, size)
+        if step_m is not None:
+            notes.append(f"points lie on a grid of {step_m:.6g} m")
+        spacing_m = options.scale * (step_m or _usual_step(file, placed, size, faces))
     rise = options.rise
     scaled = placed * [options.scale, options.scale, rise]
     if faces is None:
@@ -309,6 +315,65 @@ def _of_points(
     relief_m = _relief(elevation.z_m) / rise
     whole_m = float(size[0]), float(size[1])
     return FileMap(elevation.centred(), whole_m, relief_m, kind, tuple(notes))
+
+
+def _usual_step(file: Path, placed_m: Floats, size_m: Floats, faces: Ints | None) -> float:
+    per_cell_m = math.sqrt(_POINTS_A_CELL * float(size_m.prod()) / len(placed_m))
+    step_m = per_cell_m if faces is None else float(size_m.max()) / _MESH_SAMPLES
+    if step_m <= 0.0:
+        raise InputError(f"{file}: its points lie on a line, and span no ground")
+    return float(f"{step_m:.2g}")
+
+
+def _grid_step(placed_m: Floats, size_m: Floats) -> float | None:
+    """Step of points (n, 3) from (0, 0) on a square grid that they fill by half; else None."""
+    steps_m = []
+    cells = 1
+    for places_m, length_m in zip(placed_m[:, :2].T, size_m, strict=True):
+        if length_m <= 0.0:
+            return None
+        numbers = np.unique(np.rint(places_m / (_SAME_PLACE * length_m)))
+        cells *= len(numbers)
+        step = np.diff(numbers)
+        if step.max() > (1.0 + _EVEN_STEP) * step.min():
+            return None
+        steps_m.append(float(length_m / len(step)))
+    is_square = max(steps_m) <= (1.0 + _EVEN_STEP) * min(steps_m)
+    return min(steps_m) if is_square and 2 * len(placed_m) >= cells else None
+
+
+def _without_outliers(
+    file: Path, points_m: Floats, assumed: Assumptions, notes: list[str]
+) -> Floats:
+    """Points (n, 3) between the stated heights of the ground, or all.
+
+    Raises:
+        InputError: nothing is stated, and a few points lie far above or below all others (the
+            question).
+
+    """
+    z_m = points_m[:, 2]
+    is_ground = np.ones(len(z_m), dtype=bool)
+    for key, sign, side in (("highest_m", 1.0, "above"), ("lowest_m", -1.0, "below")):
+        heights_m = np.sort(sign * z_m)
+        last_m = heights_m[int((1.0 - _FEW_SHARE) * len(z_m)) :]
+        stated_m = assumed.given(key, -_MOST_M, _MOST_M)
+        if stated_m is not None:
+            is_ground &= sign * z_m <= sign * stated_m
+        elif len(last_m) > 1:
+            k = int(np.argmax(np.diff(last_m)))
+            gap_m = float(last_m[k + 1] - last_m[k])
+            if gap_m > max(_GAP_M, float(last_m[k] - heights_m[0])):
+                few = len(last_m) - k - 1
+                end_m, extreme_m = (sign * math.ceil(place_m) for place_m in last_m[[k, -1]])
+                raise InputError(
+                    f"{file}: {few} points ({100.0 * few / len(z_m):.2g} %) lie {gap_m:.4g} m "
+                    f"{side} all others; add --assume {key}={end_m:g} to leave them out, or "
+                    f"--assume {key}={extreme_m:g} if they are ground"
+                )
+    if not is_ground.all():
+        notes.append(f"{int((~is_ground).sum())} points beyond the stated heights are left out")
+    return points_m[is_ground]
 
 
 def _cropped(

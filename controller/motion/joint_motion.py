@@ -27,7 +27,7 @@ _STILL_RAD: Final = 1e-6
 _NUMBERED: Final = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
 """Name of a joint with a number near its end."""
 _STEPS_S: Final = (0.0005, 0.5)
-"""Steps between rows of a motion of servos, s (ours)."""
+"""Steps between rows of a motion, s (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +81,11 @@ def likely_unit(angles: Floats) -> tuple[str, float]:
     return ("deg" if largest > 2.0 * np.pi else "rad"), largest
 
 
-def time_unit(path: Path, time: Floats, column: str) -> float:
+def time_unit(path: Path, time: Floats, column: str, answer: str = "--time-unit {unit}") -> float:
     """Return the size in seconds of the unit of times (T,) without a stated one.
 
-    Seconds are assumed if no other unit gives steps that a recording of servos has.
+    Seconds are assumed if no other unit gives steps that a recording of motion has. ``answer`` is
+    the option for each reading, of ``unit`` and ``rate_hz``.
 
     Raises:
         InputError: another unit is possible; proposes those that are.
@@ -98,7 +99,8 @@ def time_unit(path: Path, time: Floats, column: str) -> float:
         return 1.0
     length = float(np.nanmax(time) - np.nanmin(time))
     readings = " or ".join(
-        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz (--time-unit {unit})"
+        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz "
+        f"({answer.format(unit=unit, rate_hz=1.0 / (step * size))})"
         for unit, size in TIME_UNITS.items()
         if unit in {"s", *possible}
     )

@@ -67,6 +67,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.console": (7750, "0188-options-are-fields.md"),
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
     "config": (20_100, "0270-one-reader-of-text-tables.md"),
+    "controller.mapping": (19_300, "0270-one-reader-of-text-tables.md"),
     "controller.exchange": (17_700, "0270-one-reader-of-text-tables.md"),
     "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
     "controller.pose": (8300, "0261-what-agreement-cannot-show-is-inaccuracy.md"),

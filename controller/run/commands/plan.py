@@ -121,6 +121,8 @@ def plan(
     show(facts, as_json)
     for line in () if as_json else warnings:
         console.print(f"warning: {line}")
+    if facts["waypoints_reached"] != facts["waypoints"]:
+        raise SystemExit(1)
 
 
 def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
@@ -162,6 +164,11 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         plan_facts["states"] = prepared.library.counts
     missing = missing_watchdogs(prepared.robot)
     warnings = [*prepared.warnings, *prepared.climb_warnings, *missing]
+    if ahead.reached < len(prepared.run.waypoints_m):
+        warnings.append(
+            f"{ahead.reached} of {len(prepared.run.waypoints_m)} waypoints are reached in "
+            f"{ahead.duration_s:.0f} s; raise run.time_limit_s or joint limits, or move waypoints"
+        )
     if safety.stop_output is not None:
         output = parse_stop_output(safety.stop_output)
         if isinstance(output, StopCommand) and output.fault is not None:

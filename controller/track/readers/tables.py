@@ -8,6 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import MISSING, read_rows
+from snakewalk.controller.motion.joint_motion import time_unit
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
@@ -161,6 +162,7 @@ def _midline(
                 f"{file}: t must increase from frame to frame, in seconds; it does not in "
                 f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
             )
+        time_unit(file, np.cumsum(step), "t", "--rate {rate_hz:.4g}")
         rate_hz = float(1.0 / np.median(step))
     return track_from_points(
         file.stem,

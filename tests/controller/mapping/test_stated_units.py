@@ -430,3 +430,39 @@ def test_broken_rasters_end_with_a_line(tmp_path: Path) -> None:
         except (InputError, OSError):
             outcomes["rejected"] += 1
     assert min(outcomes.values()) > 20
+
+
+def surface(x: Any, y: Any) -> Any:
+    return np.column_stack([x, y, np.sin(x / 5.0) + np.cos(y / 7.0)])
+
+
+@pytest.mark.parametrize(("step_m", "corner_m"), [(1.0, 0.0), (0.25, 500000.0)])
+def test_points_of_a_grid_keep_its_step(tmp_path: Path, step_m: float, corner_m: float) -> None:
+    points = surface(step_m * X.ravel(), step_m * Y.ravel())
+    points[:, :2] += corner_m
+    np.savetxt(tmp_path / "a.xyz", points, fmt="%.4f")
+    kept = np.delete(points, slice(100, 130), axis=0)
+    np.savetxt(tmp_path / "b.xyz", kept, fmt="%.4f")
+    for name in ("a.xyz", "b.xyz"):
+        made = read(tmp_path / name, unit="m")
+        assert made.elevation.spacing_m == pytest.approx(step_m)
+        assert made.elevation.z_m.shape == (ROWS, COLUMNS)
+        assert f"points lie on a grid of {step_m:g} m" in made.notes
+    assert np.isnan(read(tmp_path / "b.xyz", unit="m").elevation.z_m).sum() == 30
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_few_points_far_from_all_others_are_asked_about(tmp_path: Path, sign: float) -> None:
+    rng = np.random.default_rng(3)
+    points = surface(*rng.uniform(0.0, [40.0, 30.0], (3000, 2)).T)
+    points[:60, 2] += sign * rng.uniform(295.0, 305.0, 60)
+    np.savetxt(tmp_path / "a.xyz", points, fmt="%.4f")
+    side, key = ("above", "highest_m") if sign > 0.0 else ("below", "lowest_m")
+    said = rf"60 points \(2 %\) lie 29\d.* m {side} all others; .*{key}=\S+ to leave them out"
+    with pytest.raises(InputError, match=said):
+        read(tmp_path / "a.xyz", unit="m")
+    made = read(tmp_path / "a.xyz", unit="m", assume=(f"{key}={3.0 * sign:g}",))
+    assert made.relief_m < 4.1
+    assert "60 points beyond the stated heights are left out" in made.notes
+    kept = read(tmp_path / "a.xyz", unit="m", assume=(f"{key}={307.0 * sign:g}",))
+    assert kept.relief_m > 290.0

@@ -58,5 +58,6 @@ def test_the_plan_says_that_its_ground_is_too_steep(tmp_path: Path) -> None:
         "time_limit_s = 3.0\nstart_m = [0, 0]\nwaypoints_m = [[1, 0]]\n"
     )
     done = snakewalk("plan", str(run), "--json")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 1, done.stderr  # 3 s are too short for the waypoint
+    assert "0 of 1 waypoints are reached in 3 s" in str(json.loads(done.stdout)["warnings"])
     assert " deg of " in json.loads(done.stdout)["steeper_than_held"]

@@ -96,3 +96,18 @@ def test_an_assumed_rate_stays_assumed_in_the_file_that_is_written(tmp_path: Pat
     assert first.rate_assumed
     assert load_track(str(tmp_path / "again.npz")).rate_assumed
     assert not load_track(str(tmp_path / "again.npz"), 30.0).rate_assumed
+
+
+def test_milliseconds_in_a_table_are_asked_about(tmp_path: Path) -> None:
+    time_s = np.arange(60) / 50.0
+    table = ["t,frame,point,x_m,y_m"]
+    for frame, body in enumerate(bodies(time_s)[:, ::10]):
+        table += [
+            f"{20 * frame},{frame},{point},{x:.5f},{y:.5f}"
+            for point, (x, y) in enumerate(body.tolist(), start=1)
+        ]
+    path = tmp_path / "ms.csv"
+    path.write_text("\n".join(table))
+    with pytest.raises(InputError, match=r"0\.05 Hz \(--rate 0\.05\) or .* 50 Hz \(--rate 50\)"):
+        load_track(str(path))
+    assert load_track(str(path), 50.0).time_s[-1] == pytest.approx(1.18)
