@@ -61,18 +61,30 @@ def why_no_file(path: Path, missing: str = "no such file") -> str:
 
 
 def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
-    """Bytes of a file (or device or pipe), up to a size.
+    """Bytes of a file up to a size; of a device or a pipe up to ``FREE_BYTES``.
 
     Raises:
         InputError: it is larger.
         OSError: it cannot be read.
 
     """
-    with file.open("rb") as stream:
-        data = stream.read(most_bytes + 1)
+    if not file.is_file():
+        most_bytes = min(most_bytes, FREE_BYTES)
+    data = read_head(file, most_bytes + 1)
     if len(data) > most_bytes:
         raise InputError(f"{file}: is larger than the {most_bytes / 1e6:g} MB that are read of it")
     return data
+
+
+def read_head(file: Path, count: int) -> bytes:
+    """First bytes of a file, at most ``count``.
+
+    Raises:
+        OSError: it cannot be read.
+
+    """
+    with file.open("rb") as stream:
+        return stream.read(count)
 
 
 def read_text(file: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_or
 from pydantic import BaseModel
 
 from snakewalk.config import strict_toml
-from snakewalk.config.archive import why_no_file
+from snakewalk.config.archive import read_text, why_no_file
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.gait import GaitSetConfig
 from snakewalk.config.strict_toml import read_toml
@@ -86,7 +86,7 @@ def checked(model: type[M], data: dict[str, Any], source: str, text: str = "") -
 
 def place_of(path: Path, key: str) -> str:
     """File, line and name of a key, to begin a message."""
-    number = strict_toml.line_number(path.read_text(encoding="utf-8"), key.split("."))
+    number = strict_toml.line_number(read_text(path), key.split("."))
     return f"{path}: {key}" if number is None else f"{path}:{number}: {key}"
 
 

@@ -2,12 +2,15 @@
 
 import csv
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from snakewalk.config.archive import read_text
 from snakewalk.config.errors import InputError
+
+if TYPE_CHECKING:
+    from snakewalk.config.arrays import Floats
 
 MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 """Lower-case cells for a missing value."""
@@ -71,3 +74,34 @@ def has_decimal_commas(file: Path, rows: Iterable[list[str]]) -> bool:
             f"{file}: {cells[0]!r} has a comma for decimals or for thousands; write decimal points"
         )
     return bool(cells)
+
+
+def numbers_of(
+    file: Path, rows: Iterable[Sequence[str]], names: Sequence[str], lines: Iterable[int]
+) -> "Floats":
+    """Cells (rows, columns) as numbers; NaN for missing ones.
+
+    Args:
+        file: for errors.
+        rows: cells; further ones than ``names`` are ignored.
+        names: of the columns.
+        lines: of the rows in the file.
+
+    Raises:
+        InputError: a cell is not a number; names its line and column.
+
+    """
+    import numpy as np  # noqa: PLC0415  a TOML file needs none
+
+    rows = list(rows)
+    values = np.full((len(rows), len(names)), np.nan)
+    for k, (row, line) in enumerate(zip(rows, lines, strict=False)):
+        for column, (cell, name) in enumerate(zip(row, names, strict=False)):
+            text = cell.strip()
+            try:
+                values[k, column] = np.nan if text.lower() in MISSING else float(text)
+            except ValueError:
+                raise InputError(
+                    f"{file}: line {line}: {name}: expected a number or nothing, found {text!r}"
+                ) from None
+    return values

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json, read_arrays
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
@@ -98,7 +98,7 @@ class PartFolder:
             self.clear()
             return []
         try:
-            before = parse_json((self.path / _SETTINGS).read_text(encoding="utf-8"))
+            before = parse_json(read_bytes(self.path / _SETTINGS, MOST_JSON_BYTES))
         except FileNotFoundError:
             raise InputError(
                 f"{self.path}: no such folder, so there is nothing to continue; leave --resume out"

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Self
 
-from snakewalk.config.archive import read_text
+from snakewalk.config.archive import read_bytes, read_text
 from snakewalk.config.errors import InputError
 
 _NO_ROW: Final[dict[str, str]] = {}
@@ -70,7 +70,7 @@ class CsvTable:
     def __enter__(self) -> Self:
         """Cut off a torn last line and open for appending."""
         if self._path.exists():
-            content = self._path.read_bytes()
+            content = read_bytes(self._path)
             if not content.endswith(b"\n"):
                 os.truncate(self._path, content.rfind(b"\n") + 1)
         self._file = self._path.open("a", newline="")

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image as Pillow
 
-from snakewalk.config.archive import check_expansion, parse_json, why_no_file
+from snakewalk.config.archive import check_expansion, parse_json, read_bytes, why_no_file
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.mesh import Mesh
@@ -102,9 +102,9 @@ def _unpacked_glb(file: Path) -> int:
 
     Views may overlap, accessors without a view are zeros, and many nodes may use one mesh.
     """
-    with file.open("rb") as stream:
-        _, _, _, length, _ = struct.unpack("<5I", stream.read(20))
-        said = parse_json(stream.read(length))
+    data = read_bytes(file)
+    _, _, _, length, _ = struct.unpack("<5I", data[:20])
+    said = parse_json(data[20 : 20 + length])
     views = [abs(int(view["byteLength"])) for view in said.get("bufferViews", [])]
     accessors = [
         abs(int(a["count"])) * _WIDTH[a["type"]] * _ITEM_BYTES[a["componentType"]]

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import why_no_file
+from snakewalk.config.archive import read_bytes, why_no_file
 from snakewalk.config.arrays import DeepImage, Floats, Image, Ints
 from snakewalk.config.errors import InputError
 
@@ -353,7 +353,7 @@ def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint1
             raise InputError(f"{file}: page {page + 1} is not a readable image")
         return np.asarray(mats[0])
     try:
-        data = np.frombuffer(file.read_bytes(), dtype=np.uint8)
+        data = np.frombuffer(read_bytes(file), dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
     image = cv2.imdecode(data, how) if data.size else None

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.loader import shipped
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.metrics.displacement import full_rate_span_s
@@ -98,7 +99,7 @@ def _is_set(motion: str) -> bool:
     path = Path(motion)
     if path.suffix != ".toml" or motion in shipped("policies") or not path.is_file():
         return False
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = read_bytes(path, MOST_JSON_BYTES).decode("utf-8", "replace").splitlines()
     return any(line.partition("=")[0].strip() == "gait" for line in lines)
 
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from PIL import Image as Pictures
 
-from snakewalk.config.archive import check_expansion
+from snakewalk.config.archive import check_expansion, read_bytes
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 
@@ -19,7 +19,7 @@ def read_colours(file: Path) -> Image:
 
     """
     try:
-        data = file.read_bytes()
+        data = read_bytes(file)
         with Pictures.open(file) as opened:
             columns, rows = opened.size
         check_expansion(file, len(data), 3 * columns * rows)

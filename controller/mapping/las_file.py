@@ -11,13 +11,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json
+from snakewalk.config.archive import parse_json, read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.child_process import run_code
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
+    VERTICAL_PART,
+    WKT_UNIT,
     degree_cell_m,
     ground_lengths,
     unit_m,
@@ -55,10 +57,8 @@ _LINEAR_UNITS, _VERTICAL_UNITS = 3076, 4099
 """Keys of GeoTIFF, as records 34735 have them."""
 _USER_DEFINED = 32767
 _WKT_RECORD = 2112
-_VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
 _PROJECTED_PART: Final = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
 _KEY_UNITS: Final = {9001: "m", 9002: "ft", 9003: "us-ft"}
-_WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 
 
 _MOST_MEMORY_BYTES = 3_000_000_000
@@ -119,8 +119,7 @@ def read_las(
 
     """
     require_extra("LAS and LAZ need", "laspy", "lazrs")
-    with file.open("rb"):
-        pass
+    read_head(file, 1)
     chosen = None if classes is None else sorted(classes)
     with TemporaryDirectory() as folder:
         out = Path(folder) / "points.npy"
@@ -264,10 +263,10 @@ def _units(header: Any) -> tuple[str | None, str | None, str | int | None]:
             if key.tiff_tag_location == 0:
                 keys[int(key.id)] = int(key.value_offset)
     if wkt:
-        plain = _VERTICAL_PART.split(wkt)[0]
+        plain = VERTICAL_PART.split(wkt)[0]
         if _PROJECTED_PART.search(plain) is None:
             return DEGREE, vertical_unit(wkt), None
-        units = _WKT_UNIT.findall(plain)
+        units = WKT_UNIT.findall(plain)
         unit = unit_name(float(units[-1][1])) if units else None
         return unit, vertical_unit(wkt), wkt
     vertical = _KEY_UNITS.get(keys.get(_VERTICAL_UNITS, 0))

@@ -40,8 +40,8 @@ _SPELLINGS: Final = {
         "usft",
     ),
 }
-_VERTICAL: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
-_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
+VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
+WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 _TRUE: Final = 0.005
 """Share by which a map's lengths may be off before true lengths are used (ours): UTM is within."""
 _MOST_VARIATION: Final = 0.1
@@ -69,7 +69,7 @@ def unit_m(unit: str) -> float:
 
 def vertical_unit(wkt: str) -> str | None:
     """Unit of heights of a compound coordinate system in WKT, or None."""
-    match = _VERTICAL.search(wkt)
+    match = VERTICAL_PART.search(wkt)
     if match is None:
         return None
     depth = 1
@@ -77,7 +77,7 @@ def vertical_unit(wkt: str) -> str | None:
     while end < len(wkt) and depth:
         depth += {"[": 1, "]": -1}.get(wkt[end], 0)
         end += 1
-    unit = _UNIT.search(wkt[match.end() : end])
+    unit = WKT_UNIT.search(wkt[match.end() : end])
     return None if unit is None else unit_name(float(unit[2]))
 
 

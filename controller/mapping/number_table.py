@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import DECIMAL_COMMA, MISSING, has_decimal_commas, read_lines
+from snakewalk.config.text_table import (
+    DECIMAL_COMMA,
+    MISSING,
+    has_decimal_commas,
+    numbers_of,
+    read_lines,
+)
 
 
 def read_numbers(
@@ -39,26 +43,11 @@ def read_numbers(
     widths = {len(cells) for _, cells in rows}
     if len(widths) != 1:
         raise InputError(_uneven(file, rows, widths))
-    values = np.full((len(rows), widths.pop()), np.nan)
-    for k, (number, cells) in enumerate(rows):
-        plain = None if comma else _plain(cells)
-        values[k] = _row(file, number, cells, comma) if plain is None else plain
     if comma and notes is not None:
         notes.append("numbers have decimal commas")
-    return values
-
-
-def _row(file: Path, line: int, cells: list[str], comma: bool) -> list[float]:
-    values = []
-    for column, cell in enumerate(cells, start=1):
-        value = _number(cell, comma)
-        if value is None:
-            raise InputError(
-                f"{file}: line {line}, column {column}: {cell!r} is not a number; leave cells "
-                "without a value empty"
-            )
-        values.append(value)
-    return values
+    cells = ([cell.replace(",", ".") if comma else cell for cell in row] for _, row in rows)
+    columns = [f"column {k + 1}" for k in range(widths.pop())]
+    return numbers_of(file, cells, columns, [number for number, _ in rows])
 
 
 def _separator(lines: list[str]) -> str | None:
@@ -87,21 +76,9 @@ def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> 
     )
 
 
-def _plain(cells: list[str]) -> list[float] | None:
-    try:
-        return [float(cell) for cell in cells]
-    except ValueError:
-        return None
-
-
-def _number(cell: str, comma: bool) -> float | None:
-    if cell.lower() in MISSING:
-        return float("nan")
-    try:
-        return float(cell.replace(",", ".") if comma else cell)
-    except ValueError:
-        return None
-
-
 def _is_number(cell: str, comma: bool) -> bool:
-    return _number(cell, comma) is not None
+    try:
+        float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return cell.lower() in MISSING
+    return True

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import MOST_BYTES, check_expansion
+from snakewalk.config.archive import MOST_BYTES, check_expansion, read_bytes, read_head
 from snakewalk.config.arrays import Bytes, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -48,7 +48,7 @@ def read_pcd(file: Path) -> PcdCloud:
         OSError: the file cannot be opened.
 
     """
-    data = file.read_bytes()
+    data = read_bytes(file)
     try:
         points = _pcd(file, data)
         header, _ = _header(data)
@@ -191,8 +191,7 @@ def read_ply(file: Path) -> tuple[Floats, Any]:
     require_extra("PLY needs", "trimesh")
     import trimesh  # noqa: PLC0415  an extra
 
-    with file.open("rb") as stream:
-        head = stream.read(_HEADER_BYTES)
+    head = read_head(file, _HEADER_BYTES)
     said = [line.split() for line in head.split(b"end_header")[0].splitlines()]
     try:
         counts = [int(words[2]) for words in said if words[:1] == [b"element"]]

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from snakewalk.config.archive import check_expansion, read_arrays
+from snakewalk.config.archive import check_expansion, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -143,7 +143,7 @@ def _picture(file: Path) -> Floats:
     require_extra("pictures need", "cv2")
     import cv2  # noqa: PLC0415  an extra
 
-    data = file.read_bytes()
+    data = read_bytes(file)
     if len(data) < 33 or data[:8] != b"\x89PNG\r\n\x1a\n":
         raise InputError(f"{file}: is no PNG")
     columns, rows, bits, colour = struct.unpack(">IIBB", data[16:26])

@@ -13,7 +13,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import check_matrices, read_arrays
+from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, read_arrays, read_bytes
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
@@ -133,7 +133,7 @@ def _storage(file: Path) -> dict[str, Any]:
 
 def _middlebury(file: Path) -> dict[str, Any]:
     """``cam0=[f 0 cx; 0 f cy; 0 0 1]``, ``cam1``, ``baseline`` in mm, of rectified pictures."""
-    text = file.read_text(encoding="utf-8", errors="replace")
+    text = read_bytes(file, MOST_STORAGE_BYTES).decode("utf-8", "replace")
     lines: Mapping[str, str] = dict(re.findall(r"^(\w+)\s*=\s*(.+)$", text, re.MULTILINE))
     try:
         k_left, k_right = (

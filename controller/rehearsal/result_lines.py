@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-from snakewalk.config.archive import parse_json
+from snakewalk.config.archive import parse_json, read_text
 from snakewalk.config.errors import InputError
 
 A = TypeVar("A")
@@ -25,7 +25,7 @@ def read_lines(path: Path, parse: Callable[[Any], A], what: str) -> list[A]:
 
     """
     lines_parsed: list[A] = []
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    lines = read_text(path).splitlines() if path.exists() else []
     for number, line in enumerate(lines, 1):
         try:
             lines_parsed.append(parse(parse_json(line)))

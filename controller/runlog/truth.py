@@ -12,7 +12,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json
+from snakewalk.config.archive import parse_json, read_text
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import MotorEnergy
@@ -89,7 +89,7 @@ def read_truth(path: Path) -> Truth:
 
     """
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = read_text(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     rows = []

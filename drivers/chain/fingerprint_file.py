@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
+from snakewalk.config.archive import MOST_STORAGE_BYTES, read_text
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.chain.fingerprint import (
@@ -52,7 +53,7 @@ class FingerprintFile:
 
         """
         try:
-            text = self.path.read_text(encoding="utf-8")
+            text = read_text(self.path, MOST_STORAGE_BYTES)
         except FileNotFoundError:
             return None
         except (OSError, UnicodeDecodeError) as error:

@@ -3,7 +3,6 @@
 ``P(H(t) | H(t - 1), H(t - 2))`` is counted on a short sequence. A height of 0 is in and 1 is out.
 """
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import read_rows
 
 RATE_LIMITS = (0.4, 2.5)
 """Range of b_st, how fast the tongue plays."""
@@ -54,11 +54,11 @@ class TongueRecord:
 
         """
         try:
-            with file.open(encoding="utf-8", newline="") as stream:
-                rows = list(csv.DictReader(stream))
-        except (OSError, UnicodeDecodeError) as error:
+            first, *cells = read_rows(file, "CSV table of the tongue") or [[]]
+        except OSError as error:
             raise InputError(f"{file}: {error}; name a CSV table of the tongue") from None
-        columns = set(rows[0]) if rows else set()
+        rows = [dict(zip(first, row, strict=False)) for row in cells if row]
+        columns = set(first)
         kind = next((name for name in ("height", "length_m") if name in columns), None)
         if "time_s" not in columns or kind is None:
             raise InputError(f"{file}: the header must name time_s, and height or length_m")

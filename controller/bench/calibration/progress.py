@@ -8,6 +8,7 @@ from typing import Literal
 
 from pydantic import Field, ValidationError
 
+from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.robot import RobotConfig
@@ -136,7 +137,7 @@ class ProgressFile:
 
     def _read(self) -> CalibrationProgress:
         try:
-            return CalibrationProgress.model_validate_json(self.path.read_bytes())
+            return CalibrationProgress.model_validate_json(read_bytes(self.path, MOST_JSON_BYTES))
         except FileNotFoundError:
             raise InputError(
                 f"{self.path}: no such file, so there is nothing to continue; leave --resume out"

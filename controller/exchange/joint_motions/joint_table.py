@@ -4,11 +4,9 @@ import re
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import MISSING, read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     TIME_UNITS,
@@ -58,22 +56,12 @@ class JointTable:
             matched = _UNIT.match(cell)
             names.append((matched[1] if matched else cell).strip() or cell)
             units.add("?" if matched is None else matched[2].lower()[:3])
-        values = np.full((len(rows), len(cells)), np.nan)
         for line, row in enumerate(rows, start=2):
-            if len(row) > len(cells) and any(row[len(cells) :]):
+            if any(row[len(cells) :]):
                 raise InputError(
                     f"{path}: line {line}: {len(row)} cells, the first line names {len(cells)}"
                 )
-            for k, cell in enumerate(row[: len(cells)]):
-                text = cell.strip()
-                if text.lower() in MISSING:
-                    continue
-                try:
-                    values[line - 2, k] = float(text)
-                except ValueError:
-                    raise InputError(
-                        f"{path}: line {line}: {cells[k]}: expected a number, found {text!r}"
-                    ) from None
+        values = numbers_of(path, rows, cells, range(2, len(rows) + 2))
         unit = _unit_of(path, units, request, values[:, 1:])
         time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
@@ -39,7 +39,7 @@ class LeRobotEpisode:
         """Read one episode; see ``JointReader.read``."""
         require_extra(f"{path}: LeRobot datasets need", "pyarrow")
         try:
-            about = parse_json((path / "meta" / "info.json").read_text(encoding="utf-8"))
+            about = parse_json(read_bytes(path / "meta" / "info.json", MOST_JSON_BYTES))
             features = about["features"]
             rate_hz = float(about["fps"])
             episodes = int(about["total_episodes"])

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from pydantic import ValidationError
 
+from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import SEED, Seed
@@ -98,7 +99,7 @@ def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
 
     """
     try:
-        progress = SearchProgress.model_validate_json(file.read_bytes())
+        progress = SearchProgress.model_validate_json(read_bytes(file, MOST_JSON_BYTES))
     except FileNotFoundError:
         raise InputError(
             f"{file}: no such file, so there is nothing to continue; leave --resume out"

@@ -1,6 +1,5 @@
 """``snakewalk gait fit``: joint angles that lay the robot on a curve in space."""
 
-import csv
 import math
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +10,7 @@ import typer
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
+from snakewalk.config.text_table import read_rows
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import (
@@ -88,22 +88,21 @@ def fit_gait(
 def _read(path: Path) -> list[list[float]]:
     if not path.is_file():
         raise InputError(why_no_file(path))
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            table = csv.DictReader(stream, skipinitialspace=True)
-            names = [name.strip() for name in table.fieldnames or []]
-            table.fieldnames = names
-            if missing := [name for name in COLUMNS if name not in names]:
-                raise InputError(
-                    f"{path}: no column {', '.join(missing)}; the first line names the columns "
-                    f"{', '.join(COLUMNS)}, the points follow from the head backwards"
-                )
-            return [
-                [_number(path, table.line_num, name, row[name]) for name in COLUMNS]
-                for row in table
-            ]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: not a table of text ({error})") from None
+    first, *rows = read_rows(path, "table") or [[]]
+    names = [name.strip() for name in first]
+    if missing := [name for name in COLUMNS if name not in names]:
+        raise InputError(
+            f"{path}: no column {', '.join(missing)}; the first line names the columns "
+            f"{', '.join(COLUMNS)}, the points follow from the head backwards"
+        )
+    return [
+        [
+            _number(path, line, name, dict(zip(names, row, strict=False)).get(name))
+            for name in COLUMNS
+        ]
+        for line, row in enumerate(rows, start=2)
+        if row
+    ]
 
 
 def _number(path: Path, line: int, name: str, text: str | None) -> float:

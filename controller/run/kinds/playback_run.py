@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.archive import read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.playback import PlaybackConfig
@@ -55,8 +56,7 @@ def _reader(path: Path) -> JointReader | None:
     head = b""
     if path.is_file():
         try:
-            with path.open("rb") as stream:
-                head = stream.read(_HEAD_BYTES)
+            head = read_head(path, _HEAD_BYTES)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}") from None
     for plugin in plugins("joints"):

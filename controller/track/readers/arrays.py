@@ -12,7 +12,7 @@ import numpy as np
 import scipy  # scipy.io loads when it is first used
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays
+from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -75,7 +75,7 @@ def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None
 def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
     """Load a MATLAB file up to version 7 with ``track_from_arrays``; 7.3 is HDF5."""
     size = file.stat().st_size
-    check_expansion(file, size, _unpacked_mat(file.read_bytes()))
+    check_expansion(file, size, _unpacked_mat(read_bytes(file)))
     try:
         said = 8 * sum(math.prod(shape) for _, shape, _ in scipy.io.whosmat(file))
         check_expansion(file, size, said)  # also for cells and structs

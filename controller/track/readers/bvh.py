@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from snakewalk.config.archive import read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
@@ -39,7 +40,7 @@ class _Joint:
 def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     """Load the joints as keypoints; see ``load.load_file``."""
     try:
-        words = file.read_text(encoding="utf-8-sig").split()
+        words = read_text(file).split()
     except UnicodeDecodeError:
         raise InputError(f"{file}: is not a BVH in UTF-8") from None
     upper = [word.upper() for word in words]

@@ -16,7 +16,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import MISSING
+from snakewalk.config.text_table import numbers_of
 from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
 from snakewalk.controller.track.track import frame_numbers
 
@@ -54,17 +54,9 @@ def load_rows(
         first += 1  # hand labels have three columns: folder, video and image
     whose = level.get("individuals", [""] * len(level["coords"]))
     columns = list(zip(whose, level["bodyparts"], level["coords"], strict=False))[first:]
-    values = np.full((len(rows) - depth, len(columns)), np.nan)
-    for line, row in enumerate(rows[depth:]):
-        for k, cell in enumerate(row[first : first + len(columns)]):
-            text = cell.strip()
-            try:
-                values[line, k] = np.nan if text.lower() in MISSING else float(text)
-            except ValueError:
-                raise InputError(
-                    f"{file}: line {line + depth + 1}: {columns[k][1]} {columns[k][2]}: expected a "
-                    f"number or nothing, found {text!r}"
-                ) from None
+    names = [f"{part} {axis}" for _, part, axis in columns]
+    lines = range(depth + 1, len(rows) + 1)
+    values = numbers_of(file, [row[first:] for row in rows[depth:]], names, lines)
     frame = _frames(file, [row[first - 1] for row in rows[depth:]])
     return _track(file, columns, values, frame, rate_hz, least_score, choice)
 

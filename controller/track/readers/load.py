@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
+from snakewalk.config.archive import read_head, read_text
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
@@ -171,15 +172,14 @@ def _check_options(file: Path, rate_hz: float | None, least_score: float | None)
 
 def _format(file: Path) -> Format:
     try:
-        with file.open("rb") as stream:
-            return format_of(stream.read(HEAD_BYTES))
+        return format_of(read_head(file, HEAD_BYTES))
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
 
 
 def _json(file: Path) -> str:
     try:
-        return file.read_text(encoding="utf-8-sig")
+        return read_text(file)
     except UnicodeDecodeError:
         raise InputError(f"{file}: is no JSON in UTF-8; known: {KNOWN}") from None
 

@@ -15,7 +15,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
-from snakewalk.config.text_table import MISSING, read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.track.readers.keypoints import FEWEST, PLANES, Choice, Keypoints
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -53,7 +53,9 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
         before = len([title for title in titles if title in {"frame", "time"}])
     if not lines or min(map(len, lines)) < before + 3:
         raise InputError(f"{file}: expected rows of x, y, z of {len(names)} markers, in mm")
-    places = marker_places(file, [row[before:] for row in lines], len(names), first_line=None)
+    places = marker_places(
+        file, [row[before:] for row in lines], len(names), first_line=len(about) + 1 + bool(before)
+    )
     stated = number_or_none((about.get("FREQUENCY") or [""])[0])
     rate = stated if rate_hz is None else rate_hz
     return projected(file, names, places, 1e-3, rate, choice)
@@ -81,28 +83,19 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
 
 
 def marker_places(
-    file: Path, rows: Sequence[Sequence[str]], markers: int, *, first_line: int | None
+    file: Path, rows: Sequence[Sequence[str]], markers: int, *, first_line: int
 ) -> Floats:
     """(T, K, 3) places from cells of x, y, z per marker; NaN where a marker was not seen.
 
-    ``first_line`` is the rows' first line in the file; None counts rows from 1.
+    ``first_line`` is the rows' first line in the file.
 
     Raises:
         InputError: a cell is not a number.
 
     """
-    places = np.full((len(rows), markers, 3), np.nan)
-    for k, row in enumerate(rows):
-        for n, cell in enumerate(row[: 3 * markers]):
-            text = cell.strip()
-            if text.lower() in MISSING:
-                continue
-            value = number_or_none(text)
-            if value is None:
-                where = f"row {k + 1}" if first_line is None else f"line {first_line + k}"
-                raise InputError(f"{file}: {where}: expected a number, found {text!r}")
-            places[k, n // 3, n % 3] = value
-    return places
+    names = [f"{axis} of marker {k + 1}" for k in range(markers) for axis in "xyz"]
+    lines = range(first_line, first_line + len(rows))
+    return numbers_of(file, rows, names, lines).reshape(-1, markers, 3)
 
 
 def projected(

@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import MISSING, read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.motion.joint_motion import time_unit
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
@@ -111,20 +111,8 @@ def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) 
 
 def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     """Cells as numbers (rows, columns); empty ones and NA are NaN."""
-    table = np.full((len(rows) - 1, len(columns)), np.nan)
-    for line, row in enumerate(rows[1:], start=2):
-        for k, index in enumerate(columns):
-            cell = row[index].strip() if index < len(row) else ""
-            if cell.lower() in MISSING:
-                continue
-            try:
-                table[line - 2, k] = float(cell)
-            except ValueError:
-                name = rows[0][index]
-                raise InputError(
-                    f"{file}: line {line}: {name}: expected a number or nothing, found {cell!r}"
-                ) from None
-    return table
+    cells = [[row[k] if k < len(row) else "" for k in columns] for row in rows[1:]]
+    return numbers_of(file, cells, [rows[0][k] for k in columns], range(2, len(rows) + 1))
 
 
 def _midline(

@@ -196,7 +196,7 @@ FAULTS = {
     "none.asc": (b"ncols 3\nnrows x\n", "cannot be read as AAIGrid"),
     "none.png": (b"no", "is no PNG"),
     "big.png": (bad_png(Path()), "would expand to"),
-    "text.csv": (b"a,b\nc,d\n", "line 2, column 1: 'c' is not a number"),
+    "text.csv": (b"a,b\nc,d\n", "line 2: column 1: expected a number or nothing, found 'c'"),
     "ragged.csv": (b"1,2\n1\n", "all need as many"),
     "empty.csv": (b"", "holds no numbers"),
     "bytes.csv": (b"\xff\xfe\x00", "is not a table in UTF-8"),

@@ -316,7 +316,9 @@ def test_decimal_commas_are_read_where_commas_can_be_nothing_else(tmp_path: Path
 def test_a_cell_that_is_no_number_is_named_by_row_and_column(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text("# of a garden\nx,y,z\n1,2,3\n\n4,five,6\n")
-    with pytest.raises(InputError, match="line 5, column 2: 'five' is not a number"):
+    with pytest.raises(
+        InputError, match="line 5: column 2: expected a number or nothing, found 'five'"
+    ):
         read_numbers(file)
     file.write_text("1,2,3\n4,5\n")
     with pytest.raises(InputError, match="line 2 holds 2 numbers, line 1 holds 3"):
