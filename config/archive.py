@@ -68,9 +68,9 @@ def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
         OSError: it cannot be read.
 
     """
-    if not file.is_file():
-        most_bytes = min(most_bytes, FREE_BYTES)
-    data = read_head(file, most_bytes + 1)
+    size = file.stat().st_size  # 0 for a device or a pipe
+    most_bytes = most_bytes if size else min(most_bytes, FREE_BYTES)
+    data = read_head(file, min(most_bytes, size or most_bytes) + 1)
     if len(data) > most_bytes:
         raise InputError(f"{file}: is larger than the {most_bytes / 1e6:g} MB that are read of it")
     return data

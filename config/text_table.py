@@ -4,13 +4,13 @@ import csv
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+import numpy as np
 
 from snakewalk.config.archive import read_text
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-
-if TYPE_CHECKING:
-    from snakewalk.config.arrays import Floats
 
 MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 """Lower-case cells for a missing value."""
@@ -78,7 +78,7 @@ def has_decimal_commas(file: Path, rows: Iterable[list[str]]) -> bool:
 
 def numbers_of(
     file: Path, rows: Iterable[Sequence[str]], names: Sequence[str], lines: Iterable[int]
-) -> "Floats":
+) -> Floats:
     """Cells (rows, columns) as numbers; NaN for missing ones.
 
     Args:
@@ -91,8 +91,6 @@ def numbers_of(
         InputError: a cell is not a number; names its line and column.
 
     """
-    import numpy as np  # noqa: PLC0415  a TOML file needs none
-
     rows = list(rows)
     values = np.full((len(rows), len(names)), np.nan)
     for k, (row, line) in enumerate(zip(rows, lines, strict=False)):
