@@ -62,7 +62,6 @@ class LivenessCheck:
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
         self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
-        self._watchdog = read(WATCHDOG, watchdogs) if watchdogs else None
 
         def checks(
             registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
@@ -78,6 +77,12 @@ class LivenessCheck:
         self._shaping = checks(SHAPING_SETTINGS, configured)
         compared = dict.fromkeys(name for values in fingerprints.values() for name in values)
         self._fingerprint = checks(compared, fingerprints)
+        # without a watchdog its place reads the mode: a wheel turns at once at full speed
+        self._watchdog = (
+            read(WATCHDOG, watchdogs)
+            if watchdogs
+            else next((c for c in self._fingerprint if c.name == "Operating Mode"), None)
+        )
         self._missed: list[RegisterCheck] = []
         """Not all servos replied to these; the oldest first."""
 

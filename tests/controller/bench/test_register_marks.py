@@ -12,8 +12,9 @@ from snakewalk.controller.bench.register_checks import read_registers, register_
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.servo_chain import ServoChain
-from snakewalk.drivers.errors import ChainError
+from snakewalk.drivers.errors import BusError, ChainError
 from snakewalk.drivers.protocol.registers import ServoUnits
+from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.feetech.line import FeetechLine
 from snakewalk.sim.serve.servo_bus import ServoBus
 
@@ -203,3 +204,20 @@ def test_a_line_of_another_make_has_the_same_report() -> None:
     chain.on_event = events.append
     chain.enable()
     assert any("yaw_01 (ID 1): another program drives it at" in e for e in events)
+
+
+def test_another_mode_of_a_servo_without_a_watchdog_is_noticed_within_a_round() -> None:
+    bus = ServoBus("1-2:STS3215")
+    chain = a_chain(bus, a_robot("STS3215"))
+    goal_rad = chain.enable().position_rad
+
+    def cycles(count: int) -> None:
+        for _ in range(count):
+            chain.write(JointCommand(bus.line.clock.now_s(), goal_rad))
+            bus.line.clock.advance(0.02)
+            chain.read()
+
+    cycles(17)
+    bus.line.bank["Operating Mode"][1] = 1
+    with pytest.raises(BusError, match=r"pitch_02 \(ID 2\): Operating Mode is 1, was 0"):
+        cycles(16)
