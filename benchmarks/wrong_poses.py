@@ -278,7 +278,7 @@ def main() -> int:
             row = rehearsed(kind, given.run, seed, given.errors)
             counts = [row.get(key, 0) for key in ("claimed", "reached_as_stated", "truly_reached")]
             false += counts[0] > counts[1]
-            end = row.get("error") or row["outcome"]
+            end = row.get("error") or row["verdict"]
             shown.add_row(kind, str(seed), *map(str, counts), end)
     Console(width=160).print(shown)
     print(f"false claims: {false}")

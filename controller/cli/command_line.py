@@ -154,6 +154,7 @@ _PANELS: Final = {
     ),
 }
 """Options by their group in the help of a command; the others are in its first group."""
+_USAGE: Final = "COMMAND ... | --version | --install-completion | --help (-h)"
 _CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
 
 
@@ -204,9 +205,21 @@ class CommandGroup(TyperGroup):
         return f"; did you mean {' or '.join(meant)}?" if meant else ""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Print the list of commands from their manifests."""
+        """Print the list of commands from their manifests; the first level fits a screen."""
         with self._listing():
-            super().format_help(ctx, formatter)
+            if self.prefix:
+                super().format_help(ctx, formatter)
+                return
+            formatter.write_usage(ctx.command_path, _USAGE)
+            formatter.write(f"{self.help}\n")
+            groups: dict[str, list[tuple[str, str]]] = {}
+            for name in self.list_commands(ctx):
+                entry = self.get_command(ctx, name)
+                groups.setdefault(entry.rich_help_panel, []).append((name, entry.help))
+            for title, rows in groups.items():
+                formatter.write(f"{title}\n")
+                with formatter.indentation():
+                    formatter.write_dl(rows)
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """Complete a command's name from the manifests."""
@@ -382,8 +395,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
     context_settings=_CONTEXT,
-    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one that speaks the "
-    "same protocol.",
+    help="Run gaits on a DYNAMIXEL servo snake, or on a simulated one.",
 )
 
 

@@ -16,6 +16,7 @@ from snakewalk.config.loader import shipped
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.metrics.displacement import full_rate_span_s
 from snakewalk.controller.metrics.effort import energy_track
+from snakewalk.controller.metrics.verdict import RunVerdict
 from snakewalk.controller.motion.gait_motion import GaitMotion
 from snakewalk.controller.motion.policy_motion import PolicyMotion
 from snakewalk.controller.motion.stop_profile import STOP_S
@@ -53,12 +54,14 @@ class PolicyTrialResult:
     """Electrical energy of the motors, integrated in every physics step, for a metre of it."""
     course_rad: float
     """Direction of that line; x is 0."""
-    tripped: str | None
     slowed_to: float
     """Lowest rate of derating."""
-    pose_evidence: str
-    """How the poses are known that the numbers follow from."""
-    pose_source: str
+    verdict: RunVerdict
+
+    @property
+    def is_tripped(self) -> bool:
+        """Whether safety stopped the run."""
+        return self.verdict.failure == "safety"
 
 
 def policy_trials(
@@ -108,9 +111,8 @@ def _measured(result: RunResult, seconds: float) -> PolicyTrialResult:
     source = result.source
     outcome = result.outcome
     assert isinstance(source, GaitMotion | PolicyMotion)
-    pose_of = (result.summary.pose_evidence, result.summary.pose_source)
     if outcome.tripped is not None:
-        return PolicyTrialResult(*(math.nan,) * 4, outcome.tripped, outcome.least_rate, *pose_of)
+        return PolicyTrialResult(*(math.nan,) * 4, outcome.least_rate, result.verdict)
     pose = record.pose
     ends_s = full_rate_span_s(float(pose.time_s[0]), float(pose.time_s[-1]), seconds)
     first, last = np.searchsorted(pose.time_s, ends_s)
@@ -125,7 +127,6 @@ def _measured(result: RunResult, seconds: float) -> PolicyTrialResult:
         speed_m_s / frequency_hz / record.header.robot.length_m,
         electrical_j / distance_m,
         float(np.arctan2(way_m[1], way_m[0])),
-        None,
         outcome.least_rate,
-        *pose_of,
+        result.verdict,
     )

@@ -65,7 +65,12 @@ class RunVerdict:
     @property
     def text(self) -> str:
         """The sentence, with the explanation if there is one."""
-        return "; ".join(part for part in (self.sentence, self.explanation) if part)
+        return "; ".join(filter(None, (self.sentence, self.explanation)))
+
+    @property
+    def with_cause(self) -> str:
+        """The sentence, with the cause if there is one, for a log that is not kept."""
+        return "; ".join(filter(None, (self.sentence, self.cause)))
 
     def to_dict(self) -> dict[str, Any]:
         """Keys and values for JSON."""

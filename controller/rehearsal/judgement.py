@@ -7,6 +7,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
+from snakewalk.controller.metrics.summary import RunSummary
+from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
 
@@ -29,8 +31,8 @@ class Judgement:
     """The same within their radius and the accuracy that the run states."""
     closest_m: tuple[float, ...]
     """Least distance of the true body from each waypoint, after the waypoint before."""
-    outcome: str
-    """Outcome that the run's summary states."""
+    verdict: str
+    """How the run ended by its own log."""
     tripped: str | None
     path_error_mean_m: float | None
     """Distance of the true body from the path."""
@@ -74,23 +76,19 @@ class Judgement:
 def judge(
     truth: Truth,
     record: RunRecord,
-    tripped: str | None,
-    outcome: str,
-    position_sd_m: float | None = None,
+    numbers: RunSummary,
 ) -> Judgement:
     """Compare a run with the truth of the robot that was served.
 
     Args:
         truth: of the server.
         record: log of the run.
-        tripped: why the run was stopped, or None.
-        outcome: of the run's summary.
-        position_sd_m: accuracy of the pose that the run states; None: ``LEAST_SD_M``.
+        numbers: its summary.
 
     """
     plan = record.header.plan
     near_m = plan.waypoint_radius_m + SD * LEAST_SD_M
-    stated_m = plan.waypoint_radius_m + SD * max(position_sd_m or 0.0, LEAST_SD_M)
+    stated_m = plan.waypoint_radius_m + SD * max(numbers.pose_position_sd_m or 0.0, LEAST_SD_M)
     track_m = truth.centre_m[:, :2]
     reached, closest = true_arrivals(track_m, plan.waypoints_m, near_m)
     off_path_m = _off_path_m(truth, record)
@@ -102,8 +100,8 @@ def judge(
         truly_reached=reached,
         reached_as_stated=true_arrivals(track_m, plan.waypoints_m, stated_m)[0],
         closest_m=tuple(round(float(value), 3) for value in closest),
-        outcome=outcome,
-        tripped=tripped,
+        verdict=verdict(record, numbers).with_cause,
+        tripped=numbers.trip,
         path_error_mean_m=_mean(off_path_m),
         path_error_max_m=_largest(off_path_m),
         pose_error_rms_m=_rms(head_m),

@@ -296,13 +296,7 @@ def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> di
     except InputError as error:
         return {"error": error.faults[0]}
     numbers = result.summary
-    judgement = judge(
-        read_truth(truth),
-        result.record,
-        result.outcome.tripped,
-        numbers.outcome,
-        numbers.pose_position_sd_m,
-    )
+    judgement = judge(read_truth(truth), result.record, numbers)
     metrics = metric_errors(read_truth(truth), result.record, numbers)
     return {
         **judgement.facts(),

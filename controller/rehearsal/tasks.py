@@ -104,8 +104,10 @@ class TaskResult:
     duration_s: float | None = None
     cost_of_transport: float | None = None
     """Electrical."""
-    ended: str = ""
-    """``ran to its end``, the trip, or ``not applicable: ...``."""
+    verdict: str = ""
+    """How the run ended by its own log, or ``not applicable: ...``."""
+    is_tripped: bool = False
+    """Whether safety stopped the run."""
 
 
 def task_named(name: str) -> ControllerTask:
@@ -132,7 +134,7 @@ def run_task(item: TaskRun) -> TaskResult:
         prepared = _prepare(task, item.controller, item.seed)
         result = run_robot(RunRequest(prepared, stoppable=False))
     except InputError as error:
-        return TaskResult(*about, ended=f"not applicable: {error.faults[0]}")
+        return TaskResult(*about, verdict=f"not applicable: {error.faults[0]}")
     numbers = result.summary
     outcome = result.outcome
     return TaskResult(
@@ -140,7 +142,8 @@ def run_task(item: TaskRun) -> TaskResult:
         share=_digits(share(task, result)),
         duration_s=_digits(outcome.duration_s),
         cost_of_transport=_digits(numbers.electrical_cost_of_transport),
-        ended=outcome.tripped or "ran to its end",
+        verdict=result.verdict.with_cause,
+        is_tripped=outcome.tripped is not None,
     )
 
 
@@ -220,7 +223,8 @@ def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
         item.seed,
         share=_digits(facts["truly_reached"] / count),
         duration_s=_digits(facts["duration_s"]),
-        ended=facts["tripped"] or "ran to its end",
+        verdict=facts["verdict"],
+        is_tripped=facts["tripped"] is not None,
     )
 
 

@@ -32,7 +32,7 @@ def test_the_page_begins_with_a_complete_example_of_ten_lines(
 
 
 @pytest.mark.slow
-def test_the_examples_run_one_after_the_other(
+def test_the_other_examples_run_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -40,6 +40,6 @@ def test_the_examples_run_one_after_the_other(
     groups = re.findall(r"^## ", PAGE, re.MULTILINE)
     assert len(blocks) == len(groups)
     names: dict[str, object] = {}
-    for block in blocks:
+    for block in blocks[1:]:
         exec(block, names)
     assert (tmp_path / "out" / "log.mcap").is_file()

@@ -112,16 +112,15 @@ class _Row:
     """Root of the mean square: how far off x they went."""
     trips: int
     pose: str
-    """Evidence of the poses: ``measured (simulator)``."""
+    """Evidence of the poses, as the verdict states it: ``simulated``."""
 
 
 def _row(
     motion: str, world: str, trial_results: list[tuple[PolicyTrial, PolicyTrialResult]]
 ) -> _Row:
-    untripped = [result for _, result in trial_results if result.tripped is None]
+    untripped = [result for _, result in trial_results if not result.is_tripped]
     speeds = [result.speed_m_s for result in untripped]
-    poses = {f"{result.pose_evidence} ({result.pose_source})": None for _, result in trial_results}
-    pose = ", ".join(poses)
+    pose = ", ".join({result.verdict.evidence: None for _, result in trial_results})
     if not untripped:
         return _Row(motion, world, None, None, None, None, None, len(trial_results), pose)
     return _Row(

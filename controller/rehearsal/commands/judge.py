@@ -21,12 +21,9 @@ def judge(
 ) -> None:
     """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""
     record = read_log(log)
-    numbers = summary(record)
-    judgement = judged(
-        read_truth(truth), record, numbers.trip, numbers.outcome, numbers.pose_position_sd_m
-    )
+    judgement = judged(read_truth(truth), record, summary(record))
     facts = judgement.facts()
-    show(facts if as_json else {"verdict": judgement.text, **facts}, as_json)
+    show(facts if as_json else {"judgement": judgement.text, **facts}, as_json)
     if (
         not judgement.has_arrived
         or not judgement.is_true

@@ -96,15 +96,19 @@ def rehearse_runs(
         console.print(_table(rows))
         for row in rows:
             if not row.get("has_arrived", False):
-                why = row.get("error") or row["outcome"]
-                console.print(f"{row['run']}, seed {row['seed']}: {why}")
+                console.print(f"{row['run']}, seed {row['seed']}: {_verdict(row)}")
     if not all(row.get("has_arrived", False) for row in rows):
         raise SystemExit(1)
 
 
 def _rehearsal(row: dict[str, Any]) -> dict[str, Any]:
     case_of(row)  # rejects another row
+    _verdict(row)
     return row
+
+
+def _verdict(row: dict[str, Any]) -> str:
+    return row.get("error") or row["verdict"]
 
 
 def _table(rows: Sequence[dict[str, Any]]) -> Table:

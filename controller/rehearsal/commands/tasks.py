@@ -113,7 +113,7 @@ def cell(rows: Sequence[TaskResult]) -> str:
         return "-"
     share = sum(row.share or 0.0 for row in ran) / len(ran)
     seconds = sum(row.duration_s or 0.0 for row in ran) / len(ran)
-    tripped = sum(row.ended != "ran to its end" for row in ran)
+    tripped = sum(row.is_tripped for row in ran)
     return f"{share:.2f} {seconds:.0f} s" + (f", {tripped} tripped" if tripped else "")
 
 

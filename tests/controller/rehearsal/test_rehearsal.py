@@ -76,7 +76,7 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     assert np.array_equal(truth.head_m, again.head_m)
     assert first.summary.pose_source == "udp"
     assert first.record.header.port_is_pseudo_terminal
-    found = judge(truth, first.record, first.outcome.tripped, first.summary.outcome)
+    found = judge(truth, first.record, first.summary)
     assert found.has_arrived
     assert found.is_true
     assert found.pose_error_rms_m is not None
@@ -97,7 +97,7 @@ def test_a_rehearsal_repeats_bit_for_bit_and_is_judged(rehearsed: Rehearse) -> N
     assert metrics.true_eta is not None
     assert lost.true_eta < 0.5 * metrics.true_eta
     moved_m = truth.centre_m + np.array([0.0, 3.0, 0.0])
-    wrong = judge(replace(truth, centre_m=moved_m), first.record, None, first.summary.outcome)
+    wrong = judge(replace(truth, centre_m=moved_m), first.record, first.summary)
     assert (wrong.truly_reached, wrong.claimed) == (0, 1)
     assert wrong.text.endswith("the run claims 1: that is false")
 
@@ -110,7 +110,7 @@ def test_a_run_that_loses_its_pose_holds_and_fails_with_torque_off(rehearsed: Re
     assert not served.line.bank["Torque Enable"].any()
     events = [each.text for each in finished.record.events if each.kind == "pose"]
     assert any("the motion pauses for up to 0.6 s" in text for text in events)
-    found = judge(truth, finished.record, finished.outcome.tripped, finished.summary.outcome)
+    found = judge(truth, finished.record, finished.summary)
     assert not found.has_arrived
     rows = finished.record.pose_source
     assert rows.fault[-1].startswith("no usable pose")
@@ -227,7 +227,7 @@ def test_results_are_continued(
         work: object, cases: list[rehearsal.RehearsalCase], *, workers: int
     ) -> list[tuple[rehearsal.RehearsalCase, dict[str, object]]]:
         done.extend(cases)
-        facts = {"has_arrived": True, "is_true": True, "outcome": "every waypoint reached"}
+        facts = {"has_arrived": True, "is_true": True, "verdict": "2 of 2 waypoints"}
         facts |= dict.fromkeys(
             ("path_error_mean_m", "pose_error_rms_m", "heading_error_rms_deg"), 0.01
         )

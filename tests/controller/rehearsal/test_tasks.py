@@ -53,9 +53,10 @@ def test_a_short_swim_and_a_walk_without_waypoints(
     found = json.loads(CliRunner().invoke(app, [*words, "--json"], catch_exceptions=False).stdout)
     swum, walked = found["tasks"]
     assert 0.1 < swum["share"] < 1.0
-    assert swum["ended"] == "ran to its end"
+    assert swum["verdict"].startswith("moved ")
+    assert not swum["is_tripped"]
     assert walked["share"] is None
-    assert walked["ended"].startswith("not applicable: walk goes to waypoints")
+    assert walked["verdict"].startswith("not applicable: walk goes to waypoints")
 
     def twice(item: TaskRun) -> TaskResult:
         raise AssertionError(f"{item} ran twice")
@@ -98,10 +99,10 @@ def test_a_controller_of_another_package_enters_as_on_the_page(
         unknown = run_task(TaskRun("swimming", "slow-wav", 0))
     finally:
         plugins.foreign_plugins.cache_clear()
-    assert own.ended == "ran to its end"
+    assert own.verdict.startswith("moved ")
     assert own.share is not None
     assert 0.0 < own.share < 1.0
-    assert unknown.ended.startswith("not applicable: ")
+    assert unknown.verdict.startswith("not applicable: ")
 
 
 def test_the_score_is_the_way_of_the_body_between_the_ends() -> None:
@@ -124,8 +125,8 @@ def test_the_score_is_the_way_of_the_body_between_the_ends() -> None:
 def test_a_controller_that_does_not_fit_is_a_result(task: str, controller: str, why: str) -> None:
     result = run_task(TaskRun(task, controller, 0))
     assert result.share is None
-    assert result.ended.startswith("not applicable: ")
-    assert why in result.ended
+    assert result.verdict.startswith("not applicable: ")
+    assert why in result.verdict
 
 
 def test_an_unknown_task_is_named() -> None:
@@ -135,8 +136,8 @@ def test_an_unknown_task_is_named() -> None:
 
 def test_cells_are_means_over_the_seeds() -> None:
     rows = [
-        TaskResult("slalom", "walk", k, share=s, duration_s=10.0, ended=e)
-        for k, (s, e) in enumerate([(1.0, "ran to its end"), (0.5, "over current")])
+        TaskResult("slalom", "walk", k, share=s, duration_s=10.0, is_tripped=e)
+        for k, (s, e) in enumerate([(1.0, False), (0.5, True)])
     ]
     assert cell(rows) == "0.75 10 s, 1 tripped"
-    assert cell([TaskResult("slalom", "walk", 0, ended="not applicable: x")]) == "-"
+    assert cell([TaskResult("slalom", "walk", 0, verdict="not applicable: x")]) == "-"
