@@ -24,16 +24,17 @@ FREE_BYTES: Final = 16_000_000
 """Any file may expand to this (ours): a mask of zeros is packed a thousandfold."""
 MOST_RATIO: Final = 100
 MOST_BYTES: Final = 1_000_000_000
-"""Above ``FREE_BYTES``: unpacked over packed, and unpacked, at most (ours)."""
+"""Largest ratio of unpacked to packed size, and largest unpacked size, above ``FREE_BYTES``
+(ours)."""
 MOST_TEXT_RATIO: Final = 20
 MOST_TEXT_BYTES: Final = 500_000_000
-"""The same limit for JSON (ours): parsing needs several times its size in memory."""
+"""Largest size of a JSON text (ours): parsing needs several times its size in memory."""
 MOST_LOG_BYTES: Final = 16_000_000_000
-"""The same limit for a log, which is read row by row (ours): 30 hours of 16 servos at 50 Hz."""
+"""Largest size of a log, which is read row by row (ours): 30 hours of 16 servos at 50 Hz."""
 MOST_JSON_BYTES: Final = 64_000_000
-"""Limit of a JSON file that is read at once (ours)."""
+"""Largest size of a JSON file that is read at once (ours)."""
 MOST_STORAGE_BYTES: Final = 1_000_000
-"""Limit of a calibration file (ours)."""
+"""Largest size of a calibration file (ours)."""
 _MOST_NESTED, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
 _NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
 _ENDS: Final = ("]", "}", "</", "/>")
@@ -252,4 +253,4 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":
     if math.prod(shape) * max(dtype.itemsize, 1) > member.file_size:
         raise ValueError(f"{member.filename}: says {shape}, and holds less")
     with archive.open(member) as stream:
-        return np.asarray(np.lib.format.read_array(stream, allow_pickle=False))
+        return np.lib.format.read_array(stream, allow_pickle=False)

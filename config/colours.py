@@ -26,36 +26,36 @@ COLOURS: Final = {
     "red": RED,
     "purple": PURPLE,
 }
-"""The palette by name, as ``column.Curve`` uses it."""
+"""Colours by their names, as ``column.Curve`` uses them."""
 SERIES: Final = (BLUE, RED, GREEN, AMBER, PURPLE, SKY, INK, GREY)
 """Colours of things of one kind, in this order: runs, robots, joints."""
 LOWLAND: Final = "#606e46"
 HIGHLAND: Final = "#d6c098"
-"""Lowest and highest ground; places between are lighter the higher they are."""
+"""Colours of the lowest and the highest ground; higher places are lighter."""
 
 MEASURED: Final = BLUE
-"""Measured or simulated values."""
+"""Colour of measured or simulated values."""
 GOAL: Final = AMBER
-"""Goals that are sent to servos, and predictions."""
+"""Colour of goals that are sent to servos, and of predictions."""
 ASKED: Final = GREY
-"""Values that the motion asks for, before the safety layer."""
+"""Colour of values that the motion asks for, before the safety layer."""
 PATH: Final = INK
 TO_COME: Final = RED
-"""Waypoints that are not reached."""
+"""Colour of waypoints that are not reached."""
 REACHED: Final = GREEN
 HIGHEST: Final = RED
-"""The joint or servo with the highest value."""
+"""Colour of the joint or servo with the highest value."""
 MEAN: Final = SKY
-"""Mean of all joints, or all servos."""
+"""Colour of the mean of all joints, or all servos."""
 SUPPLY: Final = AMBER
 WARNING: Final = AMBER
 FAULT: Final = RED
 
 
 CENTRE: Final = BLUE
-"""Track of the body's centre."""
+"""Colour of the track of the body's centre."""
 HEAD: Final = SKY
-"""Track of the head."""
+"""Colour of the track of the head."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -13,4 +13,4 @@ DEFAULT_SERVO_MODEL = "XM430-W350"
 DEFAULT_BAUD: Literal[1_000_000] = 1_000_000
 """Baud rate of a bus in bit/s, if nothing else is known."""
 LOOK = "servos"
-"""Body in a film that names none."""
+"""Look of the body in a film that names none."""

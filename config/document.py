@@ -38,10 +38,10 @@ SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
     "faults": FaultPlan,
     "servo": ServoModel,
 }
-"""Model by the name of its file; a synthesis is also a table of a run."""
+"""Schemas by the names of their files; a synthesis is also a table of a run."""
 
 WRITTEN_BY_PROGRAM: Final = ("described_models",)
-"""Keys that loading a file fills; no page or template shows them."""
+"""Keys that the program fills when it loads a file; no page or template shows them."""
 _HEAD = """# Configuration
 
 A run is a TOML file that names a robot and a world; each is a shipped name or a path ending in

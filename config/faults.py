@@ -170,7 +170,7 @@ ScheduledFault = (
     | UnplugFault
     | PortFault
 )
-"""Faults that begin and end at a time; the others change packets or stop the host."""
+"""Fault that begins and ends at a time; other faults change packets or stop the host."""
 Fault = Annotated[NoiseFault | StallFault | ScheduledFault, Field(discriminator="kind")]
 
 

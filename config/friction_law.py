@@ -17,7 +17,7 @@ import numpy as np
 
 LawName = Literal["scales", "wheels", "ellipse"]
 LAWS: tuple[LawName, ...] = ("ellipse", "scales", "wheels")
-"""Names; the index is the code that compiled loops read."""
+"""Names of the friction laws; the index of a law is its code in compiled loops."""
 ELLIPSE, SCALES, WHEELS = range(3)
 Number = Any
 """A float in a loop, an array in a table."""

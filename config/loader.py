@@ -35,7 +35,7 @@ Kind = Literal[
 ]
 
 _ONE_OF: Final = {"policies": "policy"}
-"""Kinds whose singular is not the word without its s."""
+"""Singulars of the kinds of files that do not end in s."""
 
 
 def shipped(kind: Kind) -> tuple[str, ...]:

@@ -28,9 +28,9 @@ MOTIONS: Final = (
     "repertoire",
     "source",
 )
-"""Motions that need no plug-in."""
+"""Names of the motions that need no plug-in."""
 WALKS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
-"""Motions along waypoints."""
+"""Names of the motions that follow waypoints."""
 MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
 """A motion of ``MOTIONS``, or the name of a plug-in."""
 

@@ -12,7 +12,7 @@ from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.strict_toml import checked, read_toml
 
 FOLDER: Final = Path(__file__).parent / "servos"
-"""One file for each shipped model."""
+"""Folder with a file for each shipped servo model."""
 _MOST_FILES: Final = 5
 """Longest chain of files that are each like the next (ours)."""
 

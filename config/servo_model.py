@@ -14,7 +14,7 @@ from pydantic import Field, StringConstraints, model_validator
 from snakewalk.config.base import Strict
 
 TABLE_BYTES: Final = 1024
-"""Addresses that a control table may use."""
+"""Number of addresses that a control table may use."""
 MODES: Final = (0, 1, 3, 4, 5, 16)
 """Operating Mode of Protocol 2.0: current, velocity, position, extended position, current-based
 position, PWM."""
@@ -28,7 +28,7 @@ Alarm = Literal["overload", "overheating", "voltage", "encoder", "shock"]
 Block = tuple[int, int, int]
 
 _P_GAIN_DIVISOR: Final = 128.0
-"""E-manual, X series, Position P Gain."""
+"""Divisor of the register Position P Gain (e-manual, X series)."""
 _FOR_A_RUN: Final = (
     "Model Number",
     "Firmware Version",

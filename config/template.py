@@ -19,7 +19,7 @@ from snakewalk.config.field_facts import description_of
 from snakewalk.config.robot import RobotConfig
 
 _COLUMN: Final = 42
-"""Where the words behind a key begin."""
+"""Column in which the description behind a key begins."""
 
 
 def template(config: BaseModel, comment: str, without: Collection[str] = ()) -> str:

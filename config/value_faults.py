@@ -5,7 +5,7 @@ import re
 from typing import Any, Final
 
 _NOT_IN_NAMES: Final = r"/\\\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
-"""Folders, and the characters of ``plain_text``."""
+"""Characters that no name contains: those of folders and of ``plain_text``."""
 NAME_PATTERN: Final = f"^[^.{_NOT_IN_NAMES}][^{_NOT_IN_NAMES}]*$"
 STOP_OUTPUT_PATTERN: Final = r"^(-?(rts|dtr):.+|command:/.+)$"
 PATTERNS_IN_WORDS: Final = {

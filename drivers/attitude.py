@@ -14,11 +14,11 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 
 CORRECTION_1_S: Final = 0.5
-"""How fast up is corrected (ours): an error is down to a third in two seconds."""
+"""Rate of the correction of the up direction (ours): an error falls to a third in two seconds."""
 _AT_REST: Final = 0.15
 """A force that differs from gravity by a greater part says nothing of up (ours)."""
 _LONGEST_S: Final = 0.2
-"""After a longer pause without a reading a correction counts as one of this length (ours)."""
+"""Longest pause between readings that a correction counts, s (ours)."""
 
 
 def rotations() -> Any:

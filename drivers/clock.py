@@ -21,7 +21,7 @@ class WallClock:
 
     def __init__(self) -> None:
         self.zero_s = time.monotonic()
-        """Its zero, in the time of the machine's monotonic clock."""
+        """Zero of the clock, in the time of the machine's monotonic clock."""
 
     def now_s(self) -> float:
         """Seconds since creation."""

@@ -1,7 +1,6 @@
 """The joint link: the interface between the controller and the joints."""
 
-from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.types import JointCommand, JointState
@@ -20,9 +19,9 @@ class LoadEstimate(Protocol):
     """Estimates of a chain's current and of its motors' temperatures."""
 
     current_a: float
-    """Drawn by the chain now."""
+    """Current that the chain draws now, A."""
     charge_ah: float
-    """Drawn since the start."""
+    """Charge that the chain has drawn since the start, A h."""
     hottest_c: float
     """Temperature of the hottest winding; -inf before one is known."""
 
@@ -130,12 +129,6 @@ class VettedLink(JointLink, Protocol):
         """Enter the context; torque is off when it ends, even after an exception."""
         ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None:
+    def __exit__(self, kind: Any, error: Any, trace: Any, /) -> None:
         """Switch torque off."""
         ...

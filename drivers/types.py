@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bools, Floats
 
 LIMIT_SLACK_RAD = 0.2
-"""How far beyond its limit a joint may be measured, at the start and in a run (ours)."""
+"""Largest measured angle of a joint beyond its limit, at the start and in a run (ours)."""
 
 
 class JointCommand(NamedTuple):
     """Goal positions of all joints."""
 
     time_s: float
-    """Clock time for which it was made."""
+    """Clock time for which the command was computed."""
     goal_rad: Floats
     """(J,) goal positions; 0 is straight, positive yaw bends the body to the left."""
 
@@ -30,9 +30,9 @@ class ImuState(NamedTuple):
     """(3, 3) columns: the link's forward, left and up axes in a world whose up is right and whose
     heading is arbitrary, and drifts."""
     rate_rad_s: Floats
-    """(3,) about these axes."""
+    """(3,) rates of turning about the body's axes, rad/s."""
     age_s: float
-    """Since it was measured, at most."""
+    """Largest possible time since the measurement, s."""
     valid: bool
     """Whether this cycle's read succeeded."""
 
@@ -43,11 +43,11 @@ class JointState(NamedTuple):
     time_s: float
     """Clock time at the end of the read."""
     position_rad: Floats
-    """(J,)"""
+    """(J,) measured joint angles, rad."""
     velocity_rad_s: Floats
-    """(J,)"""
+    """(J,) measured joint velocities, rad/s."""
     current_a: Floats
-    """(J,)"""
+    """(J,) measured motor currents, A."""
     temperature_c: Floats
     """(J,) from the slow round; NaN until first read."""
     voltage_v: Floats
@@ -64,7 +64,7 @@ class JointState(NamedTuple):
     slow_age_s: Floats
     """(J,) the same for temperature and voltage; infinite until first read."""
     imu: ImuState | None = None
-    """None where the robot has none, or it has not shown an attitude yet."""
+    """Attitude measured by the robot's IMU; None without an IMU, or before its first attitude."""
 
 
 class BodyPose(NamedTuple):

@@ -36,10 +36,10 @@ class ServoDrive:
     supply_v: Floats
     resistance_ohm: Floats
     torque_constant_n_m_a: Floats
-    """k_t at the output shaft; k_e in V s/rad is the no-load voltage over speed."""
+    """Torque constant k_t at the output shaft; k_e in V s/rad is the no-load voltage over speed."""
     back_emf_v_s: Floats
     current_limit_a: Floats
-    """Inf where the operating mode does not limit it."""
+    """Limit of the current; infinite if the operating mode does not limit it."""
     # written by the plant, in its last step
     current_a: Floats = field(init=False)
     torque_n_m: Floats = field(init=False)
@@ -50,7 +50,7 @@ class ServoDrive:
     returned_j: Floats = field(init=False)
     """Electrical energy that the motor gave back."""
     heat_j: Floats = field(init=False)
-    """``i^2 R`` of the winding."""
+    """Heat of the winding, ``i^2 R``, J."""
     work_j: Floats = field(init=False)
     """Net work of the torque at the shaft; negative where the load turned the motor."""
 
@@ -130,7 +130,7 @@ class LinkMotion(NamedTuple):
 
     time_s: float
     centre_m: Floats
-    """(3,)"""
+    """(3,) centre of the link in the world, m."""
     rotation: Floats
     """(3, 3) columns: forward, left and up axes in the world."""
 

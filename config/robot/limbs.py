@@ -64,12 +64,12 @@ class LimbJoint(NamedTuple):
     """One joint of a leg; it moves the link with its index plus one."""
 
     pair: int
-    """Index in ``limbs``."""
+    """Index of the pair of limbs in ``limbs``."""
     side: Literal["left", "right"]
     place: int
-    """0 at the hip."""
+    """Number of the segment in its limb; 0 at the hip."""
     has_foot: bool
-    """Whether the link that it moves ends in the foot."""
+    """Whether the link that the joint moves ends in the foot."""
 
     @property
     def outward(self) -> float:

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field
 from snakewalk.config.base import Strict
 
 SIMULATED = "sim"
-"""The port of servos that are simulated while the others of the chain are real."""
+"""Name of the port of servos that are simulated while the others of the chain are real."""
 URL_SCHEMES: Final = ("socket", "rfc2217", "loop")
 """Schemes of URLs that may be a port; others of pyserial, such as ``spy``, write to files."""
 

@@ -11,7 +11,7 @@ _GAINS: Final = {
     "position_i_gain": ("Position I Gain", "position_i_gains"),
     "position_d_gain": ("Position D Gain", "position_d_gains"),
 }
-"""Keys, their registers, and the properties with the value of each joint."""
+"""Gain keys, their registers, and the properties with the value of each joint."""
 
 
 def initial_gains(robot: JointValues) -> dict[str, int]:

@@ -33,7 +33,7 @@ _BAD_TIMES: Final = 3.0
 _BAD_DROP_V: Final = 0.1
 """... and if its drop exceeds theirs by this: two servos may measure differently by less (ours)."""
 _BAD_ERRORS: Final = 3.0
-"""... which is this number of standard errors (ours)."""
+"""Difference of a bad cable's drop in standard errors (ours)."""
 _LINE: Final = 5
 """Cables between two leads from which on it is asked how those share the current (ours)."""
 _LEAST_A: Final = 1e-3
@@ -49,11 +49,11 @@ class CableEstimate:
     low_ohm: Floats
     high_ohm: Floats
     usual_ohm: float
-    """That most of them have."""
+    """Usual resistance: that of most cables."""
     usual_low_ohm: float
     usual_high_ohm: float
     bad: tuple[int, ...]
-    """Cables that have far more."""
+    """Cables with a far higher resistance than the others."""
 
     def cabling(self, leads: Cabling) -> Cabling:
         """Cables as estimated, all but the bad ones as usual; leads as given."""
@@ -180,9 +180,9 @@ class Drop(NamedTuple):
     """A chain of S servos under a load."""
 
     servo_v: Floats
-    """(S,)"""
+    """(S,) supply voltage at each servo, V."""
     drawn_a: Floats
-    """(S,) from the supply."""
+    """(S,) current of each servo from the supply, A."""
     cable_a: Floats
     """(S - 1,) in each cable, positive away from the first servo."""
 
@@ -289,7 +289,7 @@ def drawn_a(robot: RobotConfig, duty: Floats, current_a: Floats) -> Floats:
 
     """
     measured = [facts.units.current_a is not None for facts in robot.servo_records]
-    return np.asarray(np.where(measured, np.abs(duty * current_a), np.nan) + _standby_a(robot))
+    return np.where(measured, np.abs(duty * current_a), np.nan) + _standby_a(robot)
 
 
 def _standby_a(robot: RobotConfig) -> Floats:

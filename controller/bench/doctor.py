@@ -90,13 +90,13 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
 
 
 OnStep = Callable[[str], None]
-"""Called with the name of a step."""
+"""Function that gets the name of each step."""
 _MEASURED = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
 _FEETECH_MEASURED = ("Present Position", "Present Temperature")
 _PINGED = 6
-"""Up to this number of missing servos are pinged at each baud rate; for more a broadcast is quicker
-(ours)."""
+"""Largest number of missing servos that are pinged at each baud rate; for more a broadcast is
+quicker (ours)."""
 _STILL_POSITIONS = 20
 """Positions, 1.8 degrees, by which a joint at rest may differ between two reads (ours)."""
 _STILL_RAD_S = 0.4
@@ -109,7 +109,7 @@ _TIMED = 2
 _ASKED = 4
 """Rounds of pings that show whose replies get lost (ours)."""
 _NOISE_TRIES = 10
-"""How often a request is made on a noisy line (ours)."""
+"""Number of requests on a noisy line before a servo counts as silent (ours)."""
 
 
 def examine(

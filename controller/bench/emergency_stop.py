@@ -50,7 +50,8 @@ class StopOutcome:
     safe: bool
     """Whether torque is known to be off."""
     after_s: float | None = None
-    """From the request until the run had switched torque off; None where no run held the port."""
+    """Time from the request until the run had switched torque off; None where no run held the
+    port."""
     process: int | None = None
     ports: tuple[str, ...] = ()
     folder: str | None = None

@@ -17,7 +17,7 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.errors import BusError, DriverError
 
 _REST_POSITIONS = 16
-"""How far a limp shaft may sag between two readings, positions: 1.4 degrees (ours)."""
+"""Largest change of a limp shaft between two readings, in positions: 1.4 degrees (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class HomingOffset:
     servo_id: int
     before: int
     after: int
-    """With it the straight joint is where the servo's own zero is."""
+    """New homing offset, with which the straight joint is at the servo's own zero."""
 
 
 def plan_homing(bus: DynamixelBus, robot: RobotConfig) -> tuple[HomingOffset, ...]:

@@ -22,7 +22,8 @@ class InventoryEntry:
 
     found: ScanResult
     report: ServoReport | None
-    """None where it answers a ping and no read, or the SDK does not know its model."""
+    """Report of the servo; None if it answers a ping and no read, or the SDK does not know its
+    model."""
 
     def to_dict(self) -> dict[str, object]:
         """For JSON."""

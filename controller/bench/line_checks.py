@@ -11,9 +11,10 @@ from snakewalk.drivers.bus.probe import Overheard, Probe
 from snakewalk.drivers.port.byte_port import BytePort
 
 OVERHEAR_S = 0.6
-"""How long the doctor listens before it says a word (ours): any other master talks by then."""
+"""Time for which the doctor listens before its first request (ours): any other master talks by
+then."""
 PATIENCE_S = 0.1
-"""How late a group read may be (ours): a busy computer does not make a bad line."""
+"""Largest delay of a group read (ours): a busy computer does not make a bad line."""
 _TEST_READS = 200
 _BAD_SHARE = 0.05
 """Share of the requests that a line may fail before it is a fault (ours)."""
@@ -35,7 +36,7 @@ _COMPARED = 3
 _LOST = 2
 """Lost replies of one servo beyond chance (ours)."""
 _STRAY_REPLIES = 3
-"""This number of foreign replies shows another master; a single one may be a late one to us."""
+"""Number of foreign replies that show another master; a single one may be a late reply."""
 
 
 def second_master(overheard: Overheard) -> Finding:

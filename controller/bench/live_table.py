@@ -37,7 +37,7 @@ class Snapshot:
     counts: str
     rows: Rows
     packets: tuple[Packet, ...]
-    """The latest, oldest first."""
+    """Latest packets, oldest first."""
 
 
 class LiveScreen:

@@ -22,9 +22,9 @@ class PortLines:
     """Opened lines, and which servo is on which."""
 
     port: str
-    """As it was asked for."""
+    """Name of the port as the user gave it."""
     lines: tuple[tuple[Line, tuple[int, ...] | None], ...]
-    """Each with the IDs that are on it; None: any servo."""
+    """Ports with the IDs of their servos; None: any servo."""
 
     @property
     def several(self) -> bool:

@@ -91,7 +91,7 @@ class ScanReport:
     """The servos that reply on a line, and the quality of the line."""
 
     servos: tuple[ScanResult, ...]
-    """By ID."""
+    """Found servos by ID."""
     noise_bytes: Mapping[int, int]
     """Baud rate to the bytes that belong to no packet, where there were any."""
     lossy: bool

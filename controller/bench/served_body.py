@@ -113,7 +113,7 @@ class PosePublisher:
         self._line_s = line_s
         self._sender = UdpSender(*address)
         self.sent = 0
-        """Datagrams so far."""
+        """Number of datagrams that were sent so far."""
 
     def __call__(self) -> None:
         """Send the datagrams that are due."""

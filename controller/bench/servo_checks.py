@@ -30,7 +30,8 @@ _DRIFT = 0.03
 _SLACK_S = 0.05
 """Additional difference of a clock that did not restart (ours)."""
 PATIENCE_S = 0.5
-"""How long a servo without a reply is asked for its clock (ours); a restart is shorter."""
+"""Longest time for which a servo without a reply is asked for its clock (ours); a restart is
+shorter."""
 _POWER_REMEDY = (
     "a loose plug, a bad cable, or a supply that sags: the servo loses its torque in a run"
 )

@@ -69,7 +69,7 @@ class SettingsResult:
     """Changes on a servo, made or planned."""
 
     servo: int
-    """The ID by which it was addressed."""
+    """ID by which the servo was addressed."""
     changes: tuple[SettingChange, ...]
     written: bool
     """Whether the changes were written and read back."""

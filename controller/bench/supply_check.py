@@ -22,12 +22,14 @@ from snakewalk.drivers.types import JointCommand
 _AMPLITUDE_RAD = 0.15
 _FREQUENCY_HZ = 3.0
 _CYCLES = 6
-"""At most 2.8 rad/s: within the limits of a run (4 rad/s) and of the servos' motors."""
+"""Cycles of the wiggle. Its speed is at most 2.8 rad/s: within the limits of a run (4 rad/s) and of
+the servos' motors."""
 _GROWING_CYCLES = 3
-"""At first the wiggle grows: a cable that is nearly broken is measured before an alarm ends it."""
+"""Cycles in which the wiggle grows: a cable that is nearly broken is measured before an alarm ends
+it."""
 _PERIOD_S = 0.02
-"""As of a run at 50 Hz. With each step of the goal the motors draw most of their current within a
-few milliseconds."""
+"""Period of a cycle, as of a run at 50 Hz. With each step of the goal the motors draw most of their
+current within a few milliseconds."""
 _DELAYS_S = (1e-3, 2e-3, 3e-3, 5e-3, 8e-3)
 """Delays of a reading behind a step, in turns: at one phase alone the readings might always miss
 the current.
@@ -36,7 +38,7 @@ _SAG_SHARE = 0.08
 """Share of the voltage at rest that the supply may lose (ours); a walk asks for more than this."""
 _OUTPUT = "Present PWM"
 _VOLTAGE_AT = 20
-"""In a block from Present PWM(124) on: Present Input Voltage(144)."""
+"""Place of Present Input Voltage(144) in a block from Present PWM(124) on."""
 _SUPPLY_BYTES = 3
 """A block of Present Input Voltage and Present Temperature alone."""
 _ENOUGH = 10
@@ -48,13 +50,13 @@ class Wiggle:
     """Measurements of S servos in T cycles while all joints moved."""
 
     rest_v: Floats
-    """(S,) before."""
+    """(S,) supply voltages at rest, before the motion."""
     voltage_v: Floats
-    """(T, S)"""
+    """(T, S) supply voltages during the motion."""
     drawn_a: Floats
     """(T, S) from the supply; NaN of servos without a current sensor."""
     fault: DriverError | None
-    """Error that ended it early."""
+    """Error that ended the measurement early."""
 
 
 def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -> list[Finding]:

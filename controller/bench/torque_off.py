@@ -15,11 +15,11 @@ from snakewalk.drivers.port.serial_port import SerialPort
 _LIKELY: Final = (1_000_000, 57_600)
 """Sent before anything slow is imported: the usual rate, and that of new servos."""
 _USB_S: Final = 5e-3
-"""How long an adapter may keep bytes before it sends them (ours)."""
+"""Longest time for which an adapter keeps bytes before it sends them (ours)."""
 _COPIES: Final = 3
-"""So often torque off is sent: noise may hit one (ours)."""
+"""Number of times that torque off is sent: noise may hit one (ours)."""
 _TRIES: Final = 8
-"""How often a servo is asked whether its torque is off (ours)."""
+"""Number of times that a servo is asked whether its torque is off (ours)."""
 _BITS_PER_BYTE: Final = 10
 _PAST: Final = 20
 """Number of times that torque off is sent past another program (ours): its packets hit some."""

@@ -45,7 +45,7 @@ class BodyContrast:
     frame: Image
     """(h, w[, 3]), of a compressed frame without its blocks."""
     coded: Image
-    """(h, w[, 3]) as the camera sent it."""
+    """(h, w[, 3]) picture as the camera sent it."""
     floors: tuple[Image, ...]
     """(h, w[, 3]) each: a pixel that one of them explains is floor."""
     near: NDArray[np.uint8]

@@ -45,9 +45,9 @@ class BoardView:
     """The corners found in one picture."""
 
     corners_px: Floats
-    """(N, 2) x, y."""
+    """(N, 2) corners of the board in the picture, x, y."""
     corners_m: Floats
-    """(N, 2) the same on the board."""
+    """(N, 2) corners of the board on the board, m."""
 
 
 @dataclass(frozen=True)

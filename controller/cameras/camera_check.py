@@ -27,10 +27,10 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _LOOK_S: Final = 0.25
 """Time between two searches for markers, which need longer than a frame."""
 _LINE_S: Final = 0.05
-"""Between two frames in which the body is looked for."""
+"""Time between two frames in which the body is looked for."""
 _LINES = 400
 _READS = 1000
-"""The latest samples for the latency: 20 s."""
+"""Number of latest samples for the latency: 20 s."""
 _SPARSE: Final = 8  # pixel step for the light
 
 
@@ -40,18 +40,18 @@ class CameraReport:
 
     frames: int
     size_px: tuple[int, int]
-    """Width, height."""
+    """Width and height of a picture."""
     duration_s: float
     rate_hz: float
-    """NaN of less than two frames."""
+    """Frame rate; NaN with less than two frames."""
     gap_max_s: float
     """Longest time between two frames."""
     seen: Mapping[int, float]
-    """By marker of the table: in which share of the pictures it was found."""
+    """Share of the pictures in which each marker of the table was found."""
     others: tuple[int, ...]
     """Markers in the last picture that the table does not name."""
     floor: FloorFit | None
-    """By the last picture; None where it shows too few markers."""
+    """Floor according to the last picture; None if it shows too few markers."""
     fault: str
     """Reason why the floor is missing; empty if it was found."""
     bump: Bump | None
@@ -59,7 +59,8 @@ class CameraReport:
     light_spread: float
     """Range of the picture's usual brightness (5 to 95 %), as a share of it."""
     latency: LatencyFit | None
-    """None if no joints were read, or the picture of the empty floor is missing."""
+    """Latency of the camera; None if no joints were read, or the picture of the empty floor is
+    missing."""
     distortion: Distortion | None = None
     """Distortion of an uncalibrated lens, where the markers of the last picture show it."""
 

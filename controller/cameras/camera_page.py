@@ -21,9 +21,9 @@ from snakewalk.controller.view.page_server import open_page
 from snakewalk.drivers.clock import WallClock
 
 _EVERY_S: Final = 0.2
-"""Between two pictures on the page."""
+"""Time between two pictures on the page."""
 _REPORT_S: Final = 1.0
-"""Between two reports on the page."""
+"""Time between two reports on the page."""
 _WIDTH_PX: Final = 700.0
 _COLOURS: Final = {"ok": "#1b7a3a", "warn": "#a15c00", "fail": "#b3121a"}
 _MARK: Final = (230, 60, 30)

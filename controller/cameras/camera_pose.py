@@ -31,11 +31,11 @@ DECISIVE = 0.25
 GAP_S = 0.2
 """A longer time without a frame that can be used is reported."""
 HISTORY_S = 2.0
-"""How far back a late frame may date."""
+"""Largest age of a late frame."""
 
 
 PriorAt = Callable[[float], BodyPrior | None]
-"""Where the body is believed to be at a time (s); None where it was lost."""
+"""Function that returns the believed place of the body at a time (s); None where it was lost."""
 
 
 class Camera(Protocol):
@@ -86,9 +86,9 @@ class CameraPose:
         self._gap = False
         self._bump: Bump | None = None
         self.frames = 0
-        """Frames taken in so far."""
+        """Number of frames that arrived so far."""
         self.used = 0
-        """Number of these that were used."""
+        """Number of frames that were used so far."""
         self.covariance: Floats | None = None
         """(3, 3) of x, y (m) and heading (rad) of the head in the last frame that was used."""
         self._sigma_m: list[float] = []

@@ -68,9 +68,9 @@ class CameraModel:
     height_m: float
     """Height of the lens above the floor."""
     lens: Lens | None = None
-    """Where it distorts, the homography is of pixels without distortion."""
+    """Lens of the camera; if it distorts, the homography is of pixels without distortion."""
     moved_px: tuple[float, float] = (0.0, 0.0)
-    """x, y by which the picture has moved since the homography was measured."""
+    """Shift of the picture in x and y since the homography was measured."""
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
     distortion: Distortion | None = None
@@ -243,7 +243,7 @@ class LineDetection:
     """The body's line in one frame."""
 
     time_s: float
-    """When the image was taken."""
+    """Time at which the image was taken."""
     line_m: Floats
     """(101, 2) axis of the body in the world from tip to tip, which end first is not known; NaN
     where the frame shows no whole body."""
@@ -263,7 +263,7 @@ class OverheadDetector:
     bump: Bump | None = None
     """Bump of the camera since its floor was pictured."""
     first: Self | None = None
-    """As it was before any bump that markers showed."""
+    """Camera before any bump that markers showed."""
     pictured: Image | None = None
     """The floor as it was pictured, if ``background`` has been learnt since: an object may be
     removed again, and either picture is floor."""

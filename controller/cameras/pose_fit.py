@@ -18,7 +18,7 @@ _ROUNDS = 5
 _BLUR_M = 0.003
 """Usual error of a link's place on the line."""
 _TIPS_M = 0.02
-"""How far the line's middle may be off the body's."""
+"""Largest distance of the line's middle from the body's."""
 _STIFF = _BLUR_M / _TIPS_M  # keeps the total slide near 0, not one step
 _ALIKE = 0.2  # share of a link's variance common to all links (ours)
 _REGULAR = 3e-5  # limits slide and shift of a straight body, which are equivalent
@@ -136,4 +136,4 @@ def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]
 
 def _turned(points: Floats, turn: Floats) -> Floats:
     """Points (..., 2) after ``turn`` (2, 2): ``points @ turn.T`` with a fixed order of sums."""
-    return np.asarray(points[..., :1] * turn[:, 0] + points[..., 1:] * turn[:, 1])
+    return points[..., :1] * turn[:, 0] + points[..., 1:] * turn[:, 1]

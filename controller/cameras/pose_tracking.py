@@ -21,7 +21,7 @@ from snakewalk.controller.images.compression import Compression
 from snakewalk.drivers.least_squares import least_squares
 
 REACH_M: Final = 0.10
-"""How far the body may be from where it is believed."""
+"""Largest distance of the body from its believed place."""
 _TURN_RAD: Final = 0.15
 _STEP_M, _STEP_RAD = 0.0125, 0.0375  # of the search
 _ROUNDS: Final = 8
@@ -73,7 +73,7 @@ class TrackedPose:
     """Result of a frame for an expected pose."""
 
     time_s: float
-    """When the image was taken."""
+    """Time at which the image was taken."""
     head_m: Floats
     """(2,) centre of the head link."""
     heading_rad: float
@@ -98,7 +98,7 @@ class StandingOut:
     """Difference from the floor in a window of a frame."""
 
     share: NDArray[np.float32]
-    """(h, w) 0: floor, 1: as much as the body."""
+    """(h, w) share of the body in each pixel; 0: floor, 1: body."""
     origin_px: Floats
     """(2,) x, y of its first pixel in the frame."""
     to_px: ToPixels
@@ -142,11 +142,11 @@ class _Chain:
     places_m: Floats
     """(S, 2) two sections a link."""
     ahead: Floats
-    """(S, 2) directions there."""
+    """(S, 2) directions of the body at the stations."""
     tips_m: Floats
     """(2, 2) head's, tail's."""
     out: Floats
-    """(2, 2) directions out of the body there."""
+    """(2, 2) directions out of the body at its two ends."""
     middle_m: Floats
     """(2,) of the sections."""
     head_m: Floats

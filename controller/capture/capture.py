@@ -52,7 +52,7 @@ class UnusableFilmError(InputError):
             skeleton.status for skeleton in skeletons if skeleton.status is not FrameStatus.GOOD
         ]
         self.reason: FrameStatus | None = None
-        """None: the film is too short."""
+        """Commonest status of the frames without points; None: the film is too short."""
         if not reasons:
             super().__init__(f"{name}: {len(skeletons)} frame: two or more are needed")
             return
@@ -70,7 +70,7 @@ class Capture:
     radius_px: Floats
     """(T, 101) half the body's thickness."""
     length_px: Floats
-    """(T,)"""
+    """(T,) length of the body in each frame, px."""
     status: tuple[FrameStatus, ...]
     expected_px: Floats
     """(T,) expected mean error of a point; NaN for a frame without a skeleton. Above a hundredth of
@@ -86,7 +86,7 @@ class Capture:
     head_by: str
     """How the head and the tail were distinguished: ``given``, ``travel``, ``wave``, ``taper``."""
     head_sure: float
-    """How surely, 0 to 1."""
+    """Certainty of the distinction of head and tail, 0 to 1."""
     places_recorded: bool = True
     """Whether the points of all frames share one origin; images cropped to the animal have none."""
 
@@ -98,12 +98,12 @@ class Capture:
     @property
     def used(self) -> Bools:
         """(T,) frames that hold a skeleton, good or rough."""
-        return np.asarray(np.isfinite(self.length_px))
+        return np.isfinite(self.length_px)
 
     @property
     def with_distractors(self) -> Bools:
         """(T,) frames in which another object, larger than a speck, stands out: a small animal."""
-        return np.asarray(self.distractors > _DISTRACTOR)
+        return self.distractors > _DISTRACTOR
 
     @property
     def counts(self) -> dict[str, int]:
@@ -254,7 +254,7 @@ class CaptureFile:
     captured: Capture
     name: str
     m_per_px: float | None = None
-    """None: no scale."""
+    """Scale of the picture; None: unknown."""
     rate_assumed: bool = False
     source: str = "not stated"
     licence: str = "not stated"

@@ -65,9 +65,9 @@ class _Solution:
     """A stretch followed from one side, then fitted as a whole."""
 
     values: Floats
-    """(K, PARAMETERS)"""
+    """(K, PARAMETERS) parameters of the body in each frame."""
     left: Floats
-    """(K,) ``left_over``."""
+    """(K,) unexplained part of each frame (``left_over``)."""
     error: Floats
     """(K,) expected mean error of a point by the fit alone, working px."""
     cost: float
@@ -135,7 +135,7 @@ class _End:
 
     values: Floats
     turned: Floats
-    """The same with its other end first."""
+    """Solution of the stretch with the body's other end first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class _Solved:
 
     skeletons: list[Skeleton]
     expected_px: list[float]
-    """NaN where the frame is not solved, or was good before."""
+    """Expected error; NaN where the frame is not solved, or was good before."""
     turned: bool
     """Whether the ends changed places in the stretch."""
 

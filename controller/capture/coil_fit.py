@@ -108,11 +108,11 @@ class Shape:
 
     def to_px(self, line: Floats) -> Floats:
         """Places in the image, of places (P, 2) on the working grid."""
-        return np.asarray(line / self.scale + self.first_px)
+        return line / self.scale + self.first_px
 
     def from_px(self, line_px: Floats) -> Floats:
         """Places on the working grid, of places (P, 2) in the image."""
-        return np.asarray((line_px - self.first_px) * self.scale)
+        return (line_px - self.first_px) * self.scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ class CoilBody:
 
     length: float
     half_width: Floats
-    """(_DISCS,)"""
+    """(_DISCS,) half widths along the body."""
     scale: float
     """Working pixels a pixel."""
 

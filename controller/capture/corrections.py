@@ -36,14 +36,14 @@ class RedrawnFrame(Strict):
         max_length=10_000,
         description="points along the midline in pixels, head first",
     )
-    """x, y in the picture, head first, y downwards."""
+    """Points in the picture as x, y, head first, y downwards."""
 
 
 class Corrections(Strict):
     """Corrections by the user; frames count from 0."""
 
     track: str = Field(description="file of the track that is corrected")
-    """``CaptureFile.fingerprint`` of the reviewed track."""
+    """Fingerprint of the reviewed track (``CaptureFile.fingerprint``)."""
     frames: int = Field(ge=1, description="number of frames of the track")
     """Number of frames of that track."""
     flipped: tuple[int, ...] = Field((), description="frames in which head and tail are exchanged")

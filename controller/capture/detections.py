@@ -55,9 +55,9 @@ class Detections:
     ends_px: list[Floats] = field(default_factory=list)
     """(2, 3) by frame: where the profile of the body ends, and the doubt; NaN if not known."""
     file: ImageFile = field(default_factory=ImageFile)
-    """The pictures that are kept."""
+    """File of the pictures that are kept."""
     store: FrameStore = field(init=False)
-    """The surroundings of the body in every frame."""
+    """Surroundings of the body in every frame."""
     crops: CropStore = field(init=False)
     """By frame: small bodies, and where a small body was lost its last place."""
     stated_s: list[float] = field(default_factory=list)

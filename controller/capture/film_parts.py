@@ -42,7 +42,7 @@ class FilmParts:
     head_px: tuple[float, float] | None = None
     fixed: bool = True
     folder: PartFolder | None = None
-    """Where finished parts are kept; None: in memory only."""
+    """Folder of the finished parts; None: they stay in memory."""
     part_frames: int = PART_FRAMES
     finished: list[FinishedPart] = field(default_factory=list)
     _found: Detections = field(default_factory=Detections)

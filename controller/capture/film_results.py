@@ -11,7 +11,7 @@ from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film
 from snakewalk.controller.capture.review import review_page
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 
 
 def in_whole_film(options: CaptureOptions, film: OpenedFilm, captured: Capture) -> Capture:
@@ -61,5 +61,4 @@ def write_looks(
             origin_px=region.origin_px,
             on_progress=bar.advance,
         )
-        with atomic_write(options.review) as part:
-            part.write_text(text, encoding="utf-8")
+        write_result(options.review, text)

@@ -55,11 +55,6 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
     return (other - same) / max(other + same, 1e-9)
 
 
-def aligned_to(body: Skeleton, before: Skeleton) -> Skeleton:
-    """The body with the end first that was first ``before``; both must be good."""
-    return body.reversed() if margin_of(body, before) < 0.0 else body
-
-
 def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
     """Put the same end first in every frame; the end of the first skeleton is kept."""
     out = list(skeletons)

@@ -69,7 +69,7 @@ def large_array(shape: tuple[int, ...], folder: Path | None) -> Floats:
     if folder is None or 8 * int(np.prod(shape)) <= IN_MEMORY_BYTES:
         return np.empty(shape)
     with tempfile.TemporaryFile(dir=folder) as file:
-        return np.asarray(np.memmap(file, dtype=np.float64, mode="w+", shape=shape))
+        return np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
 
 
 def scaled(

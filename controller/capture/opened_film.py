@@ -23,18 +23,18 @@ class OpenedFilm:
     footage: Footage
     region: Region
     first: DeepImage
-    """The first frame, whole."""
+    """First frame, whole."""
     some: tuple[DeepImage, ...]
     """Frames spread over the film, cut to the region."""
     one_size: bool
     """Whether all of these have the same size."""
     in_colour: bool
     background: DeepImage | None
-    """The given one, cut to the region."""
+    """Background that the user gave, cut to the region."""
     threshold: float | None
-    """The contrast that the user knows, in the levels of 8 bit."""
+    """Contrast threshold that the user gave, in the levels of 8 bit."""
     head_px: tuple[float, float] | None
-    """The given place of the head in the region."""
+    """Place of the head in the region that the user gave."""
     stated_s: "array[float]" = field(default_factory=lambda: array("d"))
     """Times of the frames, as the film states them; filled by ``frames``."""
 

@@ -13,7 +13,7 @@ _FILMS = (".mp4", ".mkv", ".avi")
 _PAGES = (".html", ".htm")
 _SHEETS = (".png", ".jpg", ".jpeg")
 AUTO = "auto"
-"""Value of ``animals``: those that persist."""
+"""Value of ``animals`` that follows all animals that persist."""
 MOST_ANIMALS = 200
 
 

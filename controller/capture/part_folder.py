@@ -14,7 +14,7 @@ from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_arrays, r
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import atomic_write, write_result
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -31,12 +31,12 @@ class FinishedPart:
     head_by: str
     head_sure: float
     first: Skeleton | None
-    """The first body; None in a part without a body."""
+    """First body; None in a part without a body."""
     last: Skeleton | None
     time_s: Floats
     """(T,) times of the frames, as the film states them."""
     content: Capture | Path
-    """The part, or its file."""
+    """Content of the part, or its file."""
 
     @classmethod
     def of(cls, part: Capture, file: Path | None = None) -> "FinishedPart":
@@ -77,9 +77,9 @@ class PartFolder:
 
     path: Path
     settings: dict[str, Any]
-    """The film and the options on which the parts depend."""
+    """Film and options on which the parts depend."""
     parent: "PartFolder | None" = None
-    """The folder of a film of several animals, each of which has a folder there."""
+    """Folder of a film of several animals, which contains a folder for each animal."""
 
     def start(self, *, resume: bool, force: bool) -> list[FinishedPart]:
         """Return the finished parts; none of a new capture.
@@ -144,8 +144,7 @@ class PartFolder:
         if self.parent is not None:
             self.parent._begin()
         self.path.mkdir(exist_ok=True)
-        with atomic_write(self.path / _SETTINGS) as file:
-            file.write_text(json.dumps(self.settings), encoding="utf-8")
+        write_result(self.path / _SETTINGS, json.dumps(self.settings))
 
     def of_animal(self, number: int) -> "PartFolder":
         """Return the folder of one of several animals."""

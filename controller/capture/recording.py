@@ -29,7 +29,7 @@ class PaceFacts:
     joint_acceleration_rad_s2: float
     joint_speed_limit_rad_s: float
     times_no_load_speed: float | None
-    """None if the servo's motor is unknown."""
+    """Largest speed of a joint over the no-load speed; None if the servo's motor is unknown."""
     slowed_by: float
     slowed_by_for_speed: float
     slowed_by_for_acceleration: float

@@ -87,7 +87,7 @@ last bit, and so would runs. numpy ignores unknown names."""
 _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _STOP = "snakewalk.controller.bench.emergency_stop"
-"""The only command that must not wait for imports."""
+"""Name of the only command that must not wait for imports."""
 _NO_MEMORY = "not enough memory; end other programs, or raise the limit (ulimit -v)"
 _INTERRUPTED = 130
 """Exit code after Ctrl-C, which has been reported."""

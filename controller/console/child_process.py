@@ -25,7 +25,7 @@ from snakewalk.controller.console.safe_path import module_folders
 _CONTEXT: Final = get_context("spawn")
 """A forked child would inherit the threads of MuJoCo and numba in an unknown state."""
 _LOCK: Final = threading.RLock()
-"""The environment belongs to the whole process."""
+"""Lock of the environment, which belongs to the whole process."""
 
 
 def child_environ() -> dict[str, str]:

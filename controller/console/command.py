@@ -25,7 +25,7 @@ class CommandInfo:
     """Words and examples of a command."""
 
     words: str
-    """``plan``, or ``bus serve`` for a command below a subject."""
+    """Words of the command: ``plan``, or ``bus serve`` for a command below a subject."""
     examples: tuple[str, ...]
     """Command lines without the leading ``snakewalk``."""
     results: tuple[str, ...] = ()

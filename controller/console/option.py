@@ -31,7 +31,8 @@ class Flag:
     """How a command line spells a field; part of the field's annotation."""
 
     names: tuple[str, ...] = ()
-    """With dashes, ``--film/--no-film`` with an opposite; by default ``--`` and the field's."""
+    """Names of the option with dashes, ``--film/--no-film`` with an opposite; by default ``--`` and
+    the field's."""
     metavar: str | None = None
     """Name of the value in the help."""
     complete: Complete | None = None

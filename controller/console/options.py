@@ -5,7 +5,7 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -344,6 +344,23 @@ def show(result: Mapping[str, object], as_json: bool) -> None:
     for key, value in result.items():
         if value is not None and value not in ("", [], (), {}):
             table.add_row(*labelled(key, value))
+    console.print(table)
+
+
+_NUMBER: Final = re.compile(r"[-+]?\d|-?$")
+
+
+def print_table(
+    heads: Iterable[str], rows: Iterable[Iterable[object]], title: str | None = None
+) -> None:
+    """Print rows below heads; numbers are on the right, and a None is empty."""
+    cells = [["" if value is None else str(value) for value in row] for row in rows]
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for head, *column in zip(heads, *cells, strict=True):
+        is_number = any(column) and all(map(_NUMBER.match, column))
+        table.add_column(head, justify="right" if is_number else "left")
+    for row in cells:
+        table.add_row(*row)
     console.print(table)
 
 

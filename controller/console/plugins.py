@@ -70,13 +70,13 @@ class Plugin:
     """One plug-in, as a manifest lists it."""
 
     kind: str
-    """One of ``KINDS``."""
+    """Kind of the plug-in, one of ``KINDS``."""
     name: str
     """Words of a command; the value of an option for the other kinds."""
     help: str
-    """One line."""
+    """Description of the plug-in in one line."""
     target: str
-    """``module:attribute``."""
+    """Place of the code: ``module:attribute``."""
     group: str
     """Group of a command in ``--help``."""
     package: str

@@ -2,8 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
-from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from rich.progress import (
     BarColumn,
@@ -61,14 +60,9 @@ class ProgressBar:
         self._progress.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Leave the last state, or nothing of a transient bar."""
-        self._progress.__exit__(kind, error, trace)
+        self._progress.__exit__(*raised)
 
     def update(
         self,
@@ -106,16 +100,11 @@ class RunBar(ProgressBar):
         self.total = total
         self._cycles = 0
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Remove the bar of a run that failed before its first cycle."""
-        if kind is not None and self._cycles == 0:
+        if raised[0] is not None and self._cycles == 0:
             self.hide()
-        super().__exit__(kind, error, trace)
+        super().__exit__(*raised)
 
     def _is_due(self, progress: "RunProgress") -> bool:
         self._cycles += 1

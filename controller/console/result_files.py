@@ -229,3 +229,9 @@ def atomic_write(path: Path) -> Iterator[Path]:
             raise OSError(error.errno, error.strerror, str(path)) from error
         for part in sorted(Path(folder).iterdir()):
             part.replace(path.parent / part.name)
+
+
+def write_result(path: Path, text: str) -> None:
+    """Write a text file as ``atomic_write`` does."""
+    with atomic_write(path) as part:
+        part.write_text(text, encoding="utf-8")

@@ -16,7 +16,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.runlog.record import RunRecord
 
 WORLD: Final = "world"
-"""The frame of the head's pose."""
+"""Name of the frame of the head's pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +24,13 @@ class BodyFrames:
     """Frames of all links, each in the one that it hangs on; the head's in the world."""
 
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the frames, s."""
     names: tuple[str, ...]
     """L names, head first; the segments of legs behind the spine, in the order of the bus."""
     parents: tuple[str, ...]
     """L names."""
     translation_m: Floats
-    """(T, L, 3)"""
+    """(T, L, 3) positions of the links in their parents' frames, m."""
     quaternion: Floats
     """(T, L, 4) as x, y, z, w."""
 

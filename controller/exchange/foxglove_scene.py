@@ -124,12 +124,12 @@ _UPRIGHT: Final = (0.0, 0.0, 0.0, 1.0)
 _ALONG: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
 """Turns a cylinder, which stands along z, along x."""
 _ACROSS: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
-"""The same along y."""
+"""Quaternion that turns a cylinder, which stands along z, along y."""
 _MARGIN_M: Final = 1.0
-"""How far a flat floor is drawn beyond the path (ours)."""
+"""Width of the flat floor that is drawn beyond the path (ours)."""
 _WIDTH_PX: Final = 3.0
 _PATH_HEIGHT_M: Final = 0.005
-"""Above the ground, so that the line is seen (ours)."""
+"""Height of a drawn line above the ground, so that it is visible (ours)."""
 
 
 def write_foxglove_scene(record: RunRecord, path: Path) -> dict[str, int]:

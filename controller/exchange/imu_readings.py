@@ -18,9 +18,9 @@ class ImuReadings:
     """Readings of the device; no rows where the log has none."""
 
     frame: str
-    """Link that it sits in."""
+    """Link that carries the IMU."""
     time_s: Floats
-    """(N,) when they were measured."""
+    """(N,) times of the readings, s."""
     quaternion: Floats
     """(N, 4) as x, y, z, w: the link in a world whose heading begins anywhere, and drifts."""
     rate_rad_s: Floats

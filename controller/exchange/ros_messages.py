@@ -68,7 +68,7 @@ SHOWN: Final[Shown] = {
 UNKNOWN_VARIANCE: Final = 1e6
 """Variance of an unknown value, as `robot_localization` expects it."""
 _LEAST_VARIANCE: Final = 1e-6
-"""The variance of an exact pose: zeros would mean that the covariance is unknown."""
+"""Variance of an exact pose: zeros would mean that the covariance is unknown."""
 
 
 class Row(NamedTuple):

@@ -71,4 +71,4 @@ def _thin(rows: Floats) -> Floats:
     is_known = np.isfinite(blocks)
     count = is_known.sum(axis=1)
     total = np.where(is_known, blocks, 0.0).sum(axis=1)
-    return np.asarray(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

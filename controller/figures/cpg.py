@@ -22,7 +22,8 @@ GAITS_SHOWN = ("sidewinding", "rolling", "concertina", "lateral-undulation")
 STEP_S = 0.02
 STAY_S = 5.0
 JOINTS_SHOWN = (1, 2, 5, 10)
-"""From the head; odd: yaw, even: pitch. All sixteen would fill the panels."""
+"""Joints that the figure shows, from the head; odd: yaw, even: pitch. All sixteen would fill the
+panels."""
 
 
 def draw(out: Path) -> None:

@@ -102,7 +102,6 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
         ]
         figure.legend(handles=marks, loc="outside lower center", ncols=3)
         figure.suptitle(f"{gait.name} on {robot.name}", x=0.01, ha="left", fontweight="bold")
-        path.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, path, dpi=110)
 
 

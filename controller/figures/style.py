@@ -67,14 +67,14 @@ def style() -> Iterator[None]:
 
 
 def canvas(
-    rows: int, height_in: float, *, ratios: list[float] | None = None, share_x: bool = True
+    rows: int, height_in: float, *, ratios: list[float] | None = None
 ) -> tuple[Figure, list[Axes]]:
     """Make a figure with ``rows`` panels one below the other."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     panels = figure.subplots(
         rows,
         1,
-        sharex=share_x,
+        sharex=True,
         squeeze=False,
         gridspec_kw={"height_ratios": ratios or [1.0] * rows},
     )

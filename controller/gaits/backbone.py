@@ -37,7 +37,7 @@ SAMPLES_A_LINK = 24
 """Number of samples of the curve, over the length of a mean link."""
 ROUNDS = 40
 STEP_RAD = 0.3
-"""The most that an angle moves in a round."""
+"""Largest change of an angle in a round."""
 STIFF_M_RAD = 1e-5
 """Distance that is given up rather than bend a joint by a radian: picks one of many fits."""
 DONE = 1e-7
@@ -88,7 +88,7 @@ class BackboneFit:
     """A chain on a curve."""
 
     joint_rad: Floats
-    """(J,)"""
+    """(J,) joint angles of the fit, rad."""
     head_m: Floats
     """(3,) tip of the head."""
     head_rotation: Floats

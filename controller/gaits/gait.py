@@ -96,15 +96,16 @@ class Gait(ABC):
     """Author of the description."""
     needs: ClassVar[Needs]
     world: ClassVar[str] = "isotropic"
-    """Shipped world of its runs, where none is given."""
+    """Shipped world of the gait's runs, where none is given."""
     p_gain: ClassVar[int | None] = None
     """Register 84 of every servo where the robot's own would squeeze too hard."""
     steered_by: ClassVar[str | None] = None
-    """Its parameter, positive to the left, that steers it along waypoints; None: none does."""
+    """Parameter that steers the gait along waypoints, positive to the left; None: the gait is not
+    steered."""
     follows_velocity: ClassVar[bool] = False
     """Whether its rate and its ``turn_rad`` set how fast the body goes along itself and turns."""
     aim: ClassVar[Aim] = "advance"
-    """The purpose that its speed is measured by."""
+    """Purpose that measures the gait's speed."""
     model: ClassVar[type[GaitParameters]] = GaitParameters
 
     def __init__(self, params: GaitParameters | None = None) -> None:
@@ -168,12 +169,12 @@ class Range:
     """Kind, default, bounds and description of one parameter."""
 
     kind: type
-    """float, int or bool."""
+    """Type of the parameter: float, int or bool."""
     default: float
     low: float
     high: float
     description: str
-    """One line."""
+    """Description of the parameter in one line."""
 
     @property
     def step(self) -> float:

@@ -67,7 +67,7 @@ def spine_bends_rad(
     u = np.linspace(0.0, TURN, SAMPLES)
     headings = np.empty((len(phase_rad), len(shares) - 1))
     write_headings(u, _shapes(u, p), np.cos(phase_rad), np.sin(phase_rad), shares, headings)
-    return np.asarray(headings[:, :-1] - headings[:, 1:])
+    return headings[:, :-1] - headings[:, 1:]
 
 
 def offset(u: Floats, phase_rad: Floats, p: SpineParameters) -> Floats:

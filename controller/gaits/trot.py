@@ -49,7 +49,8 @@ class LegGait(Gait, ABC):
     duty: ClassVar[float]
     """Share of a cycle that a foot is on the ground."""
     offsets: ClassVar[tuple[float, float, float, float]]
-    """In cycles, when a foot comes down: hind left, hind right, front left, front right."""
+    """Times in cycles at which the feet come down: hind left, hind right, front left, front
+    right."""
     needs = Needs(yaw=True, legs=True)
     steered_by = "turn"
     model: ClassVar[type[GaitParameters]] = LegParameters

@@ -54,7 +54,7 @@ def travelling(
 
 def bends_rad(robot: "RobotConfig", joints: tuple[int, ...], headings_rad: Floats) -> Floats:
     """(T, n) joint angles from headings (T, n + 1) of the rigid groups between ``joints``."""
-    return np.asarray(headings_rad[:, :-1] - headings_rad[:, 1:])
+    return headings_rad[:, :-1] - headings_rad[:, 1:]
 
 
 def group_places(robot: "RobotConfig", joints: tuple[int, ...]) -> Floats:

@@ -47,7 +47,8 @@ class Detection:
 
     silhouette: Silhouette
     skeleton: Skeleton
-    """Its ends in no particular order; its status is that of the frame."""
+    """Skeleton of the body with its ends in no particular order; its status is that of the
+    frame."""
     background: DeepImage
     """(H, W[, 3]) the image that the frame was compared with."""
     faint_parts: bool = False
@@ -73,9 +74,9 @@ class BodyDetector:
     """(H, W[, 3]) the scene without the animal; None: the ground is found in each frame alone."""
     polarity: Polarity
     background_source: str
-    """Where the background is from, in words."""
+    """Source of the background, in words."""
     surroundings_px: int = 0
-    """Without a background: side of the square whose ground a place is compared with; 0: a smooth
+    """Side of the square whose ground a place is compared with, without a background; 0: a smooth
     surface is fitted to the frame."""
     inside: Bools | None = None
     """(H, W) where the animal may be; a body that reaches beyond is cut. None: everywhere."""
@@ -266,10 +267,10 @@ class _Candidate:
     """Share of the frames that show a complete body of the usual length, which explains the
     picture."""
     length_px: float
-    """Usual length; 0 if it is unknown."""
+    """Usual length of the body; 0 if it is unknown."""
     width_px: float
     contrast: float
-    """At the boundaries of these bodies, grey levels."""
+    """Contrast at the boundaries of these bodies, grey levels."""
     faint_share: float
     """Share of the frames in which something fainter than the body goes on beyond it."""
 

@@ -31,7 +31,7 @@ _FEWEST: Final = 30  # coefficients that show a quality
 _NOT_ZERO: Final = 0.7  # of a step: a larger coefficient is not stored as 0
 _REGULAR: Final = 0.8  # mean cosine of the coefficients over the steps: they are multiples (ours)
 _SHIFTS: Final = tuple((k, (7 * k + off) % 16) for k in range(16) for off in (0, 8))
-"""x, y of the shifted grids: even over the 16 px of a block of colour."""
+"""Offsets x, y of the shifted grids: even over the 16 px of a block of colour."""
 _CLEAN: Final = 16.0  # quality below which poses are less accurate than the sections show (ours)
 _LEAST: Final = 18  # quality below which no pose is used (ours)
 _USUAL: Final = 20  # quality from which most poses are used (ours)

@@ -45,9 +45,9 @@ class Equipartition:
     chord: float
     """Distance of neighbouring points, in the curve's unit."""
     method: str
-    """How it was found: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later crossing``,
-    ``two places`` (3 chords), ``branches`` (``chord_branches``), ``sample`` (``chord_beam``),
-    ``path`` (``chord_path``)."""
+    """Method of the solution: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later
+    crossing``, ``two places`` (3 chords), ``branches`` (``chord_branches``), ``sample``
+    (``chord_beam``), ``path`` (``chord_path``)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""

@@ -76,7 +76,7 @@ class _WideEnd:
     deep: float
     """Distance of that place from the boundary."""
     length: float
-    """From that place to the front."""
+    """Length of the axis from that place to the front."""
 
 
 def no_skeleton(status: FrameStatus) -> Skeleton:

@@ -21,7 +21,7 @@ MOST_PIXELS: Final = 8192**2
 """Limit of a mesh's pictures (ours)."""
 _ITEM_BYTES: Final = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTH: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-"""glTF's kinds of numbers (bytes) and of items (numbers)."""
+"""Sizes of glTF's kinds of numbers (bytes) and of items (numbers)."""
 MESH_ENDINGS: Final = (".obj", ".glb")
 _AXES: Final = {
     f"{sign}{axis}": (k, factor)
@@ -36,7 +36,7 @@ class GivenMesh:
 
     mesh: Mesh
     solid: Any
-    """``trimesh.Trimesh`` of the same triangles with its corners joined, for cutting."""
+    """Mesh of ``trimesh`` with the same triangles and joined corners, for cutting."""
     texture: Image | None
     """(H, W, 3), first row at v = 1."""
     forward: str

@@ -22,7 +22,7 @@ class Region:
     """A cut-out of every frame; the nearest ground fills the area outside the mask."""
 
     origin_px: tuple[int, int]
-    """x, y of its first pixel in the whole picture."""
+    """Position x, y of the region's first pixel in the whole picture."""
     size_px: tuple[int, int]
     """Width and height; (0, 0): the whole picture, whatever its size."""
     inside: Bools | None = None

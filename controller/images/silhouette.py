@@ -40,7 +40,7 @@ class Silhouette:
     noise_level: float
     """Contrast that noise alone may reach."""
     origin_px: tuple[float, float]
-    """x, y of the cut-out's first pixel in the image."""
+    """Position x, y of the cut-out's first pixel in the image."""
     area_px: float
     distractors: float
     """Area of the next largest visible object over this body's; noise and dirt count."""
@@ -49,7 +49,7 @@ class Silhouette:
     @property
     def mask(self) -> Bools:
         """(h, w) pixels of the body."""
-        return np.asarray(self.level > self.threshold)
+        return self.level > self.threshold
 
 
 def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:

@@ -95,7 +95,7 @@ class Footage:
     files: tuple[Path, ...]
     """Images, or nothing for a video."""
     count: int
-    """Frames that there should be."""
+    """Number of frames that the film should have."""
     rate_hz: float
     rate_assumed: bool
     """Whether ``rate_hz`` is a guess: neither the caller nor the file states it."""
@@ -104,7 +104,7 @@ class Footage:
     deep: GreyScale | None = None
     """Scale of images of 16 bit; None for all others."""
     pages: tuple[int, ...] = ()
-    """The page of each of ``files``, from 0: a stack is among them once for each page."""
+    """Page of each of ``files``, from 0; a stack occurs once for each of its pages."""
     numbers: tuple[int, ...] = ()
     """Frame number of each of ``files`` where some numbers are missing; else empty."""
 

@@ -33,11 +33,11 @@ class Frame:
 
     def to_world_m(self, points_m: Floats) -> Floats:
         """Transform points (..., 3) of this frame to the world."""
-        return np.asarray(points_m @ self.rotation.T + self.origin_m)
+        return points_m @ self.rotation.T + self.origin_m
 
     def to_local_m(self, points_m: Floats) -> Floats:
         """Transform points (..., 3) of the world to this frame."""
-        return np.asarray((points_m - self.origin_m) @ self.rotation)
+        return (points_m - self.origin_m) @ self.rotation
 
 
 def body_frame(link_m: Floats, up: ArrayLike = UP) -> Frame:

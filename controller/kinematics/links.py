@@ -32,7 +32,7 @@ class BodyView(NamedTuple):
         angles = np.arctan2(self.rotation[:, 1, 0], self.rotation[:, 0, 0])
         turns = np.rint((angles[1:] - angles[:-1]) / (2.0 * np.pi))  # np.unwrap is 4 times slower
         angles[1:] -= 2.0 * np.pi * turns.cumsum()
-        return np.asarray(angles)
+        return angles
 
     @property
     def heading_rad(self) -> float:

@@ -17,9 +17,9 @@ def cubic(x: Share, height: float = 1.0) -> Share:
     return height * x * x * (3.0 - 2.0 * x)
 
 
-def cubic_slope(x: Share, height: float = 1.0) -> Share:
-    """Slope of ``cubic``; at most 1.5 heights, in the middle."""
-    return height * 6.0 * x * (1.0 - x)
+def cubic_slope(x: Share) -> Share:
+    """Slope of ``cubic`` of height 1; at most 1.5, in the middle."""
+    return 6.0 * x * (1.0 - x)
 
 
 def cubic_sum(x: Share) -> Share:

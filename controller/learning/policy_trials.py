@@ -29,7 +29,7 @@ from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.sweep_measure import varied
 
 HEADING_SPREAD_RAD: Final = 0.2
-"""The start's heading is drawn within this, around x (that of the environment's episodes)."""
+"""Largest difference of the start's heading from x (that of the environment's episodes)."""
 
 
 @dataclass(frozen=True, slots=True)

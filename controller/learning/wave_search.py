@@ -135,7 +135,5 @@ def _earned(policy: Policy, *, world: str, start: int, steps: int) -> float:
     return episode_reward_m(snake, policy, seed=start, steps=steps)
 
 
-@cache
-def _environment(robot: str, world: str) -> SnakeEnvironment:
-    """One of a process: to make it costs as much as an episode."""
-    return SnakeEnvironment(robot, world)
+_environment = cache(SnakeEnvironment)
+"""Environment of a robot and a world, once a process: it costs as much as an episode."""

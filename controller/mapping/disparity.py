@@ -17,14 +17,14 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 _BLOCK_PX: Final = 3
 _SMALL: Final = {1: (12, 48), 3: (24, 96)}
-"""By channels: penalties of a step of one pixel and of more, per pixel of a block (ours)."""
+"""Penalties, by channels, of a step of one pixel and of more, per pixel of a block (ours)."""
 _SPECKLE_PX: Final = 60
 """Islands of fewer pixels are dropped (ours)."""
 _AGREE_PX: Final = 1.0
-"""Between the disparity of a pixel and that of its match (ours)."""
+"""Largest difference between the disparity of a pixel and that of its match (ours)."""
 _UNIQUE_PERCENT: Final = 15
-"""By how much the best match must be better than any other (ours): under the sky, where nothing is
-to be seen, the matches of a hill's edge go on."""
+"""Least lead of the best match over any other (ours): under the sky, where nothing is to be seen,
+the matches of a hill's edge go on."""
 _STEPS: Final = 2
 _WINDOW_PX: Final = 7
 _LEAST_STEEP: Final = 4.0
@@ -34,7 +34,7 @@ _RADIUS_PX: Final = 4
 _LEAST_SHARE: Final = 0.4
 """Share of a window's pixels that must lie on the plane of its middle (ours)."""
 _TOUCH_PX: Final = 1.0
-"""How far from the plane a pixel may be that belongs to it (ours)."""
+"""Largest distance from a plane of a pixel that belongs to it (ours)."""
 
 
 def match(left: Image, right: Image, count: int, least: int = 0, fill_px: int = 0) -> Floats:
@@ -122,7 +122,7 @@ def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
     ]
     disparity = matcher.compute(*wide)[:, count + least :].astype(float) / 16.0
     disparity[disparity < max(least, 0.5)] = np.nan
-    return np.asarray(disparity)
+    return disparity
 
 
 def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:

@@ -27,14 +27,14 @@ from snakewalk.controller.mapping.raster_file import (
 from snakewalk.controller.terrain.elevation_map import CellHeight, ElevationMap
 
 LOWEST_M: Final = -430.0
-"""The lowest dry land: the shore of the Dead Sea, which sinks by a metre a year."""
+"""Height of the lowest dry land: the shore of the Dead Sea, which sinks by a metre a year."""
 HIGHEST_M: Final = 8850.0
-"""The highest: Mount Everest, 8848.86 m (China and Nepal, 2020)."""
+"""Height of the highest land: Mount Everest, 8848.86 m (China and Nepal, 2020)."""
 _MOST_M: Final = 1e6
 _GAP_M: Final = 50.0
 """Step to all other heights, wider than their relief, that is suspicious (ours)."""
 _MANY: Final = 3
-"""Cells of one value there (ours)."""
+"""Number of cells of one value that counts as a missing height (ours)."""
 
 
 def check_heights(z_m: Floats, per_value_m: float, assumed: Assumptions) -> None:
@@ -139,9 +139,9 @@ class MapOptions:
     scale: float = 1.0
     """Metres in the robot's world per metre of the file."""
     vertical_scale: float | None = None
-    """The same of heights; None: as ``scale``."""
+    """Factor on the heights; None: as ``scale``."""
     spacing_m: float | None = None
-    """Between samples in the robot's world; None: as the file's, scaled."""
+    """Distance between samples in the robot's world; None: as in the file, scaled."""
     height: CellHeight | None = None
     """Which of the points in a cell counts; None: the median, of a cloud seen from above."""
     up: str | None = None

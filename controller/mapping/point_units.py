@@ -52,10 +52,10 @@ def points_in_metres(
         unit = "m"
     rise_m = unit_m(units.height_unit or ("m" if unit == DEGREE else unit))
     if unit != DEGREE:
-        return np.asarray(points * [unit_m(unit), unit_m(unit), rise_m])
+        return points * [unit_m(unit), unit_m(unit), rise_m]
     if not _is_on_earth(points):
         raise InputError(f"{file}: --unit deg: expected longitude, latitude and height in columns")
-    return np.asarray(points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m])
+    return points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m]
 
 
 def _columns(names: Sequence[str]) -> list[int] | None:

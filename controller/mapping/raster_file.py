@@ -33,9 +33,9 @@ class Raster:
     z_m: Floats
     """(rows, columns), row 0 in the south; NaN where the file has no data."""
     dx_m: float
-    """Between columns."""
+    """Distance between columns."""
     dy_m: float
-    """Between rows."""
+    """Distance between rows."""
     notes: tuple[str, ...] = ()
     """Statements of the file that were used or left out, for the result."""
     per_value_m: float = 1.0

@@ -73,7 +73,7 @@ class RectifiedPair:
         with np.errstate(invalid="ignore", divide="ignore"):
             per_px = np.where(beyond > 0.0, self.baseline_m / beyond, np.nan)
         x, y = (u - self.centre_px[0]) * per_px, (v - self.centre_px[1]) * per_px
-        return np.asarray(np.stack([x, y, self.focal_px * per_px], axis=-1) @ self.turned)
+        return np.stack([x, y, self.focal_px * per_px], axis=-1) @ self.turned
 
 
 def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:

@@ -25,7 +25,7 @@ _SAMPLE: Final = 20_000
 _LEVEL_ENOUGH: Final = np.cos(np.radians(70.0))
 """A ground's normal leans from the camera's up by at most 70 degrees (ours)."""
 _LEAST_POINTS: Final = 2
-"""In a cell that is known (ours)."""
+"""Least number of points in a known cell (ours)."""
 _LEAST_GROUND: Final = 0.2
 """Share of the points that must lie on a ground that is fitted (ours)."""
 
@@ -36,9 +36,9 @@ class CameraStand:
 
     height_m: float
     tilt_rad: float
-    """Tilt of its axis, downwards from the level."""
+    """Tilt of the camera's axis, downwards from the level."""
     roll_rad: float
-    """About its axis: the picture's right side is down."""
+    """Roll of the camera about its axis; positive if the picture's right side is down."""
 
     def world_from_camera(self) -> Floats:
         """(3, 3) rotation from the camera's axes (right, down, forward) to (ahead, left, up)."""
@@ -67,9 +67,9 @@ class StereoGround:
     fitted: bool
     """Whether the stand was fitted to the points, as no one gave it."""
     known_share: float
-    """Pixels with a disparity, over those that show something."""
+    """Share of the pixels that show something that have a disparity."""
     used_share: float
-    """Pixels in the map, over the same."""
+    """Share of the pixels that show something that are in the map."""
 
 
 def stereo_ground(

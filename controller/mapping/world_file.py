@@ -25,7 +25,7 @@ class MapWorld:
     """A world from a map, not yet written."""
 
     file: Path
-    """The world's TOML."""
+    """Path of the world's TOML file."""
     config: WorldConfig
     ground: HeightField
     relief: Relief

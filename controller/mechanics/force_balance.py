@@ -22,7 +22,7 @@ from snakewalk.drivers.compiling import callable_in_loops, compiled, inlined, re
 
 _STILL_M_S = 1e-4  # smooths the kink of |v| at rest
 _WHEEL_M_S = 1e-3
-"""The same for wheels, each of which has two kinks. A step of the simulator creeps faster."""
+"""Speed that smooths the two kinks of a wheel at rest. A step of the simulator creeps faster."""
 _SLIDES_M_S = 1e4
 """Speed beyond which friction does not hold a body."""
 _STEPS = 50

@@ -16,14 +16,14 @@ from snakewalk.config.world import FrictionConfig
 PRIOR = 0.4
 """Standard deviation of the logarithm about the file's (ours): half to twice it in 95 %."""
 _MEMORY_S = 40.0
-"""In which the estimate returns to the file by a factor of e (ours)."""
+"""Time in which the estimate returns to the file by a factor of e (ours)."""
 _STRAY = 0.1
 """Difference of the friction of one span from that of the ground (ours): no single span is more
 accurate, however far the body slid."""
 STEP = 0.1
 """Step of the logarithms, between the hypotheses (ours)."""
 _MOST = 0.3
-"""By which a span moves an estimate at most (ours)."""
+"""Largest change of an estimate by a span (ours)."""
 _BOUND = math.log(4.0)
 DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
@@ -31,7 +31,7 @@ out: 99 % and 95 % of chi square with two degrees of freedom."""
 _ESTIMATED = 0.8
 """Variance over that of the prior below which a value is estimated (ours)."""
 _TRUST = 1.39
-"""The same below which the file holds again: 50 %."""
+"""Squared distance of the file from the estimate below which the file holds again: 50 %."""
 _NORMAL_95 = 1.96
 _ROOT = math.sqrt(0.5)
 

@@ -52,12 +52,12 @@ def yaw_load_n_m(
     joints_m = (centres_m + back)[:-1]
     behind = _tail_sums(force_n)[1:]
     about_origin = _tail_sums(_cross(centres_m, force_n))[1:]
-    return np.asarray(about_origin - _cross(joints_m, behind))
+    return about_origin - _cross(joints_m, behind)
 
 
 def _tail_sums(values: Floats) -> Floats:
-    return np.asarray(values[::-1].cumsum(axis=0)[::-1])
+    return values[::-1].cumsum(axis=0)[::-1]
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

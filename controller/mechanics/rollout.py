@@ -66,7 +66,7 @@ class TabulatedPath:
     """A path as a table: a point every ``PATH_STEP_M``, and straight beyond its end."""
 
     points_m: Floats
-    """(n, 2)"""
+    """(n, 2) points of the path, m."""
     waypoint_m: Floats
     """(2,) the next one."""
     waypoint_at: float

@@ -23,7 +23,7 @@ from snakewalk.controller.mechanics.friction_filter import (
 from snakewalk.controller.mechanics.rigid_motion import planar_slide
 
 BIN_S: Final = 0.25
-"""Poses within this time are averaged (ours)."""
+"""Time within which poses are averaged (ours)."""
 NOISE_S: Final = 0.1
 """Time after which the noise of a source is taken as independent (ours): averages of more poses
 count no more."""
@@ -45,11 +45,11 @@ class HeadReadings:
     """Measured poses of the head link."""
 
     time_s: Floats
-    """(N,)"""
+    """(N,) times of the poses, s."""
     place: Floats
     """(N, 3) x, y (m) and heading (rad)."""
     variance: Floats
-    """(N, 3) of these."""
+    """(N, 3) variances of the poses."""
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -60,7 +60,7 @@ class SlideWindow:
     """The shapes of a body in C cycles, head first, in the frame of its mean heading."""
 
     time_s: Floats
-    """(C,)"""
+    """(C,) times of the shapes, s."""
     headings_rad: Floats
     """(C, L) of the links, about the mean heading."""
     points_m: Floats

@@ -21,13 +21,13 @@ class SpeedLaw:
     """The four constants, in SI units."""
 
     viscous_1_s: float
-    """c1"""
+    """Coefficient c1 of viscous friction."""
     coulomb_m_s2: float
-    """c2"""
+    """Coefficient c2 of Coulomb friction."""
     bend_m_s2_rad: float
-    """c3, per radian of K"""
+    """Coefficient c3 of the bending, per radian of K."""
     turn_m_s: float
-    """c4: m/s^2 lost per rad/s of turning"""
+    """Coefficient c4 of turning: m/s^2 lost per rad/s."""
 
     @classmethod
     def printed(cls, unit_m: float, c4: float = 1.0) -> Self:

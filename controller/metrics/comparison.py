@@ -26,7 +26,7 @@ class Difference:
     first_s: float | None
     """Time of the first row that differs; None if none does."""
     first_column: int | None
-    """Joint, or axis, that differs there."""
+    """Joint, or axis, of the first difference."""
     first_name: str = ""
     """Name for people: ``joint yaw_05 (ID 5)``, ``y``; empty without a difference."""
     decides: bool = True

@@ -13,7 +13,7 @@ from snakewalk.controller.motion.stop_profile import STOP_S
 from snakewalk.controller.runlog.record import RunRecord
 
 SKIPPED_S = 1.5
-"""After the ramp: the gait comes up to speed and the body into its shape."""
+"""Time after the ramp that is skipped: the gait comes up to speed and the body into its shape."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class GaitDisplacement:
     start_s: float = float("nan")
     """Begin of the first of the cycles."""
     end_s: float = float("nan")
-    """End of the last of them."""
+    """End of the last cycle."""
 
     @property
     def distance_m(self) -> float:

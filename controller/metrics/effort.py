@@ -33,13 +33,14 @@ class EnergyTrack:
     """Energy of all motors at the cycles of a run, since its first one or earlier; T cycles."""
 
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the cycles, s."""
     electrical_j: Floats
     """(T,) consumed; energy that a motor returns is lost. Without the servos' electronics."""
     mechanical_j: Floats
     """(T,) net work at the shafts."""
     source: EnergySource
-    """``integrated`` in every physics step, or ``sampled``: from readings and goals of cycles."""
+    """Source of the energy: ``integrated`` in every physics step, or ``sampled``: from readings and
+    goals of cycles."""
 
     def between(self, from_s: float, to_s: float) -> tuple[float, float]:
         """Electrical and mechanical energy from one time to another, J; NaN where not known."""
@@ -123,7 +124,7 @@ class Effort:
     cost_of_transport: float
     """Power over weight times net speed; without the servos' own electronics."""
     mechanical_cost: float
-    """The same of the net work at the shafts."""
+    """Net work at the shafts over weight and distance."""
     climb_m_s: float
     slip: float
     """Distance that touching links slide sideways, over that of the centre; flat floors only."""

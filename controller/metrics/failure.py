@@ -14,9 +14,9 @@ from snakewalk.controller.terrain.climb import CLIMBED_RAD
 Cause = Literal["safety", "roll", "joint", "slip", "climb", "steering", "time"]
 
 ROLL_LIMIT_RAD = float(np.radians(60.0))
-"""Beyond this roll of the head link the body counts as rolled over (ours)."""
+"""Roll of the head link beyond which the body counts as rolled over (ours)."""
 WINDOW_S = 30.0
-"""The end of a run that is judged (ours): several body lengths of travel."""
+"""Duration of the end of a run that is judged (ours): several body lengths of travel."""
 CLAMP_SHARE = 0.2
 """Share of cycles with a clamped goal from which on the joints do not follow (ours)."""
 PROGRESS_SHARE = 0.5
@@ -33,7 +33,7 @@ class Failure:
     advanced too little, on a climb or on other ground; it advanced, but not towards the waypoints;
     it was on its way and ran out of time."""
     text: str
-    """With the numbers that say so."""
+    """Description of the failure, with the numbers that show it."""
 
 
 def failure(record: RunRecord) -> Failure | None:

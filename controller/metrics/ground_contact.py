@@ -58,13 +58,13 @@ def support_n(robot: RobotConfig, body: BodyView, torque_n_m: Floats) -> Floats:
     rows = np.concatenate([lever_m, profile, even])
     target = (rows * share).sum(axis=1) * weight_n
     target[: len(pitch)] -= torque_n_m[pitch]
-    return np.asarray(scipy.optimize.nnls(rows, target)[0])
+    return scipy.optimize.nnls(rows, target)[0]
 
 
 def lifted(robot: RobotConfig, bears_n: Floats) -> Bools:
     """Whether each link is lifted, from the supporting force; any shape."""
     weight_n = robot.mean_link_mass_kg * link_weights(robot) * GRAVITY_M_S2
-    return np.asarray(bears_n < LIFTED_SHARE * weight_n)
+    return bears_n < LIFTED_SHARE * weight_n
 
 
 EVERY = 5
@@ -133,4 +133,4 @@ def lifted_by_current(record: RunRecord) -> float:
 
 def roll_rad(rotation: Floats) -> Floats:
     """Roll (n,) of a link about its own axis, from -pi to pi, by its frames (n, 3, 3)."""
-    return np.asarray(np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]))
+    return np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])

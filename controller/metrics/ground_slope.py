@@ -15,7 +15,7 @@ class GroundSlope(NamedTuple):
     ahead_rad: Floats
     """(P,) from the tail to the head; positive uphill."""
     steepest_rad: Floats
-    """(P,)"""
+    """(P,) steepest slope under the links, rad."""
 
 
 def ground_slope(ground: HeightField, links_m: Floats) -> GroundSlope:

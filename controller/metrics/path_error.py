@@ -131,7 +131,7 @@ def fitted_parabolas(values: Floats, window: int) -> Floats:
     places = np.arange(window, dtype=float)
     first, last = (_parabola(places, some) for some in (values[:window], values[-window:]))
     fitted[:half], fitted[-half:] = first[:half], last[-half:]
-    return np.asarray(fitted)
+    return fitted
 
 
 def _parabola(places: Floats, values: Floats) -> Floats:

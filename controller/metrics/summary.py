@@ -25,7 +25,7 @@ from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Header, RunRecord
 
 _KEYS = {"paths_replanned": "paths_laid_again"}
-"""Names that ``summary.json`` spells otherwise: programs read its keys."""
+"""Names of summary values that ``summary.json`` spells otherwise: programs read its keys."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class RunSummary:
     robot: str
     world: str
     backend: str
-    """``sim``, or the serial port."""
+    """Backend of the run: ``sim``, or the serial port."""
     software: str
     config_hash: str
     """Digest of run, robot and world."""
@@ -73,7 +73,7 @@ class RunSummary:
     log_note: str
     """Parts that the log lacks; empty if it is complete."""
     outcome: str
-    """How the run ended, in words."""
+    """End of the run, in words."""
     waypoints: int
     waypoints_reached: int | None
     """Waypoints that the centre of mass came to, in order; None where the pose is dead-reckoned,
@@ -81,12 +81,12 @@ class RunSummary:
     waypoints_counted: int | None
     """Waypoints that the run itself counted."""
     waypoint_times_s: tuple[float, ...] | None
-    """Since torque on."""
+    """Times from torque on at which the waypoints were reached."""
     duration_s: float | None
     """Time from torque on to torque off."""
     path_length_m: float | None
     paths_replanned: int
-    """How often the path was replanned."""
+    """Number of times that the path was replanned."""
     travelled_m: float | None
     """Length of the track of the centre of mass, on a way to waypoints while the shape moves."""
     path_error_mean_m: float | None
@@ -111,7 +111,8 @@ class RunSummary:
     mechanical_energy_j: float | None
     """Net work at the shafts."""
     energy_source: str
-    """``integrated`` in every physics step; ``sampled`` from readings and goals of the cycles."""
+    """Source of the energy: ``integrated`` in every physics step; ``sampled`` from readings and
+    goals of the cycles."""
     electrical_cost_of_transport: float | None
     """Energy over weight times the distance of ``speed_m_s``, in the same time."""
     mechanical_cost_of_transport: float | None
@@ -152,13 +153,14 @@ class RunSummary:
     battery: SummarizedBattery | None
     """Supply and load over the run; None in older logs."""
     pose_evidence: str
-    """How the poses are known: ``measured``, ``estimated`` or ``dead-reckoned``."""
+    """Evidence of the poses: ``measured``, ``estimated`` or ``dead-reckoned``."""
     pose_source: str
-    """``simulator``, ``camera``, ``joints``, ``imu``, or the name of a plug-in."""
+    """Source of the poses: ``simulator``, ``camera``, ``joints``, ``imu``, or the name of a
+    plug-in."""
     pose_position_sd_m: float | None
     """Standard deviation of the head's position; None where the source does not state it."""
     pose_heading_sd_rad: float | None
-    """The same of its heading."""
+    """Standard deviation of the measured heading."""
     pose_is_simulated: bool
     """Whether the simulator measured the poses, or moved the body that was measured."""
     port_is_pseudo_terminal: bool | None

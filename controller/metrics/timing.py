@@ -15,4 +15,4 @@ def skipped_cycles(record: RunRecord) -> NDArray[np.int64]:
 
 def wire_use(record: RunRecord) -> Floats:
     """Share (T,) of the period that the wire was busy; NaN where unknown."""
-    return np.asarray(record.cycle.wire_busy_s / record.period_s)
+    return record.cycle.wire_busy_s / record.period_s

@@ -12,7 +12,7 @@ _LONGEST_S: Final = 0.6
 
 def tracking_error_rad(cycle: CycleTable) -> Floats:
     """Measured minus sent, (T, J); NaN where a read failed."""
-    return np.asarray(np.where(cycle.valid, cycle.measured_rad - cycle.sent_rad, np.nan))
+    return np.where(cycle.valid, cycle.measured_rad - cycle.sent_rad, np.nan)
 
 
 def lag_s(cycle: CycleTable, period_s: float) -> float:

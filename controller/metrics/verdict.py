@@ -32,7 +32,7 @@ class RunVerdict:
     sentence: str
     """Waypoints or distance, error of the path, duration."""
     evidence: str
-    """How the sentence is known: ``simulated``, ``measured (udp)``, ``dead-reckoned (joints)``."""
+    """Evidence of the sentence: ``simulated``, ``measured (udp)``, ``dead-reckoned (joints)``."""
     exit_code: int
     """0: as planned; 1: safety stopped it, or a waypoint was missed; 3: as planned, but nothing
     measured the arrival."""

@@ -221,12 +221,12 @@ class Blend(MotionWrapper):
 
     def goal_rad(self) -> Floats:
         """(J,) present joint targets."""
-        return np.asarray(self.target.goal_rad() + self.join.error_at(self._t_s)[0])
+        return self.target.goal_rad() + self.join.error_at(self._t_s)[0]
 
     def velocity_rad_s(self) -> Floats:
         """(J,) their present speeds."""
         rate = self.join.source_rate(self._t_s)
-        return np.asarray(rate * self.target.velocity_rad_s() + self.join.error_at(self._t_s)[1])
+        return rate * self.target.velocity_rad_s() + self.join.error_at(self._t_s)[1]
 
     def pace(self) -> Pace:
         """The robot's limits during the join, then the target's pace."""

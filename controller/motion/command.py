@@ -9,7 +9,7 @@ from snakewalk.controller.gaits.gait import Gait
 LATE_S: Final = 1.0
 """An operator's command that is older is dropped (ours): its user no longer expects it."""
 TIMEOUT_S: Final = 1.0
-"""How long joints go on towards goals that nobody renews (ours)."""
+"""Time for which joints go on towards goals that nobody renews (ours)."""
 POINTS_MAX: Final = 500
 """Largest number of points of a trajectory, which is splined and checked within a cycle."""
 JOINTS_MAX: Final = 256
@@ -34,7 +34,7 @@ class JointTrajectory(NamedTuple):
     position_rad: Floats
     """(N, K) for the K joints named."""
     velocity_rad_s: Floats | None = None
-    """(N, K)"""
+    """(N, K) velocities of the joints at the points, rad/s."""
     acceleration_rad_s2: Floats | None = None
     """(N, K), with velocities only."""
 

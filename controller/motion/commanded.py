@@ -57,7 +57,7 @@ class _Follow:
         self._limiter.speed_rad_s = np.array(now.speed_rad_s)
         self._most_rad = limits.angle_rad
         self.left_s: float | None = None
-        """Until the goals are out of date; None: they never are."""
+        """Time until the goals expire; None: they never do."""
         self.goal_rad = now.angle_rad
         self.stop()
 
@@ -123,7 +123,7 @@ class Commanded:
         """Gait that follows velocities, from the first such command to another kind of command."""
         self._driven_by: Gait = LateralUndulation()
         self._driven_s = 0.0
-        """Until the velocity is out of date."""
+        """Time until the velocity expires."""
         rest = np.zeros(robot.joint_count)
         self._mode: _Mode = _Follow(JointsNow(rest, rest), self._limits)
         self._time_s = 0.0

@@ -117,7 +117,7 @@ class GaitTransition:
     parts: tuple[Part, ...]
     needs: Needs
     settled: Pace
-    """Pace of the gait that it leads to."""
+    """Pace of the gait after the transition."""
     under_way: Pace
     stops: bool
 

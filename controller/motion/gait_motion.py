@@ -37,7 +37,7 @@ class GaitMotion(MotionWrapper):
         self._remaining_s = duration_s
         self._stop_profile = StopProfile()
         self.cycles = 0.0
-        """Gone through so far."""
+        """Number of cycles of the gait so far."""
 
     @property
     def gait(self) -> Gait:

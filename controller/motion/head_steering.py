@@ -14,7 +14,8 @@ from snakewalk.controller.motion.source import MotionSource, Pace
 from snakewalk.controller.motion.wrapper import MotionWrapper
 
 LEAD_S = 0.12
-"""How far the swing of the body is foreseen: the lag of the servos and of the rate limiter."""
+"""Time by which the swing of the body is predicted: the lag of the servos and of the rate
+limiter."""
 RANGE_SHARE = 0.9
 """Share of the neck joints' range that is used."""
 

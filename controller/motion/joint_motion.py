@@ -35,9 +35,9 @@ class JointRequest:
     """Choices of the user that a file may not state."""
 
     unit: str | None = None
-    """One of ``UNITS``."""
+    """Unit of the angles, one of ``UNITS``."""
     time_unit: str | None = None
-    """One of ``TIME_UNITS``."""
+    """Unit of the times, one of ``TIME_UNITS``."""
     topic: str | None = None
     """Topic of a bag."""
     episode: int | None = None
@@ -53,7 +53,7 @@ class JointMotion:
     names: tuple[str, ...]
     """Names of the K joints of the file."""
     joint_rad: Floats
-    """(T, K); NaN where a value is missing."""
+    """(T, K) joint angles, rad; NaN where a value is missing."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out, changed or assumed."""
 

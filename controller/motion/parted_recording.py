@@ -62,7 +62,7 @@ class PartedRecording:
             for part, rows in zip(times, angles, strict=True)
         ]
         self.slowed = max(part.slowed for part in self._parts)
-        """As ``Recorded.slowed``."""
+        """Factor by which the recording was slowed (``Recorded.slowed``)."""
         speed_rad_s = HEADROOM * robot.joint_speed_limit_rad_s
         acceleration_rad_s2 = HEADROOM * robot.joint_acceleration_limit_rad_s2
         self._bridges = [

@@ -86,9 +86,9 @@ class Layer(Strict):
     """Outputs are ``tanh(weights @ inputs + bias)``; the last layer's are without the tanh."""
 
     weights: tuple[tuple[float, ...], ...] = Field(description="a row for each output")
-    """(outputs, inputs)"""
+    """(outputs, inputs) weights of the layer."""
     bias: tuple[float, ...] = Field(description="one for each output")
-    """(outputs,)"""
+    """(outputs,) biases of the layer."""
 
 
 class Origin(Strict):

@@ -21,7 +21,7 @@ from snakewalk.controller.motion.stop_profile import StopProfile
 GAIN_PER_S = 25.0
 """Gain of the rate limiter: a goal lags its wave by 40 ms if no limit binds (ours)."""
 CHANGE_S = 0.1
-"""In which the wave follows an action (ours)."""
+"""Time in which the wave follows an action (ours)."""
 
 
 class PolicyMotion:
@@ -73,7 +73,7 @@ class PolicyMotion:
         self._remaining_s = duration_s
         self._stop_profile = StopProfile()
         self.cycles = 0.0
-        """Cycles of the wave so far."""
+        """Number of cycles of the wave so far."""
 
     @property
     def done(self) -> bool:

@@ -76,7 +76,7 @@ class Recorded:
             np.maximum(bend / self.slowed**2, ramps),
         )
         self.duration_s = self._length_s * self.slowed + self._ramp_s
-        """From rest to rest."""
+        """Duration of the motion, from rest to rest."""
         self._now_s = 0.0
         self.needs = Needs(
             yaw=bool(np.any(joint_rad[:, robot.yaw_joints])),

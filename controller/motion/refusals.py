@@ -6,7 +6,7 @@ from typing import Final
 from snakewalk.config.plain_text import plain
 
 QUIET_S: Final = 1.0
-"""The same line is reported again after this time (ours)."""
+"""Time after which the same line is reported again (ours)."""
 LINES_MAX: Final = 10
 """Lines per ``QUIET_S``; the others are counted (ours)."""
 NAME_MAX: Final = 100

@@ -19,9 +19,9 @@ class Pace:
     """Largest speeds and accelerations of joints, of a source or of a robot's limits."""
 
     speed_rad_s: Floats
-    """(J,)"""
+    """(J,) largest speeds of the joints, rad/s."""
     acceleration_rad_s2: Floats
-    """(J,)"""
+    """(J,) largest accelerations of the joints, rad/s^2."""
 
     @staticmethod
     def limit(robot: RobotConfig) -> "Pace":

@@ -16,7 +16,7 @@ from snakewalk.controller.motion.command import POINTS_MAX, JointTrajectory
 from snakewalk.controller.motion.refusals import NAME_MAX
 
 START_RAD: Final = 0.05
-"""How far a joint may be from a first point at 0 s (ours)."""
+"""Largest distance of a joint from a first point at 0 s (ours)."""
 _SAMPLES: Final = 32
 """Points of each piece at which the limits are checked."""
 _SLACK: Final = 1.0 + 1e-6
@@ -29,9 +29,9 @@ class JointsNow(NamedTuple):
     """Commanded state of the joints when a trajectory begins."""
 
     angle_rad: Floats
-    """(J,)"""
+    """(J,) commanded joint angles, rad."""
     speed_rad_s: Floats
-    """(J,)"""
+    """(J,) commanded joint speeds, rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class JointLimits:
     """J names, head first."""
     robot: str
     angle_rad: Floats
-    """(J,)"""
+    """(J,) largest joint angles, rad."""
     speed_rad_s: float
     acceleration_rad_s2: float
 

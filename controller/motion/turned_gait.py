@@ -10,7 +10,7 @@ from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.motion.source import Pace
 
 TURN_RATE_PER_S: Final = 0.5
-"""How fast the turn changes (ours): within a cycle of 4 s it goes from straight to its limit."""
+"""Rate of change of the turn (ours): within a cycle of 4 s it goes from straight to its limit."""
 TURN_PER_S2: Final = 1.0
 
 

@@ -31,7 +31,7 @@ from snakewalk.controller.motion.turned_gait import (
 BEND_LIMIT_RAD: Final = 1.4
 """Largest bend of the axis over the body (ours), as of a steered gait."""
 _RATE_PER_S: Final = 0.7
-"""How fast the share of the full rate changes (ours): from full speed to rest in 1.5 s."""
+"""Rate of change of the share of the full rate (ours): from full speed to rest in 1.5 s."""
 _RATE_PER_S2: Final = 4.0
 _AT_REST: Final = 1e-3
 _ROUNDING: Final = 1.0 + 1e-9
@@ -136,7 +136,7 @@ class VelocityGait:
             self._joints_rad(self._phase_rad + at_s * rate, bend + at_s * bending)
             for at_s in (-half_s, half_s)
         )
-        return np.asarray((after - before) / (2.0 * half_s))
+        return (after - before) / (2.0 * half_s)
 
     def pace(self) -> Pace:
         """Return the pace at full speed with changing rate and bend."""

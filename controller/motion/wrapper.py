@@ -13,7 +13,7 @@ class MotionWrapper:
 
     def __init__(self, wrapped: MotionSource) -> None:
         self.wrapped = wrapped
-        """The source that moves the joints; a subclass may replace it."""
+        """Source that moves the joints; a subclass may replace it."""
 
     @property
     def needs(self) -> Needs:

@@ -21,11 +21,11 @@ SAMPLE_S: Final = 0.04
 JUDGE_S: Final = 0.5
 """Time between two samples and between two judgements."""
 DOUBT_S: Final = 3.0
-"""How long a body may move without agreement (ours)."""
+"""Longest time for which a body may move without agreement (ours)."""
 NAMED_S: Final = 1.5
-"""The same for a contradiction that has a name (ours)."""
+"""Longest time for which a body may move with a contradiction that has a name (ours)."""
 CAUTIOUS_S: Final = 8.0
-"""How long a run moves slowly before the first agreement (ours)."""
+"""Longest time for which a run moves slowly before the first agreement (ours)."""
 LEAST_UP: Final = 0.7
 """Least cosine between the head's up axis and the vertical (ours)."""
 LEAST_TURN_RAD: Final = 0.12
@@ -38,8 +38,8 @@ TURNS: Final = (0.6, 1.5)
 SCALES: Final = (0.6, 1.5)
 """Measured over expected swing that agrees on a floor: 0.74 to 1.29 in five walks."""
 SCALES_HILLS: Final = (0.5, 1.7)
-"""The same on hills, as the median of ``WINDOWS`` windows: dead reckoning knows no hills, and
-single windows of sound sources have 0.57 to 1.75."""
+"""Measured over expected swing that agrees on hills, as the median of ``WINDOWS`` windows: dead
+reckoning knows no hills, and single windows of sound sources have 0.57 to 1.75."""
 TURNED_DEG: Final = 45.0
 """Direction of the swing beyond which the frame is turned (ours)."""
 UNIT: Final = 20.0
@@ -52,8 +52,8 @@ SCALE_SD: Final = 0.02
 """Least standard deviation of the scale (ours)."""
 SCALE_FLAT: Final = 0.05
 SCALE_HILLS: Final = 0.3
-"""How far the swing of a sound source is from the expected one, on a floor and on hills: means of
-13 walks are within 0.04 and 0.2."""
+"""Difference of the swing of a sound source from the expected one, on a floor and on hills: means
+of 13 walks are within 0.04 and 0.2."""
 
 
 class Agreement:
@@ -247,7 +247,7 @@ def _size(a: Floats, b: Floats) -> float:
 def _detrended(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
     fit = np.linalg.lstsq(line, values, rcond=None)[0]
-    return np.asarray(values - line @ fit)
+    return values - line @ fit
 
 
 def _related(a: Floats, b: Floats) -> float:

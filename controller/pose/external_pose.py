@@ -30,9 +30,9 @@ STEP_S: Final = 0.02
 SLOW_S: Final = 2.0
 """Slower differences are drift of dead reckoning (ours)."""
 MEMORY_S: Final = 8.0
-"""How long a measurement counts (ours)."""
+"""Time for which a measurement counts (ours)."""
 CONTRAST: Final = 0.7
-"""The best shift is believed if its error is below this share of the largest one (ours)."""
+"""Share of the largest error below which the best shift is believed (ours)."""
 FOLLOW_S: Final = 2.0
 """Time constant with which the estimate follows (ours)."""
 
@@ -49,7 +49,7 @@ class LatencyEstimate:
         self._seconds = 0.0
         self._is_fixed = fixed_s is not None
         self.latency_s = fixed_s or 0.0
-        """The estimate; 0 until the motion shows it."""
+        """Estimated latency; 0 until the motion shows it."""
         self.is_known = self._is_fixed
         """Whether the delay is given, or the motion has shown it."""
 
@@ -98,9 +98,9 @@ class LatencyEstimate:
 
 
 AGAIN_S: Final = 10.0
-"""The same fault is reported again after this time (ours)."""
+"""Time after which the same fault is reported again (ours)."""
 RESTART_S: Final = 1.0
-"""After such a silence another sender on the same host replaces the first one (ours)."""
+"""Silence after which another sender on the same host replaces the first one (ours)."""
 FROZEN: Final = 10
 FROZEN_M: Final = 0.03
 """This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
@@ -112,7 +112,7 @@ class TimedHead(NamedTuple):
     """A measured pose of the head link that was used."""
 
     time_s: float
-    """When it was measured, on the clock of the run."""
+    """Time of the measurement on the clock of the run."""
     head: HeadMeasurement
 
 

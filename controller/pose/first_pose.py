@@ -18,10 +18,10 @@ from snakewalk.controller.pose.sample import (
 from snakewalk.drivers.clock import Clock
 
 WAIT_S: Final = 5.0
-"""How long the first pose is awaited (ours)."""
+"""Longest wait for the first pose (ours)."""
 LOOK_S: Final = 0.02
 WATCH_S: Final = 2.0
-"""How long the poses of a robot at rest are watched (ours)."""
+"""Time for which the poses of a robot at rest are watched (ours)."""
 BLOCKS: Final = 8
 DRIFT_M_S: Final = 0.01
 DRIFT_SD: Final = 5.0

@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 
 HISTORY_S: Final = 2.0
-"""How far back a late measurement may date."""
+"""Largest age of a late measurement."""
 _ROOM: Final = 4096
 
 
@@ -20,7 +20,7 @@ class Moment:
     place: Floats
     """(3,) x, y, heading of the head link."""
     joint_rad: Floats
-    """(J,)"""
+    """(J,) joint angles, rad."""
 
 
 class MotionHistory:

@@ -22,15 +22,16 @@ from snakewalk.drivers.types import BodyPose
 SLIP_SHARE: Final = 0.15
 """Standard deviation of dead-reckoned speed and rate, over their magnitude (ours)."""
 SLIP_TIME_S: Final = 0.5
-"""How long one such error lasts (ours)."""
+"""Duration of such an error of speed and rate (ours)."""
 DRIFT_M2_S: Final = 2e-4
 """Growth of the variance of each coordinate at rest: 14 mm in a second (ours)."""
 DRIFT_RAD2_S: Final = 1e-3
 """Growth of the variance of the heading at rest: 1.8 degrees in a second (ours)."""
 RISE_M2_S: Final = 2e-4
-"""The same of the height, which dead reckoning does not know (ours)."""
+"""Growth of the variance of the height, which dead reckoning does not know (ours)."""
 TILT_RAD2_S: Final = 5e-2
-"""The same of roll and pitch of the body: it may roll over within half a second (ours)."""
+"""Growth of the variance of roll and pitch of the body: it may roll over within half a second
+(ours)."""
 JUMP_SD: Final = 5.0
 JUMP_M: Final = 0.10
 JUMP_RAD: Final = 0.45
@@ -41,7 +42,8 @@ LEAST_LEVEL: Final = 0.5
 SLIDE_M_S: Final = 0.3
 SLIDE_RAD_S: Final = 0.5
 SLIDE_S: Final = 0.5
-"""How fast a body may slide and turn without its joints, and for how long at most (ours)."""
+"""Largest speed and turn of a body that slides without its joints, and longest time of such a slide
+(ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +51,7 @@ class Innovation:
     """Difference between a measurement and the prediction for its time."""
 
     position_m: Floats
-    """(3,)"""
+    """(3,) difference of the positions, m."""
     turn_rad: Floats
     """(3,) rotation vector in the world."""
     is_jump: bool
@@ -79,8 +81,8 @@ class PoseFilter:
         self._shape = np.eye(3)
         """Mean frame of the links in the axes of the head link, for the newest joints."""
         self._seen_s = -np.inf
-        """When the newest measurement was made, used or not: poses that arrive without a gap leave
-        no time in which the body could have slid unseen."""
+        """Time of the newest measurement, used or not: poses that arrive without a gap leave no
+        time in which the body could have slid unseen."""
         self._gate = self._used_gate = np.zeros((3, 3))
         """Covariance of the position with which a jump is judged, and the same after the newest
         measurement that was used."""

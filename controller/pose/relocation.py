@@ -19,7 +19,7 @@ RATE_RAD_S: Final = 3.0
 friction 0.08 ends at 1.4 m/s."""
 STEP_M: Final = 0.15
 STEP_RAD: Final = 0.3
-"""How far at most between two poses, however long apart: a body that nobody saw slide did not."""
+"""Largest step between two poses, however long apart: a body that nobody saw slide did not."""
 GAPS: Final = 1.5
 """Intervals between poses in which a step may happen (ours): a tracker's step needs one."""
 STEP_SD: Final = 5.0
@@ -43,7 +43,7 @@ class PlacedPose:
     odometry_m: Floats
     """(2,) of the head, in the frame of dead reckoning."""
     turn_rad: float
-    """From the frame of dead reckoning to the world, by this measurement alone."""
+    """Turn from the frame of dead reckoning to the world, by this measurement alone."""
     position_sd_m: float
     turn_sd_rad: float
 
@@ -60,7 +60,7 @@ class Relocated(NamedTuple):
 
     distance_m: float
     seconds: float
-    """Since the last pose that was used."""
+    """Time since the last pose that was used."""
 
 
 class Relocation:

@@ -23,7 +23,7 @@ class PoseSample:
     sequence: int
     """Number of the pose; the source counts up."""
     time_s: float
-    """When the pose was measured, on the clock of the source."""
+    """Time of the measurement on the clock of the source."""
     position_m: Floats
     """(3,) origin of the body."""
     rotation: Floats
@@ -39,7 +39,7 @@ class ArrivedPose:
     """A pose, or a message that contains none, with its arrival."""
 
     arrival_s: float
-    """On the clock of the run."""
+    """Time of arrival on the clock of the run."""
     sender: str
     """Address of the sender, for messages."""
     sample: PoseSample | UnusablePoseError

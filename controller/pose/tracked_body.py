@@ -20,9 +20,9 @@ class HeadMeasurement:
     """Pose of the head link in the world, measured."""
 
     position_m: Floats
-    """(3,)"""
+    """(3,) position of the head link in the world, m."""
     rotation: Floats
-    """(3, 3)"""
+    """(3, 3) axes of the head link in the world, in columns."""
     position_covariance: Floats
     """(3, 3) m^2"""
     rotation_covariance: Floats

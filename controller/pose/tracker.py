@@ -26,7 +26,7 @@ class Sent:
     """A datagram of a tracker."""
 
     due_s: float
-    """When it arrives, on the clock of the servos."""
+    """Time of arrival on the clock of the servos."""
     data: bytes
 
 

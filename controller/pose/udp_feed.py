@@ -79,7 +79,7 @@ class UdpFeed(PoseQueue):
             ) from None
         self._socket.settimeout(_LOOK_S)
         self.port: int = self._socket.getsockname()[1]
-        """The port that is bound."""
+        """Number of the bound port."""
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._receive, daemon=True)
         self._thread.start()

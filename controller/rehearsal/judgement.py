@@ -32,7 +32,7 @@ class Judgement:
     closest_m: tuple[float, ...]
     """Least distance of the true body from each waypoint, after the waypoint before."""
     verdict: str
-    """How the run ended by its own log."""
+    """End of the run according to its own log."""
     tripped: str | None
     path_error_mean_m: float | None
     """Distance of the true body from the path."""

@@ -15,7 +15,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
-from snakewalk.controller.kinematics.links import BodyView, SpineLinks
+from snakewalk.controller.kinematics.links import SpineLinks
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.pose.sample import ArrivedPose
 from snakewalk.controller.pose.udp_feed import decoded
@@ -34,7 +34,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.types import BodyPose
 
 _SMOOTHING_S: Final = 0.5
-"""As the loop smooths the forward speed."""
+"""Time constant of the smoothing of the forward speed, as in the loop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,9 @@ def with_head_poses(
         spine.in_world(BodyPose(0.0, head, turn), np.nan_to_num(joints))
         for head, turn, joints in zip(head_m, rotation, cycle.measured_rad[rows], strict=True)
     ]
-    displacement_m = np.array([0.0, *(_advance_m(*pair) for pair in pairwise(views))])
+    displacement_m = np.array(
+        [0.0, *(now.unbiased_advance_since_m(before) for before, now in pairwise(views))]
+    )
     hz = record.header.run.cycle_hz
     speed_m_s = np.empty(len(views))
     smooth = 0.0
@@ -138,10 +140,6 @@ def with_head_poses(
         speed_m_s=speed_m_s,
     )
     return replace(record, pose=other), displacement_m
-
-
-def _advance_m(before: BodyView, now: BodyView) -> float:
-    return now.unbiased_advance_since_m(before)
 
 
 def slip_alarms(record: RunRecord, displacement_m: Floats) -> int:
@@ -212,7 +210,7 @@ RUNS: Final = (
 """Runs that are rehearsed by default."""
 START_SD_M: Final = 0.05
 START_SD_DEG: Final = 5.0
-"""How accurately the robot is laid down at the start (ours)."""
+"""Standard deviation of the robot's place at the start (ours)."""
 LATE_S: Final = 0.04
 """Delay of the goals, in addition to ``Deviation.drawn`` (ours)."""
 

@@ -4,7 +4,6 @@ A task is a world with its friction, a robot with its servos, and waypoints or a
 is the share that the simulated body truly reached.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,6 +14,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world, shipped
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.rounding import significant
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.plugins import find
@@ -28,11 +28,11 @@ from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 
 CONTROLLERS: Final = ("walk", "serpenoid", "gait", "cpg", "wave-cma", "wave-ppo")
-"""The walk; the serpenoid with line of sight; a gait, without steering or along waypoints where
-the run says so; the same by the pattern generator; the shipped policies."""
+"""Controllers of the tasks: the walk; the serpenoid with line of sight; a gait, without steering or
+along waypoints where the run says so; the same by the pattern generator; the shipped policies."""
 OPEN_LOOP: Final = ("gait", "cpg")
 START_SD_M: Final = 0.02
-"""How accurately the robot is laid down before a task with waypoints (ours)."""
+"""Standard deviation of the robot's place before a task with waypoints (ours)."""
 TRACKER: Final = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
 """Pose noise (1 s.d.) and delay in the rehearsal."""
 _LENGTH_S: Final = 0.5
@@ -105,7 +105,7 @@ class TaskResult:
     cost_of_transport: float | None = None
     """Electrical."""
     verdict: str = ""
-    """How the run ended by its own log, or ``not applicable: ...``."""
+    """End of the run according to its own log, or ``not applicable: ...``."""
     is_tripped: bool = False
     """Whether safety stopped the run."""
 
@@ -139,9 +139,9 @@ def run_task(item: TaskRun) -> TaskResult:
     outcome = result.outcome
     return TaskResult(
         *about,
-        share=_digits(share(task, result)),
-        duration_s=_digits(outcome.duration_s),
-        cost_of_transport=_digits(numbers.electrical_cost_of_transport),
+        share=significant(share(task, result), 4),
+        duration_s=significant(outcome.duration_s, 4),
+        cost_of_transport=significant(numbers.electrical_cost_of_transport, 4),
         verdict=result.verdict.with_cause,
         is_tripped=outcome.tripped is not None,
     )
@@ -221,12 +221,8 @@ def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
         item.task,
         item.controller,
         item.seed,
-        share=_digits(facts["truly_reached"] / count),
-        duration_s=_digits(facts["duration_s"]),
+        share=significant(facts["truly_reached"] / count, 4),
+        duration_s=significant(facts["duration_s"], 4),
         verdict=facts["verdict"],
         is_tripped=facts["tripped"] is not None,
     )
-
-
-def _digits(value: float | None) -> float | None:
-    return float(f"{value:.4g}") if value is not None and math.isfinite(value) else None

@@ -20,13 +20,13 @@ CLEAR_LENGTHS = 0.6
 CLEAR_SIDE_LENGTHS = 0.25
 """Clearance to head, middle and tail of bodies that do not intersect, body lengths (ours)."""
 AHEAD_LENGTHS = 1.0
-"""How far ahead a body looks (ours)."""
+"""Distance that a body looks ahead (ours)."""
 TURNING_S = 1.5
-"""In which a body would turn to where it wants (ours)."""
+"""Time in which a body turns to its wanted direction (ours)."""
 PAUSE_SHARE = 0.08
 """Share of arrivals after which a body rests for a while (ours)."""
 WAITING_FRAMES = 24
-"""After which a body that another one blocks begins another action (ours)."""
+"""Frames after which a body that another one blocks begins another action (ours)."""
 SPREADING_TRIES = 200
 """Rounds in which bodies that intersect at the start move to other places (ours)."""
 _OFFSETS_RAD = np.array([0.0, 0.5, -0.5, 1.0, -1.0, 1.6, -1.6, 2.4, -2.4])
@@ -63,7 +63,7 @@ class Wandering:
         self._ground = ground
         self._random = random = np.random.default_rng(seed)
         self.length_m = sizes * repertoire.length_m
-        """(N,)"""
+        """(N,) lengths of the bodies, m."""
         self.crowd = Crowd(repertoire, count, balance_rad=balance_rad)
         self._controllers = [
             SecondaryController(repertoire, scale=float(size), patience=4, seed=seed + k)
@@ -182,7 +182,7 @@ class Wandering:
     def _safe(self, points_m: Floats) -> Bools:
         x, y = points_m[..., 0], points_m[..., 1]
         inside = self._ground.contains(x, y)
-        return np.asarray(inside & (self._ground.slope_rad(x, y) < STEEP_RAD))
+        return inside & (self._ground.slope_rad(x, y) < STEEP_RAD)
 
     def _places(self, count: int) -> Floats:
         """(count, 2) random places that are not steep, a tenth of the field from its edge.

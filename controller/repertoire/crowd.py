@@ -62,11 +62,11 @@ class Crowd:
         self.rotation: Floats = np.tile(np.eye(3).ravel(), (bodies, 1))
         """(N, 9) row-major axes of the body frames."""
         self.origin_m: Floats = np.zeros((bodies, 3))
-        """(N, 3)"""
+        """(N, 3) origins of the bodies, m."""
         self.scale: Floats = np.ones(bodies)
         """(N,) size over that of the recorded body."""
         self.visible: Bools = np.ones(bodies, dtype=np.bool_)
-        """(N,)"""
+        """(N,) whether a body is visible."""
         self.segment: Int32s = np.zeros(bodies, dtype=np.int32)
         """(N,) requested: begins when the cycle ends."""
         self.cycles: Int32s = np.zeros(bodies, dtype=np.int32)

@@ -47,7 +47,7 @@ class DetailedChain:
     points_m: Floats
     """(n, 3) on the ground, head first: 4, one of two links, or all."""
     radius_m: Floats
-    """(n,) there."""
+    """(n,) radii of the body at its points."""
 
 
 class DetailedCrowd:

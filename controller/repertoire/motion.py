@@ -17,7 +17,8 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import Segment
 
 Choose = Callable[[BodyView], int | None]
-"""Told where the body is when a cycle ends; returns the next action, or None to come to rest."""
+"""Function that gets the place of the body at the end of a cycle; it returns the next action, or
+None to come to rest."""
 
 
 class SegmentCycle:
@@ -45,7 +46,7 @@ class SegmentCycle:
             wheels=True,
         )
         self.gone_s = 0.0
-        """Since its beginning, over all cycles."""
+        """Time since the beginning of the motion, over all cycles."""
 
     @property
     def cycles(self) -> float:

@@ -25,7 +25,7 @@ class Repertoire:
 
     robot: str
     joint_axes: str
-    """Axes of the recorded robot, as in its configuration."""
+    """Axes of the recorded robot's joints, as in its configuration."""
     world: str
     length_m: float
     """Length of the recorded body: another body is scaled by the ratio of lengths."""

@@ -1,8 +1,7 @@
 """A simulated robot driven frame by frame by a motion source: servos, bus, safety, MuJoCo."""
 
 from contextlib import ExitStack
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.ground import build_ground
@@ -65,14 +64,9 @@ class PhysicsBody:
         self._keep_view()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         """Torque off."""
-        self._open.__exit__(kind, error, trace)
+        self._open.__exit__(*raised)
 
     def frame(self, goal_rad: Floats) -> None:
         """One frame: wait for it, read the joints, send goals (J,).

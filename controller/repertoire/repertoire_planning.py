@@ -17,7 +17,7 @@ from snakewalk.config.loader import checked, load_robot, load_run, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import load_repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
@@ -139,8 +139,7 @@ def save_plan(job: RepertoireRun, path: Path) -> None:
         "robot": job.robot.model_dump(mode="json"),
         "world": job.world.model_dump(mode="json"),
     }
-    with atomic_write(path) as part:
-        part.write_text(json.dumps(about, indent=1) + "\n", encoding="utf-8")
+    write_result(path, json.dumps(about, indent=1) + "\n")
 
 
 def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
@@ -190,11 +189,11 @@ class SearchCost:
     candidate_s: float
     """A candidate of the search on the repertoire: one more cycle, all book-keeping included."""
     physics_candidate_s: float
-    """The same cycle on the simulated robot, mean over those that were run."""
+    """CPU time of a cycle on the simulated robot, mean over the cycles that were run."""
     ran: int
     """Candidates run on the physics."""
     candidates: int
-    """That the search scored."""
+    """Number of candidates that the search scored."""
 
     @property
     def ratio(self) -> float:
@@ -221,11 +220,9 @@ def search_cost(
     candidates: int,
     *,
     beam: int = 400,
-    length: int = 4,
-    seed: int = 0,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> SearchCost:
-    """Time the search, and ``candidates`` random cycles of actions on the physics."""
+    """Time the search, and ``candidates`` random cycles of at most four actions on the physics."""
     run = job.run
     start = job.route.pose[0]
     aimed_m = AIM_SHARE * run.waypoint_radius_m
@@ -235,11 +232,11 @@ def search_cost(
         begun = time.process_time()
         route = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
         best = min(best, time.process_time() - begun)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     spent = 0.0
     ran = 0
     while ran < candidates:
-        count = min(length, candidates - ran)
+        count = min(4, candidates - ran)
         actions = tuple(int(k) for k in random.choice(job.primitives.tried, size=count))
         spent += physics_route(job, actions)[0]
         ran += count

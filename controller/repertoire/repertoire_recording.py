@@ -30,7 +30,7 @@ class Action:
     name: str
     kind: Kind
     frequency_hz: float
-    """At most; the joints' limits and whole frames may make it slower."""
+    """Largest frequency; the joints' limits and whole frames may make it slower."""
     turn_rad: float = 0.0
 
 

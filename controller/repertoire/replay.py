@@ -21,7 +21,7 @@ class Replayed:
     rotation: Floats
     """(T, 3, 3) of the body frame in the world."""
     origin_m: Floats
-    """(T, 3)"""
+    """(T, 3) origins of the body, m."""
     link_m: Floats
     """(T, L, 3) centres of the links in the world."""
 

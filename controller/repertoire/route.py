@@ -38,7 +38,7 @@ class RouteFollower:
         self._beam = beam
         self.reached = 0
         self.chosen: list[int] = [route.actions[0]]
-        """Actions so far."""
+        """Actions that the follower has chosen so far."""
         self.predicted: list[Floats] = [route.pose[1]]
         """(3,) where each action should end, predicted when it began."""
         self.measured: list[Floats] = []

@@ -192,9 +192,9 @@ class PlayedAction:
     requested: tuple[float, float]
     """Speed, m/s, and turn, rad/s."""
     recorded: tuple[float, float]
-    """The same of the action, at this body's size."""
+    """Speed, m/s, and turn, rad/s, of the action at this body's size."""
     measured: tuple[float, float]
-    """The same of the body, over the time that the action and the join to it took."""
+    """Speed, m/s, and turn, rad/s, of the body, over the time of the action and the join to it."""
 
 
 class ScheduleMotion(MotionWrapper):
@@ -207,7 +207,7 @@ class ScheduleMotion(MotionWrapper):
         self._now_s = 0.0
         self._begun: tuple[float, int, tuple[float, float], Floats] | None = None
         self.played: list[PlayedAction] = []
-        """So far."""
+        """Actions that were played so far."""
         self._requested = prepared.requested(0.0)
         first = self._controller.choose(*self._requested)
         self._motion = RepertoireMotion(prepared.repertoire, prepared.robot, first, self._choose)

@@ -28,7 +28,7 @@ class MotionPrimitives:
         self.travel = np.array([t[m] * stretch for t, m in zip(travels, marks, strict=True)])
         """(A, SAMPLES, 3) x, y, heading in the frame at the beginning of the cycle."""
         self.duration_s = np.array([segment.duration_s for segment in repertoire.segments])
-        """(A,)"""
+        """(A,) durations of the actions, s."""
         kinds = [segment.kind for segment in repertoire.segments]
         self.tried: Ints = np.flatnonzero(np.isin(kinds, ["forward", "left", "right"]))
         """(B,) actions of which the search makes sequences: it never goes back or rests."""
@@ -126,11 +126,11 @@ class _Level:
     """Sequences of one length, and the level that they go on from."""
 
     pose: Floats
-    """(n, 3)"""
+    """(n, 3) poses at the ends of the sequences."""
     passed: Ints
     """(n,) waypoints."""
     time_s: Floats
-    """(n,)"""
+    """(n,) durations of the sequences, s."""
     before: "_Level | None"
     parent: Ints
     """(n,) in ``before``."""

@@ -157,4 +157,4 @@ class SecondaryController:
             if len(options):
                 return np.asarray(options)
         slowest = np.abs(self._speed_m_s[self._steady]).argmin()
-        return np.asarray(self._steady[slowest : slowest + 1])
+        return self._steady[slowest : slowest + 1]

@@ -43,7 +43,7 @@ class Segment:
     closure_m: float
     """Largest distance of a link, in the body frame, between the first and the last pose."""
     closure_rad: float
-    """Largest difference of a joint between them."""
+    """Largest difference of a joint between the segment's begin and end."""
 
     @property
     def frames(self) -> int:

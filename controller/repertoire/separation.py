@@ -15,9 +15,9 @@ from snakewalk.drivers.compiling import callable_in_loops, compiled
 
 NONE: Final = -1
 YIELDING_FRAMES: Final = 6
-"""After which a body that waits moves sideways, too (ours)."""
+"""Frames after which a body that waits moves sideways, too (ours)."""
 YIELDING_LENGTHS: Final = 0.005
-"""By this much in a frame, body lengths (ours)."""
+"""Sideways distance of a waiting body in a frame, body lengths (ours)."""
 _LINKS: Final = "float32[:, :, ::1]"
 _ROW: Final = "float64[::1]"
 

@@ -7,7 +7,14 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import FILM, LOG, REPORT, SUMMARY, atomic_write
+from snakewalk.controller.console.result_files import (
+    FILM,
+    LOG,
+    REPORT,
+    SUMMARY,
+    atomic_write,
+    write_result,
+)
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Drawings, film_on_page, page
@@ -106,8 +113,7 @@ def _write_page(
         folders=folders,
     )
     path = out_dir / REPORT
-    with atomic_write(path) as part:
-        part.write_text(html, encoding="utf-8")
+    write_result(path, html)
     LOGGER.debug("page: %s", path)
     return path
 

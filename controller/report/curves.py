@@ -29,7 +29,7 @@ _BAND_POINTS: Final = 100
 """Places of the band that is drawn instead."""
 _PANEL_PX: Final = 160
 _GAP_PX: Final = 34
-"""Between two panels: the title and the legend of the lower one."""
+"""Gap between two panels for the title and the legend of the lower one."""
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""
 

@@ -56,7 +56,7 @@ class Film:
     """Data URI, or a link relative to the page."""
     is_picture: bool
     start: str
-    """Time of the run at which it begins, s."""
+    """Time of the run at which the film begins, s."""
     speed: str
     """Seconds of run per second of film."""
 

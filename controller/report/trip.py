@@ -28,7 +28,7 @@ class Trip:
     joint: int | None
     """Index from the head; None if the reason names no joint of the robot."""
     joint_label: str
-    """Empty without a joint."""
+    """Label of the joint; empty without a joint."""
     values: tuple[LimitedValue, ...]
     """Last known values of the joint; empty without a joint."""
 

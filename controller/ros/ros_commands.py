@@ -39,7 +39,7 @@ _PENDING_MAX: Final = 16
 newer ones of the same joints follow, and velocities and goal poses that newer ones follow."""
 QUEUE: Final = QoSProfile(depth=10)
 _WINDOW_S: Final = 120.0
-"""The fastest message of this time has no delay (ours), so that clocks need not agree."""
+"""Time whose fastest message counts as having no delay (ours), so that clocks need not agree."""
 
 
 class Delays:

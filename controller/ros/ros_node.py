@@ -64,13 +64,13 @@ _WAIT_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
 _STOP_S: Final = 1.0
-"""How long the stop service waits for the run to say that torque is off."""
+"""Longest wait of the stop service for the run to confirm that torque is off."""
 _LOOK_S: Final = 1e-3
 _LAST_S: Final = 0.2
-"""For the last messages to leave."""
+"""Time for the last messages to leave."""
 _RUN: Final = "run"
 _LEVELS: Final = {0: OK, NOT_MEASURED: WARNING}
-"""Level of a run by its exit code."""
+"""Diagnostic level of a run by its exit code."""
 _LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
     JOINT_STATES: ("robot_joint_states", QUEUE),

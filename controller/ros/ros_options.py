@@ -17,7 +17,7 @@ class RosOptions:
     """Where in a ROS graph a robot is."""
 
     domain: int | None = None
-    """None: as ``ROS_DOMAIN_ID`` says, or 0."""
+    """Domain of ROS; None: that of ``ROS_DOMAIN_ID``, or 0."""
     namespace: str = ""
     network: bool = False
     """Whether other machines see it; else only this one, unless the environment says where."""

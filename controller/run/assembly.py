@@ -1,7 +1,6 @@
 """Steps that all preparations of runs share."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from snakewalk.config.loader import checked, load_robot, load_world
 from snakewalk.config.robot import RobotConfig
@@ -11,20 +10,19 @@ from snakewalk.controller.run.run_keys import with_keys_of
 from snakewalk.controller.run.servo_setup import check_servos
 
 
-def load_body(name: str, keys: Mapping[str, object], folder: Path | None = None) -> RobotConfig:
+def load_body(name: str, keys: Mapping[str, object]) -> RobotConfig:
     """Load a robot and replace values of its file.
 
     Args:
         name: a shipped robot, or a file.
         keys: as ``checked_keys`` returns them.
-        folder: folder of the run's file.
 
     Raises:
         ConfigError: every fault of the file.
         InputError: a key does not fit.
 
     """
-    return with_keys_of("robot", load_robot(name, folder), keys)
+    return with_keys_of("robot", load_robot(name), keys)
 
 
 def assemble(
@@ -33,7 +31,6 @@ def assemble(
     body: RobotConfig,
     *,
     origin: str = "command line",
-    folder: Path | None = None,
 ) -> tuple[RunConfig, WorldConfig]:
     """Check a run, apply the keys of run and world, and check its servos and its cycle rate.
 
@@ -42,7 +39,6 @@ def assemble(
         keys: as ``checked_keys`` returns them.
         body: the robot that runs.
         origin: name that messages use for the origin of the fields.
-        folder: folder of the run's file.
 
     Raises:
         InputError: one line per fault.
@@ -50,4 +46,4 @@ def assemble(
     """
     run = with_keys_of("run", checked(RunConfig, dict(fields), origin), keys)
     check_servos(run, body)
-    return run, with_keys_of("world", load_world(run.world, folder), keys)
+    return run, with_keys_of("world", load_world(run.world), keys)

@@ -32,7 +32,7 @@ from snakewalk.drivers.port.serial_port import SerialPort
 from snakewalk.drivers.types import BodyPose
 
 FILE_PORTS: Final = "robot"
-"""``--port`` of a robot whose file names the ports of its segments."""
+"""Value of ``--port`` for a robot whose file names the ports of its segments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Backend:
     pose: Callable[[], BodyPose] | None
     """Measures the head link; None where nothing does."""
     qpos: Callable[[], Floats] | None
-    """The simulator's coordinates, for the film."""
+    """Coordinates of the simulator, for the film."""
     wire_busy_s: Callable[[], float]
     """Time for which bytes have occupied the wire; NaN if unknown."""
     energy: Callable[[], MotorEnergy] = MotorEnergy

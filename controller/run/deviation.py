@@ -16,8 +16,8 @@ FRICTION: Final = 1.25
 MASS: Final = 1.15
 WEAK: Final = 0.7
 HORN_DEG: Final = 2.0
-"""Drawn errors: factor on friction and mass or its inverse, torque of one servo, and standard
-deviation of the horns (ours)."""
+"""Sizes of drawn errors: factor on friction and mass or its inverse, torque of one servo, and
+standard deviation of the horns (ours)."""
 
 
 @dataclass(frozen=True, slots=True)

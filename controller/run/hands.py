@@ -40,7 +40,7 @@ _EVENTS_MAX = 8
 BUTTONS = {0: "n", 1: "m", 2: "p", 3: "d", 6: "space", 7: "q", 8: "space", 9: "q", 10: "t"}
 """A, B, X, Y, select and start of common pads; 10 is the right stick pressed, or the middle one."""
 DEAD_MAN = (4, 5)
-"""The shoulder buttons, left and right."""
+"""Buttons of the dead man's switch: the shoulder buttons, left and right."""
 AXES = {0: ("left", "right"), 1: ("up", "down"), 6: ("left", "right"), 7: ("up", "down")}
 """Left stick and cross: the names at the low and at the high end."""
 
@@ -234,7 +234,7 @@ class Hands:
         self._motion: GaitMotion | None = None
         self._lost: str | None = None
         self.policy = "stop"
-        """``safety.lost_observer`` of the run."""
+        """Action if the observer is lost (``safety.lost_observer`` of the run)."""
 
     @property
     def gait(self) -> str | None:

@@ -72,7 +72,7 @@ class MapProvider:
     measure: PoseSource
     """Measures the pose, and captures due pictures."""
     ground_map: "GrowingMap | None" = None
-    """None if the walk knows its ground from the world."""
+    """Map that the walk makes of its ground; None if it knows the ground from the world."""
     true_ground: HeightField | None = None
     head_m: float = 0.0
     """Way of the head so far, in plan."""

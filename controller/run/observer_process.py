@@ -4,7 +4,6 @@ import json
 import socket
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Self
 
 from snakewalk.config.arrays import Image
@@ -49,19 +48,14 @@ class ObserverProcess:
             self._process.kill()
             raise InputError(f"{fault}: {said.get('fault', 'it did not start')}")
         self.said: dict[str, Any] = said
-        """Its description of itself."""
+        """Description that the observer gave of itself."""
         self._end = RunEnd(ours)
         self._what = what
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self._end.close(0.5)
         self._process.join(_END_S)
         if self._process.is_alive():

@@ -102,7 +102,7 @@ class Observers:
 
         """
         self.page = page
-        """The page of the run; None without a page."""
+        """Page of the run; None without a page."""
         self._all: list[RunObserver] = [*([] if page is None else [page]), *observers]
         self._with_waypoints = [
             observer for observer in observers if isinstance(observer, OffersWaypoints)

@@ -40,7 +40,7 @@ class PoseContext:
     """Text after the colon of ``--pose NAME:ARGUMENT``."""
     on_event: OnEvent
     on_picture: OnPicture
-    """Accepts each picture of a camera with its time."""
+    """Function that accepts each picture of a camera with its time."""
 
 
 class PosePlugin(Protocol):
@@ -105,7 +105,7 @@ class PoseError:
     head_m: Floats
     """(T,) distance between the centres of the head link."""
     heading_rad: Floats
-    """(T,) absolute difference between its headings."""
+    """(T,) absolute difference of the headings of the head link, rad."""
     waypoints_reached: int
     """Waypoints reached by the body's true centre, in order."""
 

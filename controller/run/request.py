@@ -92,7 +92,7 @@ class RunRequest:
     """A prepared run, its folder, its port, and everyone who watches or operates it."""
 
     prepared: PreparedRun
-    """The motion, checked on paper."""
+    """Motion of the run, checked on paper."""
     folder: Path | None = None
     """Folder of the log, which is made; None: a temporary one, which is deleted."""
     port: str | RehearsedPort | None = None
@@ -115,9 +115,9 @@ class RunRequest:
     """Returns an operator's changes of the waypoints in each cycle, as ``LiveCourse`` accepts them.
     The run then holds at the last waypoint until it is ended."""
     on_progress: OnProgress = lambda progress: None
-    """Called after each cycle."""
+    """Function that is called after each cycle."""
     on_event: OnEvent = lambda kind, text: None
-    """Called with decisions of the motion: a slower rate, an operator's change."""
+    """Function that gets decisions of the motion: a slower rate, an operator's change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class RunResult:
     prepared: PreparedRun
     outcome: Outcome
     record: RunRecord
-    """The log, read once for summary and report."""
+    """Log of the run, read once for summary and report."""
     summary: RunSummary
     travel: Travel
     """Travel of the centre of mass, which gives the summary's speed."""
@@ -136,11 +136,11 @@ class RunResult:
     map: MapProvider
     """Map source and its accuracy, for a run that maps its ground."""
     source: MotionSource
-    """The motion that ran, at its end."""
+    """Motion of the run, at its end."""
     ending: RunEnding
     """State of torque and log, for an ending of the program afterwards."""
     saved_log: Path | None
-    """None if the folder was temporary."""
+    """Path of the log; None if the folder was temporary."""
 
     @property
     def verdict(self) -> RunVerdict:

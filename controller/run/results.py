@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SERVOS: Final = "servos"
 """Look of the body in a film: a capsule per link."""
 ANIMAL: Final = "animal"
-"""The animal of the run's recording."""
+"""Name of the look of the animal in the run's recording."""
 _BODY: Final = "body"
 """Plug-in of all other looks: names and files of bodies."""
 
@@ -78,7 +78,7 @@ class Artifacts:
     report: Path | None
     film: Path | None
     notes: tuple[str, ...]
-    """One line each."""
+    """Reasons for missing files, one line each."""
 
     def to_dict(self) -> dict[str, str | None]:
         """Names of the files, for a command's answer."""

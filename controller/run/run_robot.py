@@ -23,9 +23,9 @@ from snakewalk.controller.console.plugins import require
 from snakewalk.controller.console.result_files import (
     LOG,
     SUMMARY,
-    atomic_write,
     cleared_folder,
     refuse_another_run,
+    write_result,
 )
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.metrics.travel import travel
@@ -93,7 +93,7 @@ class CheckedRun:
     """Facts of a request that may be opened."""
 
     robot: RobotConfig
-    """With the ports of its segments."""
+    """Robot with the ports of its segments."""
     port: str | None
     """Name of the port; None: the simulator."""
     rehearsed: RehearsedPort | None
@@ -101,7 +101,7 @@ class CheckedRun:
     """Ports of real servos; None: the simulator."""
     plan: PlanSummary
     initial_pose: InitialPose | None
-    """None if no servo is simulated."""
+    """Pose in which the simulated body starts; None if no servo is simulated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,8 +327,7 @@ def finish(request: RunRequest, opened: OpenedRun, outcome: Outcome, folder: Pat
 def write_summary(numbers: RunSummary, folder: Path) -> RunSummary:
     """Write ``summary.json`` into a folder and return the numbers."""
     text = json.dumps(numbers.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
-    with atomic_write(folder / SUMMARY) as part:
-        part.write_text(text + "\n", encoding="utf-8")
+    write_result(folder / SUMMARY, text + "\n")
     return numbers
 
 

@@ -103,7 +103,7 @@ class Column:
     is_printed_alone: bool = False
     """Whether the digits of an array do not depend on unknown numbers in other arrays."""
     choices: tuple[str, ...] = ()
-    """All texts that occur, if the field is one of a few."""
+    """All texts that the field can have, if it is one of a few."""
     curves: tuple[Curve, ...] = ()
 
     @property

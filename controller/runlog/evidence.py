@@ -11,7 +11,8 @@ class Kind(StrEnum):
     """How a value is known."""
 
     MEASURED = "measured"
-    """By a source, at a time, with an accuracy; the truth of the simulator is measured."""
+    """Evidence of a value that a source measured at a time, with an accuracy; the truth of the
+    simulator is measured."""
     ESTIMATED = "estimated"
     """Computed from measurements, with an interval."""
     ASSUMED = "assumed"
@@ -28,7 +29,8 @@ class PoseEvidence:
 
     kind: Kind
     source: str
-    """``simulator``, ``camera``, ``joints``, ``imu``, or the name of a plug-in."""
+    """Source of the value: ``simulator``, ``camera``, ``joints``, ``imu``, or the name of a
+    plug-in."""
     position_m: float | None = None
     """Standard deviation of the head's position; None where the source does not state it."""
     heading_rad: float | None = None

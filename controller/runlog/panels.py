@@ -15,7 +15,7 @@ class CurveValues(NamedTuple):
 
     curve: Curve
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the curve, s."""
     values: Floats
     """(T,) in the panel's unit; (T, J) if the panel shows one joint. NaN is a gap."""
 

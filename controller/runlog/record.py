@@ -81,7 +81,7 @@ class InitialPose:
     heading_rad: float
     """Heading of the head link."""
     joint_rad: Floats
-    """(J,)"""
+    """(J,) joint angles of the pose, rad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +94,14 @@ class Header:
     backend: str
     plan: PlanSummary
     pose_evidence: PoseEvidence
-    """How the poses of the log are known."""
+    """Evidence of the poses of the log."""
     ground: HeightField | None = None
     """Thinned; None on a flat floor."""
     torque_constant_n_m_a: float = float("nan")
     winding: Winding | None = None
     """Winding of the robot's servos; None if the log does not state it."""
     initial_pose: InitialPose | None = None
-    """None on servos."""
+    """Pose in which the simulated robot was put on the ground; None on servos."""
     software: str = field(default_factory=partial(version, "snakewalk"))
     config_hash: str = ""
     """Digest of run, robot and world; set when the log is read."""
@@ -226,7 +226,7 @@ class RunRecord:
     paths: tuple[tuple[float, Floats], ...]
     """Paths in force from a time on; the first is the plan's, at 0."""
     waypoints: tuple[tuple[float, Floats], ...]
-    """The same of waypoints (w, 2)."""
+    """Times from which waypoints are in force, and the waypoints (w, 2)."""
     events: tuple[Event, ...]
     complete: bool
     """Whether the file was closed properly."""

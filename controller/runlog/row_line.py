@@ -37,7 +37,8 @@ SILENT_S: Final = 3.0
 """An observer without a request for this time does not respond (ours): it requests rows 20 times a
 second, and on a busy machine late by a second."""
 _START_S: Final = 60.0
-"""The same before it has shown a cycle (ours): building a scene needs seconds."""
+"""Longest time without a request before an observer has shown a cycle (ours): building a scene
+needs seconds."""
 _STEP_MAX_S: Final = 0.1
 """Largest part of the time between two checks that counts (ours)."""
 _RECEIVE_BYTES: Final = 1 << 18

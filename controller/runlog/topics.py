@@ -32,7 +32,7 @@ NAN: Final = float("nan")
 FLAT_V: Final = 0.15
 """Span up to which a supply holds no information (ours)."""
 FLAT_C: Final = 1.0
-"""The same of a temperature (ours)."""
+"""Span up to which a temperature holds no information (ours)."""
 Flags = NDArray[np.bool_]
 Texts = tuple[str, ...]
 _TIME: Final = Column("clock of the run, s", "exact", is_known=True)
@@ -140,7 +140,8 @@ class CycleTable(Table):
     electrical_j: Annotated[
         Floats, _optional("consumed by all motors so far; energy that they return is lost")
     ]
-    """``MotorEnergy`` since the start; NaN on servos, which do not measure it."""
+    """Electrical energy since the start (``MotorEnergy``); NaN on servos, which do not measure
+    it."""
     mechanical_j: Annotated[Floats, _optional("net work at all shafts so far")]
     verdict: Annotated[Texts, Column("", "text", default="pass", choices=("pass", "clamp", "veto"))]
     reason: Annotated[Texts, Column("of a clamp or veto", "text", default="")]
@@ -212,7 +213,7 @@ class PoseTable(Table):
     ]
     """Head link in the world."""
     links_m: Annotated[Floats, Column("(L, 3) centres of the links", shape=(LINK, 3), default=None)]
-    """NaN where unknown."""
+    """Positions of the links; NaN where unknown."""
     centre_m: Annotated[Floats, Column("(3,) centre of mass", shape=(3,))]
     speed_m_s: Annotated[
         Floats,

@@ -66,7 +66,7 @@ class Truth:
 
     header: dict[str, Any]
     sequence: Ints
-    """(n,)"""
+    """(n,) numbers of the poses."""
     time_s: Floats
     """(n,) on the clock of the servos."""
     sent_s: Floats
@@ -74,7 +74,7 @@ class Truth:
     head_m: Floats
     """(n, 3) centre of the head link."""
     rotation: Floats
-    """(n, 3, 3) its axes."""
+    """(n, 3, 3) axes of the head link, in columns."""
     centre_m: Floats
     """(n, 3) centre of mass."""
     energy_j: Floats

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Literal, Self
 
 import numpy as np
@@ -86,12 +85,7 @@ class RunLog:
         """Start at once."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         """Finish the file also when the run ends with an error: the log says how it came to it.
 
         Nothing is left of a run that was refused before its first cycle, or that a signal ended

@@ -20,7 +20,8 @@ from snakewalk.drivers.types import JointState
 LEAST = 0.25
 """Lowest rate; a motion that stands still looks like one that hangs."""
 HEAT_BAND_C = 10.0
-"""From so far below the limit on, down to ``HEAT_EDGE_C`` below it."""
+"""Range of temperatures below the limit in which the rate falls, and its end ``HEAT_EDGE_C`` below
+the limit."""
 HEAT_EDGE_C = 2.0
 CURRENT_START, CURRENT_END = 0.75, 0.98
 """Shares of the current limit."""
@@ -34,7 +35,8 @@ joint does not count: the ground may hold it off at any rate."""
 AVERAGE_S = 0.2
 """Averaging time of current and lag: a peak is not a load."""
 WINDING_BAND_C, WINDING_EDGE_C = 25.0, 5.0
-"""From so far below the limit of a winding on, down to so far below it."""
+"""Range of winding temperatures below the limit in which the rate falls, and its end below the
+limit."""
 REPORT_BELOW, REPORT_ABOVE = 0.95, 0.99
 
 
@@ -43,7 +45,7 @@ class Allowed:
     """Rate that a state allows."""
 
     rate: float
-    """1 down to ``LEAST``."""
+    """Rate of the motion, from 1 down to ``LEAST``."""
     reason: str
     """Limiting quantity, one line; empty at 1."""
 
@@ -169,7 +171,7 @@ class Derating:
     ) -> None:
         self.rate = 1.0
         self.least = 1.0
-        """Lowest rate so far."""
+        """Lowest rate of the motion so far."""
         self._safety = safety
         self._robot = robot
         self._load = load

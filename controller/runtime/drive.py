@@ -58,7 +58,7 @@ class Progress(NamedTuple):
     """State of a run after the command of a cycle has been sent."""
 
     time_s: float
-    """Since torque on."""
+    """Time since torque on."""
     speed_m_s: float
     """Forward speed of the body, smoothed."""
     reached: int
@@ -68,7 +68,7 @@ class Progress(NamedTuple):
     done: bool
     """Whether the motion has come to its end and rests."""
     waypoints: int = 0
-    """How many are in force."""
+    """Number of waypoints in force."""
 
 
 @contextmanager
@@ -107,7 +107,7 @@ class Outcome:
     alarms: int
     tripped: str | None
     waypoints: int
-    """How many there were, those among them that were set on the way."""
+    """Number of waypoints, with those that were set on the way."""
     least_rate: float = 1.0
     """Lowest rate to which derating slowed the motion."""
 
@@ -178,9 +178,9 @@ class Watchers:
 
     observer: CycleObserver | None = None
     on_progress: OnProgress = lambda progress: None
-    """Called after each cycle."""
+    """Function that is called after each cycle."""
     on_event: OnEvent = lambda kind, text: None
-    """Called with decisions of the motion."""
+    """Function that gets decisions of the motion."""
 
 
 class Drive:

@@ -40,7 +40,7 @@ class Slide:
     holding_rad: float
     """Torque that it could have held there, in that shape."""
     lasted_s: float
-    """All the time that nothing held it."""
+    """Time in which nothing held the body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,19 +48,19 @@ class Forecast:
     """Predicted course of the plan, if the friction is as configured."""
 
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the forecast, s."""
     joint_rad: Floats
-    """(T, J)"""
+    """(T, J) joint angles, rad."""
     centre_m: Floats
     """(T, 2) centre of mass in the world."""
     torque_n_m: Floats
     """(T, J) that the yaw joints must hold against friction."""
     pulse_m: float
-    """How far the shape has travelled along the body."""
+    """Distance that the shape has travelled along the body."""
     reached: int
     missed: int
     slide: Slide | None
-    """None where friction held everywhere."""
+    """Place where the body slides; None where friction held everywhere."""
 
     @property
     def duration_s(self) -> float:
@@ -160,7 +160,7 @@ class _PaperBody:
         self.joints: Floats = np.zeros(robot.joint_count)
         """(J,) joint angles."""
         self.slide: Slide | None = None
-        """The steepest ground that did not hold the body."""
+        """Steepest ground that did not hold the body."""
 
     def begin(self, head_m: Floats, heading_rad: float, joints: Floats) -> None:
         """Lay the body down: head link (2,), heading of its mean line, joint angles (J,)."""
@@ -206,7 +206,7 @@ class _PaperBody:
         self._head_m = self._head_m + step_s * turn @ velocity[:2]
         self._head_rad += step_s * velocity[2]
         self.joints = goal
-        return np.asarray(torque)
+        return torque
 
     def _balance(
         self,

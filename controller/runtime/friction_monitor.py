@@ -25,8 +25,8 @@ SPAN_S = 1.5
 in a longer one bodies diverge."""
 _SETTLED = 4
 _RESTS = 3
-"""After ``_SETTLED`` spans in a row that confirm the file's friction, ``_RESTS`` are skipped behind
-each replayed one (ours): a quarter of the cost, and up to 4.5 s until a change is visible."""
+"""Spans that are skipped behind each replayed one, after ``_SETTLED`` spans in a row that confirm
+the file's friction (ours): a quarter of the cost, and up to 4.5 s until a change is visible."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 

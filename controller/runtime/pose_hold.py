@@ -17,7 +17,7 @@ class PoseHealth:
     fault: Callable[[], str | None]
     """Why the pose cannot be trusted in this cycle; None while it can."""
     hold_s: float
-    """How long a run without a pose holds."""
+    """Longest time for which a run without a pose holds."""
     row: Callable[[], dict[str, Any]]
     """State of the source, as ``PoseSourceTable`` logs it."""
     is_cautious: Callable[[], bool] = lambda: False

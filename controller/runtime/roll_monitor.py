@@ -8,7 +8,7 @@ from snakewalk.controller.kinematics.roll_compensation import body_roll_rad
 OVER_RAD = np.deg2rad(75.0)
 """Mean roll of the links from which on it has rolled over (ours)."""
 UPRIGHT_RAD = np.deg2rad(50.0)
-"""Mean roll below which it lies well again (ours)."""
+"""Mean roll below which the body lies well again (ours)."""
 _LASTS_S = 1.5
 """Time that it must lie so before this is reported (ours): a body that rolls uphill passes by."""
 

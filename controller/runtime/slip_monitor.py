@@ -44,7 +44,7 @@ class SlipMonitor:
         self._pulse_m = 0.0
         self._displacement_m = 0.0
         self.window: SlipWindow | None = None
-        """The last full window."""
+        """Last full window of the monitor."""
 
     def update(self, pulse_m: float, displacement_m: float) -> bool:
         """Add one cycle; return whether a window has just closed with too small a share."""

@@ -21,7 +21,7 @@ class Graph:
     """
 
     indptr: Ints
-    """(V + 1,)"""
+    """(V + 1,) places of the neighbours of each vertex in ``indices``."""
     indices: Ints
     """(2 E,) ascending for each state."""
 

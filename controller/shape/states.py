@@ -47,7 +47,7 @@ def to_states(angles_rad: Floats, coefficients: int = 7) -> Complexes:
     64 a.
     """
     spectrum = np.fft.fft(pad(np.unwrap(angles_rad, axis=-1)), axis=-1)
-    return np.asarray(spectrum[..., 1 : coefficients + 1])
+    return spectrum[..., 1 : coefficients + 1]
 
 
 def to_angles(states: Complexes, points: int = 100) -> Floats:
@@ -68,7 +68,7 @@ def energy_kept(angles_rad: Floats, coefficients: int = 7) -> Floats:
     power = np.abs(spectrum[..., 1:]) ** 2
     total = power.sum(axis=-1)
     kept = power[..., :coefficients].sum(axis=-1)
-    return np.asarray(np.where(total > 0.0, kept / np.where(total > 0.0, total, 1.0), 1.0))
+    return np.where(total > 0.0, kept / np.where(total > 0.0, total, 1.0), 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,9 @@ class StateRange:
     high: Floats
     """(n,) largest, C_max."""
 
-    def amplitude_rad(self, points: int = 100) -> Floats:
+    def amplitude_rad(self) -> Floats:
         """(n, 2) amplitudes of a wave of tangent angle: modulus over half the samples."""
-        return np.stack([self.low, self.high], axis=-1) / (0.5 * padded_length(points))
+        return np.stack([self.low, self.high], axis=-1) / (0.5 * padded_length(100))
 
 
 def state_range(states: Complexes) -> StateRange:

@@ -36,7 +36,7 @@ class StudyResult:
     repeats: int
     seed: int
     states: Floats
-    """(R,) |V| of each graph: its largest connected part."""
+    """(R,) number of states |V| of each graph: its largest connected part."""
     mean_degree: float
     """Measured, mean over the graphs."""
     cover: Floats
@@ -44,7 +44,7 @@ class StudyResult:
     short_returns: Floats
     """(R,) share of returns after less than 0.05 |V| steps, until cover."""
     short_steps: Floats
-    """(R,) such returns as a share of all steps."""
+    """(R,) share of short returns in all steps."""
     short_per_state: Floats
     """(R,) such returns over |V|: comparable between walks of different length."""
     leaves: Floats

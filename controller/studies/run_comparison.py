@@ -21,24 +21,24 @@ class ComparedRun:
     """Extract of a log, which may be large."""
 
     name: str
-    """Name that separates it from the others."""
+    """Name that distinguishes the run from the others."""
     summary: RunSummary
     verdict: RunVerdict
     settings: Mapping[str, Any]
     """Values of run, robot and world by dotted key, with the bus and the software."""
     pose: str
-    """Evidence of its poses: ``measured by simulator``."""
+    """Evidence of the run's poses: ``measured by simulator``."""
     waypoints_m: Floats
-    """(w, 2)"""
+    """(w, 2) waypoints of the run, m."""
     waypoint_radius_m: float
     centre_m: Floats
     """(P, 2) track of the centre of mass."""
     pose_s: Floats
     """(P,) times of the values from poses:"""
     path_error_m: Floats
-    """(P,)"""
+    """(P,) distances from the path, m."""
     speed_m_s: Floats
-    """(P,)"""
+    """(P,) forward speeds, m/s."""
     cycle_s: Floats
     """(T,) times of the values from control cycles:"""
     current_a: Floats

@@ -1,12 +1,12 @@
 """One point of a sweep on the physics, with bus, safety layer and simulated servos."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.rounding import significant
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
 from snakewalk.controller.metrics.summary import RunSummary
@@ -27,7 +27,7 @@ class Measurement:
     """Results of a point, in five digits; None if unknown. The fields are columns of a table."""
 
     ended: str
-    """``ran to its end``, the trip, or ``refused: ...``, without further values."""
+    """End of the run: ``ran to its end``, the trip, or ``refused: ...``, without further values."""
     cycles: int | None = None
     ran_hz: float | None = None
     """Cycles a second that the joints could follow."""
@@ -46,7 +46,7 @@ class Measurement:
     tracking_max_rad: float | None = None
     least_rate: float | None = None
     pose_evidence: str | None = None
-    """How the poses are known that speeds and costs follow from."""
+    """Evidence of the poses from which speeds and costs follow."""
     pose_source: str | None = None
     backend: str | None = None
     """Simulator of the point: ``compiled``, or ``warp:DEVICE``."""
@@ -114,21 +114,21 @@ def measurement(
     return Measurement(
         ended=tripped or "ran to its end",
         cycles=moved.cycles,
-        ran_hz=_digits(moved.frequency_hz),
-        forward_bl_cycle=_digits(moved.forward_bl),
-        left_bl_cycle=_digits(moved.left_bl),
-        turn_rad_cycle=_digits(moved.turn_rad),
-        speed_m_s=_digits(moved.speed_m_s),
-        climb_m_s=_digits(cost.climb_m_s),
-        power_w=_digits(cost.power_w),
-        cost_of_transport=_digits(cost.cost_of_transport),
-        mechanical_cost=_digits(cost.mechanical_cost),
-        slip=_digits(cost.slip),
-        peak_current_a=_digits(numbers.peak_current_a),
-        peak_torque_n_m=_digits(numbers.peak_torque_n_m),
-        peak_temperature_c=_digits(numbers.peak_temperature_c),
-        tracking_max_rad=_digits(numbers.tracking_max_rad),
-        least_rate=_digits(least_rate),
+        ran_hz=significant(moved.frequency_hz, 5),
+        forward_bl_cycle=significant(moved.forward_bl, 5),
+        left_bl_cycle=significant(moved.left_bl, 5),
+        turn_rad_cycle=significant(moved.turn_rad, 5),
+        speed_m_s=significant(moved.speed_m_s, 5),
+        climb_m_s=significant(cost.climb_m_s, 5),
+        power_w=significant(cost.power_w, 5),
+        cost_of_transport=significant(cost.cost_of_transport, 5),
+        mechanical_cost=significant(cost.mechanical_cost, 5),
+        slip=significant(cost.slip, 5),
+        peak_current_a=significant(numbers.peak_current_a, 5),
+        peak_torque_n_m=significant(numbers.peak_torque_n_m, 5),
+        peak_temperature_c=significant(numbers.peak_temperature_c, 5),
+        tracking_max_rad=significant(numbers.tracking_max_rad, 5),
+        least_rate=significant(least_rate, 5),
         pose_evidence=numbers.pose_evidence,
         pose_source=numbers.pose_source,
         backend=backend,
@@ -154,7 +154,3 @@ def varied(prepared: P, rng: np.random.Generator) -> P:
         world=world.model_copy(update={"friction": friction}),
         robot=robot.model_copy(update={"servo": servo}),
     )
-
-
-def _digits(value: float | None) -> float | None:
-    return float(f"{value:.5g}") if value is not None and math.isfinite(value) else None

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from snakewalk.config.rounding import rounded
 from snakewalk.controller.console.parquet import Kind
 from snakewalk.controller.console.table import CsvTable, read_csv_table
 from snakewalk.controller.gaits.gait import Aim
@@ -158,16 +159,18 @@ def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
             keys=keys,
             points=some.points,
             tripped=some.points - some.ran,
-            default_bl_cycle=_round(math.nan if some.first is None else distance_bl(some.first), 3),
-            most_bl_cycle=_round(some.most_bl, 3),
-            default_pace=_round(math.nan if some.first is None else pace(some.first), 3),
-            most_pace=_round(some.most_pace, 3),
+            default_bl_cycle=rounded(
+                math.nan if some.first is None else distance_bl(some.first), 3
+            ),
+            most_bl_cycle=rounded(some.most_bl, 3),
+            default_pace=rounded(math.nan if some.first is None else pace(some.first), 3),
+            most_pace=rounded(some.most_pace, 3),
             pace=UNITS[GAITS[gait].aim],
-            default_cost=_round(_of(some.first, "cost_of_transport"), 2),
-            least_cost=_round(some.least_cost, 2),
-            peak_torque_n_m=_round(some.torque_n_m, 2),
-            peak_c=_round(some.celsius, 1),
-            default_slip=_round(_of(some.first, "slip"), 2),
+            default_cost=rounded(_of(some.first, "cost_of_transport"), 2),
+            least_cost=rounded(some.least_cost, 2),
+            peak_torque_n_m=rounded(some.torque_n_m, 2),
+            peak_c=rounded(some.celsius, 1),
+            default_slip=rounded(_of(some.first, "slip"), 2),
         )
         for (gait, robot, keys), some in running_by_key.items()
     ]
@@ -193,7 +196,3 @@ def _of(row: dict[str, str] | None, key: str) -> float:
 def _most(values: list[float]) -> float:
     finite_values = [value for value in values if math.isfinite(value)]
     return max(finite_values, default=math.nan)
-
-
-def _round(value: float, digits: int) -> float | None:
-    return round(value, digits) if math.isfinite(value) else None

@@ -92,13 +92,13 @@ class Trial:
     """Evidence of the poses: ``measured``, ``dead-reckoned``, ..."""
     pose_source: str = ""
     alarms: int = 0
-    """For missing advance."""
+    """Number of alarms for missing advance."""
     cause: str = ""
     """Cause of an incomplete run, of ``metrics.failure``, or ``refused`` or ``error``."""
     why: str = ""
-    """The same in a sentence."""
+    """Cause of an incomplete run, in a sentence."""
     verdict: str = ""
-    """How the run ended by its own log, in a sentence."""
+    """End of the run according to its own log, in a sentence."""
     exit_code: int = 2
     """Exit code of ``snakewalk run`` with this end; 2 if the run could not be prepared."""
 
@@ -306,7 +306,7 @@ class CaseSummary:
     runs: int
     slope_deg: float | None
     complete: str
-    """``n of m`` runs."""
+    """Share of complete runs as ``n of m``."""
     complete_95: tuple[float, float]
     """Interval of the share of complete runs (Wilson, 95 %)."""
     first_pass: int
@@ -314,7 +314,7 @@ class CaseSummary:
     first_pass_95: tuple[float, float]
     reached: float | None
     passed_by: int
-    """In all runs, also in those that are not complete."""
+    """Number of waypoints that were passed by in all runs, also in those that are not complete."""
     duration_s: float | None
     path_error_m: float | None
     path_error_max_m: float | None
@@ -328,19 +328,19 @@ class CaseSummary:
     causes: dict[str, int]
     """Number of runs by cause of failure, most first."""
     why: str
-    """The reasons in a line; unforeseen errors in full."""
+    """Reasons of failures in a line; unforeseen errors in full."""
     compliance: str = ""
-    """``on`` or ``off`` where it was chosen."""
+    """Whether joints yield to current: ``on`` or ``off`` where it was chosen."""
     speed_m_s: float | None = None
     """Net speed of gaits, mean of the runs."""
     speed_sd_m_s: float | None = None
     """Standard deviation of that speed from run to run."""
     truly_complete: str = ""
-    """``n of m`` runs that truly reached every waypoint, with an estimated pose."""
+    """Share of runs that truly reached every waypoint as ``n of m``, with an estimated pose."""
     head_error_m: float | None = None
     """Error of an estimated pose, mean over the runs."""
     world: str = ""
-    """Where one was chosen."""
+    """Name of the world where one was chosen."""
     pose: str = ""
     """Evidence of the poses: ``measured (simulator)``."""
     exit_codes: dict[str, int] | None = None

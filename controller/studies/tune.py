@@ -26,7 +26,7 @@ from snakewalk.controller.studies.sweep_points import Point, Space, robot_file
 
 Aim = Literal["speed", "efficiency"]
 LAGGARD = 0.5
-"""For efficiency: share of the defaults' speed from which a gait counts as moving."""
+"""Share of the defaults' speed from which a gait counts as moving, for efficiency."""
 _WORST = 1e3
 
 

@@ -34,7 +34,7 @@ class DubinsCurves:
     """All Dubins curves from one pose to each of n others."""
 
     start_m: complex
-    """x + iy."""
+    """Start of the curve as the complex number x + iy."""
     headings_rad: Floats
     """(n,) at the start."""
     radius_m: float
@@ -145,7 +145,7 @@ class Turn:
     points_m: Floats
     """(n, 2) a centimetre apart, from the start to where it joins the path."""
     joins_at_m: float
-    """Arc length of the path there."""
+    """Arc length of the path where the curve joins it."""
     cost: float
     """Cost of the turn and the rest of the path."""
 

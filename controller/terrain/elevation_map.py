@@ -136,7 +136,7 @@ class ElevationMap:
     @property
     def known(self) -> Bools:
         """(rows, columns) whether a height was measured."""
-        return np.asarray(np.isfinite(self.z_m))
+        return np.isfinite(self.z_m)
 
     def centred(self) -> Self:
         """Return the map with its middle at (0, 0)."""

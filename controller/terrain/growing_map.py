@@ -46,7 +46,7 @@ class GrowingMap:
         """(rows, columns) time of the first picture that showed a sample."""
         self._touched_m = np.empty((rows, columns))
         self.pictures = 0
-        """That were added so far."""
+        """Number of pictures that were added so far."""
         self.clear()
 
     @classmethod
@@ -63,7 +63,7 @@ class GrowingMap:
     @property
     def known(self) -> Bools:
         """(rows, columns) whether a sample was seen."""
-        return np.asarray(np.isfinite(self.z_m))
+        return np.isfinite(self.z_m)
 
     def is_known(self, x_m: float, y_m: float) -> bool:
         """Whether the sample of a place was seen."""
@@ -74,7 +74,7 @@ class GrowingMap:
         """(k,) height errors of the seen samples against the true ground."""
         row, column = np.nonzero(self.known)
         x, y = self.x0_m + column * self.spacing_m, self.y0_m + row * self.spacing_m
-        return np.asarray(self.z_m[row, column] - ground.elevation_m(x, y))
+        return self.z_m[row, column] - ground.elevation_m(x, y)
 
     def add(self, points_m: Floats, error_m: Floats, time_s: float) -> None:
         """Add the points of one pair of pictures.
@@ -181,4 +181,4 @@ def _coarsely_filled(z_m: Floats) -> Floats:
     coarse_m = filled(mean_m, count == 0) if (count == 0).any() else mean_m
     axes_cells = [(np.arange(n) - 0.5 * (_COARSE - 1)) / _COARSE for n in (rows, columns)]
     places = np.meshgrid(*axes_cells, indexing="ij")
-    return np.asarray(map_coordinates(coarse_m, places, order=1, mode="nearest"))
+    return map_coordinates(coarse_m, places, order=1, mode="nearest")

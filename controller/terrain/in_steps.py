@@ -30,7 +30,7 @@ class Unfinished(Generic[T]):
         self.largest = 0
         """Units done in the call of ``carry_on`` that did most."""
         self.result: T | None = None
-        """None until it is done."""
+        """Result of the work; None until it is done."""
 
     def carry_on(self, budget: int) -> bool:
         """Do the next step, and more within ``budget`` units; return whether it is done.

@@ -23,11 +23,12 @@ from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
 
 _REACH_M: Final = 0.6
-"""From the head to the first node (ours): a mast's cameras do not see the ground at its foot."""
+"""Longest distance from the head to the first node (ours): a mast's cameras do not see the ground
+at its foot."""
 _LEAST_M: Final = 0.4
 """Shortest path worth walking, where there is a longer one (ours)."""
 _WITHIN_M: Final = (np.inf, 1.2, 0.7)
-"""How far a path may lead, the nearer ones where no smooth one leads farther (ours)."""
+"""Distances that a path may lead; the nearer ones where no smooth path leads farther (ours)."""
 _SURELY_UNSAFE: Final = 1.15
 """Largest risk of ground on a path in force: the next picture may show planned ground to be a
 little worse."""

@@ -12,7 +12,8 @@ from snakewalk.drivers.compiling import compiled
 
 _STEP_M = 0.01
 WINDOW_M = 1.5
-"""How far ahead a point is projected: onto its own lap, where a path crosses itself."""
+"""Distance ahead within which a point is projected: onto its own lap, where a path crosses
+itself."""
 
 
 class SplinePath:

@@ -15,7 +15,7 @@ from snakewalk.config.world import PlannerConfig
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 EDGE_TOLERANCE_M = 1e-9
-"""By which a point may lie beyond the margin and count as on it."""
+"""Distance beyond the margin at which a point still counts as on it."""
 _UNKNOWN_RISK = 1e9
 """Risk of samples next to one that was not measured: never safe; finite, as it is interpolated."""
 
@@ -191,4 +191,4 @@ def _summed(values: Floats, weight: Floats) -> Floats:
     shape = [next_fast_len(n + m - 1, True) for n, m in sizes]
     sums = irfft2(rfft2(values, shape) * rfft2(weight[::-1, ::-1], shape), shape)
     (rows, columns), (up, left) = values.shape, ((m - 1) // 2 for m in weight.shape)
-    return np.asarray(sums[up : up + rows, left : left + columns])
+    return sums[up : up + rows, left : left + columns]

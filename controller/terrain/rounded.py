@@ -52,7 +52,7 @@ def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
     """(n, 2) points of the parabola; ``back`` and ``onward`` are relative to the corner."""
     count = max(3, round(float(np.hypot(*back) + np.hypot(*onward)) / _STEP_M) + 1)
     t = np.linspace(0.0, 1.0, count)[:, None]
-    return np.asarray(corner + (1.0 - t) ** 2 * back + t**2 * onward)
+    return corner + (1.0 - t) ** 2 * back + t**2 * onward
 
 
 def _evenly(points: Floats) -> Floats:

@@ -61,7 +61,7 @@ class Footprint:
         """Inclination (...) of the plane fitted to the footprint at points (..., 2)."""
         x, y = np.moveaxis(points_m, -1, 0)
         layers = interpolated(self._ground, self._layers, x, y)
-        return np.asarray(np.arctan(np.hypot(layers[..., 0], layers[..., 1])))
+        return np.arctan(np.hypot(layers[..., 0], layers[..., 1]))
 
     def slopes(self, points_m: Floats, direction: Floats) -> Floats:
         """Tangents (2, ...) of the slope up along a direction, and of the RMS slope across it.
@@ -87,7 +87,7 @@ RISK_LIMIT = 0.9
 # Half of the sixteen neighbours; the others are the same edges reversed.
 _STEPS = ((0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (2, -1), (1, -2))
 SAMPLE_M = 0.05
-"""Between the points at which an edge is weighed, at most."""
+"""Largest distance between the points at which an edge is weighed."""
 _AVOID = 30.0
 """Metres of level path that a metre through an avoided place costs more."""
 _EDGES_IN_STEP = 5000

@@ -25,11 +25,11 @@ class PathRelief:
     median_slope_rad: float
     """Median slope of the plane fitted in the planner's slope window."""
     max_slope_rad: float
-    """Largest such slope; the planner bounds it."""
+    """Largest slope of the plane fitted in the planner's slope window; the planner bounds it."""
     median_footprint_slope_rad: float
     """Median inclination of the surface in the strip that the body stands on, with no window."""
     max_footprint_slope_rad: float
-    """Largest such slope."""
+    """Largest inclination of the surface in the strip that the body stands on."""
     max_up_slope_rad: float
     """Steepest climb: slope of the footprint's plane along the path."""
     max_side_slope_rad: float

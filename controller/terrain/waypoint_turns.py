@@ -20,8 +20,8 @@ _SHARP = 0.45
 """Share of the wanted radius (ours): larger bends are followed, at 0.2 m a corner of 90 degrees."""
 _TURNED_RAD = 2.0
 _SHARP_BACK = 0.75
-"""The same share of a bend by which a path turns back, by at least this angle (ours): 3 of 10 walks
-missed a waypoint at 0.19 m and 128 degrees."""
+"""Share of the wanted radius for a bend by which a path turns back, by at least this angle (ours):
+3 of 10 walks missed a waypoint at 0.19 m and 128 degrees."""
 _RADII = 1.5, 1.0, 0.75, 0.5
 """Shares of the wanted radius, tried in turn until a turn stays on safe ground. The centre of a
 body of 1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""

@@ -39,7 +39,7 @@ class Analysis:
     energy: Floats
     """(T,) share of each shape's energy in seven coefficients, [PT] 2.5."""
     states: StateRange
-    """Between which random states are drawn for the graph, [PT] Eq. 1."""
+    """Range of the random states that are drawn for the graph, [PT] Eq. 1."""
 
     @property
     def pulse_body_lengths_s(self) -> float:

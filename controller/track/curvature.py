@@ -16,7 +16,7 @@ def smooth_curvature(angles_rad: Floats) -> Floats:
     Without smoothing, noise of 0.2 % of the length exceeds the bending itself.
     """
     smooth = gaussian_filter1d(angles_rad, _SMOOTH, axis=1, order=1, mode="nearest")
-    return np.asarray(smooth[:, _END:-_END])
+    return smooth[:, _END:-_END]
 
 
 def analytic_signal(values: Floats) -> Complexes:
@@ -28,4 +28,4 @@ def analytic_signal(values: Floats) -> Complexes:
     share = np.zeros(count)
     share[0] = share[count // 2] = 1.0
     share[1 : (count + 1) // 2] = 2.0
-    return np.asarray(ifft(fft(values, axis=0) * share[:, None], axis=0))
+    return ifft(fft(values, axis=0) * share[:, None], axis=0)

@@ -38,7 +38,7 @@ def tangent_angles(points: Floats) -> Floats:
     The angle is the direction of travel: from each point to the one before it.
     """
     step = -np.diff(points, axis=-2)
-    return np.asarray(np.unwrap(np.arctan2(step[..., 1], step[..., 0]), axis=-1))
+    return np.unwrap(np.arctan2(step[..., 1], step[..., 0]), axis=-1)
 
 
 def body_points(angles_rad: Floats, length: float = 1.0) -> Floats:

@@ -12,7 +12,8 @@ from scipy.ndimage import gaussian_filter1d
 from snakewalk.config.arrays import Floats
 
 CUT_CYCLES = 5.0
-"""Where smoothing leaves exp(-1/2), in multiples of the wave's frequency: the wave keeps 98 %."""
+"""Frequency at which smoothing leaves exp(-1/2), in multiples of the wave's frequency: the wave
+keeps 98 %."""
 
 
 @dataclass(frozen=True, slots=True)

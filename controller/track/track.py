@@ -57,7 +57,7 @@ class Track:
     """Whether the points of different frames share one origin; not of images cropped to the animal,
     nor of a camera that moves: they contain no travel."""
     head_sure: float | None = None
-    """How surely the first point is the head, 0 to 1; None where the file does not say."""
+    """Certainty that the first point is the head, 0 to 1; None where the file does not say."""
 
     @property
     def frames(self) -> int:
@@ -85,7 +85,7 @@ class Track:
 
 
 UNSURE_HEAD = 0.3
-"""``head_sure`` below which head and tail may be exchanged."""
+"""Value of ``head_sure`` below which head and tail may be exchanged."""
 
 
 def track_from_points(

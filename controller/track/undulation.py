@@ -76,7 +76,7 @@ class Advance:
         All segments also move in the head's direction, at the difference of head speed and pulse
         speed.
         """
-        return np.asarray(self.headward + pulse * (1.0 - self.cosine))
+        return self.headward + pulse * (1.0 - self.cosine)
 
 
 def advance_of(body: Floats, number: Ints, step: int) -> Advance:

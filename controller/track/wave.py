@@ -120,9 +120,10 @@ LEAST_SHARE = 0.45
 LEAST_FRAMES = 4.0
 """Frames a cycle: from 2 on a wave looks like another that runs the other way."""
 LEAST_CYCLES = 2.0
-"""In the recording: a wave by formula has its frequency within 1.5 % from here on."""
+"""Least number of cycles in the recording: a wave by formula has its frequency within 1.5 % from
+here on."""
 LEAST_RUN_CYCLES = 1.0
-"""In the longest part without a gap (ours)."""
+"""Least number of cycles in the longest part without a gap (ours)."""
 _NO_BEND = 1e-9  # rad per segment: rounding errors of a straight body that turns
 _STEPS = 6  # until frequency and smoothing are consistent
 
@@ -134,7 +135,7 @@ class Wave:
     waves: float
     """Wavelengths on the body."""
     frequency_hz: float
-    """How often a wave passes a point of the body."""
+    """Frequency with which waves pass a point of the body."""
     towards_tail: bool
     """The direction of an animal that moves forward."""
     share: float
@@ -144,7 +145,7 @@ class Wave:
     lists the tail first."""
     frames_a_cycle: float
     cycles: float
-    """How many the recording lasts, without its gaps."""
+    """Number of cycles in the recording, without its gaps."""
     longest_cycles: float | None = None
     """Cycles of the longest part without a gap; None where the recording has no gap."""
 

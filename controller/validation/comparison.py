@@ -46,7 +46,7 @@ class Compared:
     measured: float
     sd: float | None
     simulated: float | None
-    """None if the simulation failed."""
+    """Simulated value; None if the simulation failed."""
     range: tuple[float, float]
     cause: str
     """Most likely cause of a ratio far from 1, or why the simulation failed."""

@@ -29,9 +29,9 @@ KEYS: Final = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
 STICK: Final = (("left", "right"), ("up", "down"))
 """Left stick: the keys at the low and at the high end of its axes."""
 DEAD_MAN: Final = (4, 5)
-"""The shoulder buttons, left and right."""
+"""Buttons of the dead man's switch: the shoulder buttons, left and right."""
 STOP: Final = (11, 16)
-"""The right stick pressed, and the button in the middle."""
+"""Stop buttons: the right stick pressed, and the button in the middle."""
 _HALF: Final = 0.5
 _MESSAGE_BYTES: Final = 2000
 _MESSAGES_S: Final = 100
@@ -76,7 +76,7 @@ SCRIPT: Final = f"""(() => {{
   setInterval(tell, {_PERIOD_MS});
   document.addEventListener("visibilitychange", tell);
 }})();"""
-"""The script in the page."""
+"""Script in the page that reads the gamepad."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,7 @@ class BrowserGamepad:
         self.state: PadState | None = None
         """Last state of the gamepad that steers."""
         self.on_stop: Callable[[], None] = lambda: None
-        """Called when a stop button is pressed, from any thread."""
+        """Function that is called from any thread when a stop button is pressed."""
 
     @property
     def is_stale(self) -> bool:

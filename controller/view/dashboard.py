@@ -19,7 +19,7 @@ from snakewalk.controller.runlog.topics import TABLES
 from snakewalk.controller.view.scene import contour_step_m
 
 SPAN_S: Final = 30.0
-"""How much of the past the curves show (ours)."""
+"""Time span of the past that the curves show (ours)."""
 _POINTS: Final = 150
 """Points of a curve: more would only be sent."""
 _EVENTS: Final = 7

@@ -34,7 +34,7 @@ class Freshness:
     def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
         self.now_s = now_s
         self.on_late: Callable[[float], None] = lambda since_s: None
-        """Called with the earliest beginning of a message that is dropped."""
+        """Function that gets the earliest beginning of a message that is dropped."""
         self._since_s: float | None = None
 
     def accept(self, since_s: float) -> None:

@@ -48,13 +48,13 @@ from snakewalk.drivers.priority import give_way
 from snakewalk.drivers.safety.stop_button import PressedButton
 
 _PERIOD_S: Final = 0.05
-"""How often the body is drawn."""
+"""Time between two drawings of the body."""
 _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
 _SILENT_S: Final = 2.0
 """A run that sends nothing for this time is reported."""
 _LAST_S: Final = 0.2
-"""For the verdict to reach the browsers."""
+"""Time for the verdict to reach the browsers."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
 

@@ -40,7 +40,7 @@ class LiveView(ObserverProcess):
             _serve, *host_and_port(position), what="page", fault=f"--view-at {position}"
         )
         self.url = str(self.said["url"])
-        """To be opened in a browser; contains the token."""
+        """Address to open in a browser; contains the token."""
         self._picture: bytes | None = None
         self._picture_s = -math.inf
         self._dead_man = DeadMan()

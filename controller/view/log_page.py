@@ -22,7 +22,7 @@ from snakewalk.drivers.clock import Clock
 _PERIOD_S: Final = 0.05
 _CURVES_S: Final = 0.5
 _GAP_M: Final = 0.5
-"""Between the grounds of two logs (ours)."""
+"""Gap between the grounds of two logs (ours)."""
 _SPEEDS: Final = ("0.25", "0.5", "1", "2", "5", "10")
 
 

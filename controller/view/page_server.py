@@ -11,7 +11,7 @@ from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gate import Gate, Insert
 
 _LEFT_PX, _TOP_PX, _WIDTH_PX = 16.0, 170.0, 300.0
-"""Where a window floats over the scene: below the browser's own notices."""
+"""Place of a window over the scene: below the browser's own notices."""
 
 
 def open_page(

@@ -40,9 +40,10 @@ _CONTOUR_ABOVE_M: Final = 0.002
 _CONTOURS: Final = 12
 """Most contours of a ground (ours)."""
 _ABOVE_M: Final = 0.006
-"""How far lines lie above the ground, so that they are seen (ours)."""
+"""Height of lines above the ground, so that they are visible (ours)."""
 _GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
-"""The goals' line: how far above the body's axis, and how thick, in radii of the body (ours)."""
+"""Height above the body's axis and thickness of the line of the goals, in radii of the body
+(ours)."""
 _LINE: Final = 3.0
 _FLOOR_M: Final = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
@@ -338,7 +339,7 @@ class BodyScene:
     def _height_m(self, points_m: Floats) -> Floats:
         if self._ground is None:
             return np.zeros(len(points_m))
-        return np.asarray(self._ground.elevation_m(points_m[:, 0], points_m[:, 1]))
+        return self._ground.elevation_m(points_m[:, 0], points_m[:, 1])
 
 
 def _place(links: viser.BatchedMeshHandle, body: BodyView, above_m: float = 0.0) -> None:

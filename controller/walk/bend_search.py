@@ -19,14 +19,15 @@ UNLIKE = np.array([[0, 0], [-1, 0], [1, 0], [-1, 1], [1, -1]], dtype=float)
 _HEXAGON = np.array([(1, 0), (-1, 0), (0.5, 1), (-0.5, -1), (-0.5, 1), (0.5, -1)], dtype=float)
 """Pairs that lie opposite each other, along three axes."""
 _STEP = np.array([0.25, 0.5])
-"""From the best bends to the hexagon about them (ours); the second bend counts half as much."""
+"""Distance from the best bends to the hexagon about them (ours); the second bend counts half as
+much."""
 
 
 class Vertex(NamedTuple):
     """Minimum of a parabola."""
 
     bends: Floats
-    """(2,)"""
+    """(2,) bends of the minimum."""
     enclosed: bool
     """Whether it lies within the bends that were judged."""
 

@@ -55,7 +55,7 @@ class _Onward:
     passed_m: list[float]
     """Arc lengths at the waypoints."""
     length_m: float
-    """Its own, and the weighted straight rest from its end to the last waypoint."""
+    """Length of the path, and of the weighted straight rest from its end to the last waypoint."""
 
 
 class OnCourse:
@@ -63,7 +63,7 @@ class OnCourse:
 
     def __init__(self, course: "Course") -> None:
         self.course = course
-        """In force."""
+        """Course that the motion follows."""
 
     @property
     def path(self) -> SplinePath:
@@ -139,11 +139,11 @@ class Course:
         self.reached = 0
         """Number of waypoints reached."""
         self.missed = 0
-        """How often another path was laid to a waypoint."""
+        """Number of times that another path was laid to a waypoint."""
         self.replanned: str | None = None
         """Reason for another path in the last step, or None."""
         self.path: SplinePath
-        """In force."""
+        """Path that the motion follows."""
         self._passed_m: list[float]
         """Arc lengths of the waypoints; infinite where the path does not lead to one."""
         self._lay(np.asarray(start_m, float), None)

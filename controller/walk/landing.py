@@ -44,7 +44,7 @@ class Landing(MotionWrapper, OnCourse):
         self._switch = SourceSwitch(robot, swim)
         MotionWrapper.__init__(self, self._switch)
         self._before: BodyView | None = None
-        """Where the body was when the cycle began."""
+        """Place of the body when the cycle began."""
         self._cycle = 0
         self._best_m = 0.0
 

@@ -20,11 +20,11 @@ from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.walk.course import Course, OnCourse
 
 ADD: Final = "waypoint"
-"""``waypoint=X,Y``: go there after the waypoints that are left."""
+"""Command ``waypoint=X,Y``: go there after the waypoints that are left."""
 NEXT: Final = "next"
-"""``next=X,Y``: go there, and leave those out."""
+"""Command ``next=X,Y``: go there, and leave the other waypoints out."""
 CLEAR: Final = "clear"
-"""Leave out those that are left."""
+"""Command ``clear``: leave out the waypoints that are left."""
 END: Final = "end"
 """End the run at rest, without the remaining waypoints."""
 WAYPOINTS_MAX: Final = 1000
@@ -32,7 +32,7 @@ WAYPOINTS_MAX: Final = 1000
 _COMMANDS_MAX: Final = 10
 """Largest number of commands in a step (ours): a person clicks less often."""
 _APART_M: Final = 0.05
-"""Between where a path begins and where it leads (ours)."""
+"""Least distance between the begin and the goal of a path (ours)."""
 
 
 class MotionOnCourse(MotionSource, PathProgress, Protocol):

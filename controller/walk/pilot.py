@@ -166,7 +166,7 @@ class Pilot(OnCourse):
         self._has_thought = False
         self._coasts = False
         self.decision: Decision | None = None
-        """Made in the last step, if one was."""
+        """Decision of the last step, if there was one."""
 
     @property
     def done(self) -> bool:
@@ -194,7 +194,7 @@ class Pilot(OnCourse):
         speed = (self._goal_rad - self._last_rad) / self._last_s
         before = (self._last_rad - self._earlier_rad) / (self._earlier_s or 1.0)
         gain_rad_s2 = (speed - before) / (0.5 * (self._last_s + self._earlier_s))
-        return np.asarray(speed + 0.5 * self._last_s * gain_rad_s2)
+        return speed + 0.5 * self._last_s * gain_rad_s2
 
     def pace(self) -> Pace:
         """The robot's limits, because the next motion is unknown."""

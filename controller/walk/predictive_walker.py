@@ -55,7 +55,7 @@ class _Option:
     near: int
     """States within tolerance of the aim, including this one."""
     base_rad: float
-    """Angle of its mean line at its begin."""
+    """Angle of the state's mean line at its begin."""
     wave_rad: Floats
     """(n,) the continuation about the mean line, oldest first; a body length is rolled out."""
     carrier: SerpenoidParameters | None = None
@@ -69,7 +69,7 @@ class _Tried(NamedTuple):
 
     cost_m2: float
     progress: float
-    """Over that at the wanted pulse without slip."""
+    """Progress of the rollout over that at the wanted pulse without slip."""
     option: _Option
     bends: Floats
     """(2,) of the mean line over the first and second half body, relative to the limit."""

@@ -46,7 +46,7 @@ class PathRequest:
     """(n, 2) the head, and the waypoints that are left."""
     heading_rad: float
     avoid_m: Floats
-    """(k, 2)"""
+    """(k, 2) places that the path avoids, m."""
     number: int
     """Number of the first waypoint that is left, from 1."""
     is_miss: bool

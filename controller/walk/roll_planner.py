@@ -17,7 +17,7 @@ FREQUENCY_HZ = 1.0
 """Turns a second (ours); joints at their limit slow it."""
 MOST_TURNS = 16
 JOIN_S = 1.5
-"""Cost of joining, there and back."""
+"""Cost of the joins to a roll and back."""
 _UPHILL = 0.7
 """Least cosine between a roll and the slope's direction."""
 _LEAST_SLOPE = 0.07
@@ -41,9 +41,9 @@ class RollPlan:
     """(n,) the walk's last piece of track; empty where the joints bend at once."""
     turns: int
     target_m: Floats
-    """(2,) that it shall come near to."""
+    """(2,) target of the roll, m."""
     speed_m_s: float
-    """At which the target comes nearer, joins and all."""
+    """Speed at which the target comes nearer, joins included."""
 
     @property
     def at_once(self) -> bool:

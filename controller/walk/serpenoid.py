@@ -16,7 +16,7 @@ class SerpenoidParameters:
 
     amplitude_rad: float = 0.7
     waves: float = 1.2
-    """k, on the body."""
+    """Number k of waves on the body."""
     turn_limit_rad: float = 1.2
     """Largest bend of the mean line over one body length."""
     pieces: int = 10
@@ -24,7 +24,7 @@ class SerpenoidParameters:
 
     def wave_rad(self, sample: Ints, points: int) -> Floats:
         """Angles about the mean line at samples of a track, with ``points`` per body."""
-        return np.asarray(self.amplitude_rad * np.sin(2.0 * np.pi * self.waves * sample / points))
+        return self.amplitude_rad * np.sin(2.0 * np.pi * self.waves * sample / points)
 
 
 class Serpenoid:

@@ -41,7 +41,7 @@ def shape_filters(
         return self_touches(shapes_rad, robot.length_m, robot.body_radius_m)
 
     def slipping(shapes_rad: Floats) -> Bools:
-        return np.asarray(quasi_static_gain(shapes_rad, friction) < states.gain_limit)
+        return quasi_static_gain(shapes_rad, friction) < states.gain_limit
 
     return {
         "turn": coiled,

@@ -102,7 +102,7 @@ class SideRolls(MotionWrapper, OnCourse):
         self._rolling: _Rolling | None = None
         self._walks_until = 0.0
         self.decision: Decision | None = None
-        """Made in the last step, if one was."""
+        """Decision of the last step, if there was one."""
 
     @property
     def needs(self) -> Needs:

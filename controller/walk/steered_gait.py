@@ -72,7 +72,7 @@ class SteeredGait(OnCourse):
         self._stop_profile = StopProfile()
         self._phase_rad = 0.0
         self.cycles = cycles
-        """Gone through on this course."""
+        """Number of cycles of the gait on this course."""
 
     @property
     def needs(self) -> Needs:
@@ -111,7 +111,7 @@ class SteeredGait(OnCourse):
             self._joints_rad(self._phase_rad + at_s * rate, self.turn + at_s * turning)
             for at_s in (-half_s, half_s)
         )
-        return np.asarray((after - before) / (2.0 * half_s))
+        return (after - before) / (2.0 * half_s)
 
     def pace(self) -> Pace:
         """The robot's limits, because the next turn is unknown."""

@@ -46,7 +46,7 @@ class PathPose:
     aim_rad: float
     """Direction to the carrot on the path, in the world."""
     path: TabulatedPath
-    """The path in force."""
+    """Path that the body follows."""
     path_at: int
     """Index of the path's point nearest to the centre."""
 
@@ -58,15 +58,15 @@ class SteeringWeights:
     off_path: float = 1.0
     """Mean square distance of the centre from the path."""
     end: float = 1.0
-    """Its square at the end of the rollout."""
+    """Square distance of the centre from the path at the end of the rollout."""
     head: float = 0.5
-    """The head's."""
+    """Mean square distance of the head from the path."""
     heading_m: float = 0.3
     """Lever that converts the heading error at the end to a distance."""
     pass_by: float = 4.0
     """Weight of the squared distance beyond ``near_m`` at which the next waypoint is passed."""
     near_m: float = 0.2
-    """Within this a waypoint is passed well."""
+    """Distance within which a waypoint is passed well."""
     delay_m2: float = 0.1
     """Cost of no progress; it falls linearly to 0 at the wanted pulse."""
 
@@ -99,7 +99,7 @@ class Steering:
         self._tree_of: PathPose | None = None
         self._past_tree: RolloutTree | None = None
         self.drift = Drift()
-        """Identified so far."""
+        """Drift of the body that was identified so far."""
 
     def observe(self, pose: PathPose) -> None:
         """Compare the motion over the last span of pulse with its prediction."""

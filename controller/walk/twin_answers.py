@@ -21,7 +21,7 @@ class Coasting:
     """State of a pilot that continues without decisions; plain data for another process."""
 
     time_law: TimeLaw
-    """With the end of the track."""
+    """Time law of the track, with its end."""
     roll: RollCompensation | None
     pitch_rad: Floats | None
 
@@ -46,7 +46,7 @@ class TwinAnswer:
     """Result for one piece."""
 
     number: int
-    """The number of the question."""
+    """Number of the question."""
     piece: int
     columns: Floats | None
     """(1, 10) of ``Rolled``; None if the twin diverged."""

@@ -21,7 +21,7 @@ STATUS_BYTES = 11
 FAST_HEAD_BYTES = 8
 """Common reply to a fast read, without the servos' parts: header 4, id, length 2, instruction."""
 FAST_PART_BYTES = 4
-"""Each servo's part of it, without its data: error, id, CRC 2."""
+"""Bytes of each servo's part of a fast reply, without its data: error, id, CRC 2."""
 STATE_BYTES = 10
 """State block, read in every cycle: Present Current, Velocity, Position."""
 SLOW_STATE_BYTES = 3
@@ -40,13 +40,13 @@ class WireBudget:
     baud: int
     fast: bool
     write_bytes: int
-    """Sync write of the goals."""
+    """Bytes of the sync write of the goals."""
     request_bytes: int
-    """Sync read instruction."""
+    """Bytes of the sync read instruction."""
     reply_bytes: int
-    """All servos' replies."""
+    """Bytes of all servos' replies."""
     return_delay_s: float
-    """Sum over the replies."""
+    """Sum of the return delays of all replies."""
     may_be_fast: bool = True
     """Whether the servos have fast reads."""
 

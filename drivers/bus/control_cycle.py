@@ -37,7 +37,7 @@ _MISSED_LIMIT = 3
 """Missed reads in a row after which a silent servo is ignored in the choice of the length."""
 _KEPT_REQUESTS = 64
 SPIN_S = 40e-6
-"""Typical delay with which Linux wakes a program."""
+"""Typical delay, s, with which Linux wakes a program."""
 SPIN_FROM_BAUD = 3_000_000
 """Lowest baud rate at which a cycle polls: at 1 Mbaud polling is half of a read's CPU time, and
 saves

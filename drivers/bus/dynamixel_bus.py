@@ -36,10 +36,10 @@ from snakewalk.drivers.protocol.packet import (
 T = TypeVar("T")
 PROBES = 5
 _PING_BYTES = 3
-"""Model number and firmware."""
+"""Bytes of a reply to a ping with data: model number and firmware."""
 _GAP_BYTES = 64
-"""Up to this number of bytes between two registers is read as well: at 1 Mbaud they need less time
-than a separate packet (ours)."""
+"""Largest number of bytes between two registers that are read as one block (ours): at 1 Mbaud they
+need less time than a separate packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class PingReply:
     servo_id: int
     model_number: int
     firmware: int | None
-    """None where the SDK does not return it."""
+    """Version of the firmware; None where the SDK does not return it."""
     alert: bool
     """Whether it reports a hardware error (register 70)."""
 
@@ -85,7 +85,7 @@ class DynamixelBus:
         self.table: ControlTable = load_control_table(first)
         """Control table of the model, or of the first one."""
         self.latency_s = latency_s
-        """How long adapter and driver may hold bytes back (FTDI: its latency timer)."""
+        """Longest time for which adapter and driver hold bytes back (FTDI: its latency timer)."""
         self._tries = max(1, tries)
         self._pending = PendingReplies(port.clock)
         self._line = LineReservation(port.clock, paced=port.paced)

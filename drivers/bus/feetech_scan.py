@@ -15,14 +15,14 @@ from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
 
 _HEAD: Final = Register("Firmware Version to Model Number", 0, 5, signed=False)
 _ANY: Final = "STS3215"
-"""Model whose first registers all of them share."""
+"""Model whose first registers all Feetech models share."""
 _TURN_S: Final = 0.3e-3
 """Time after which the next servo replies to a broadcast ping (ours)."""
 _SETTLE_S: Final = 0.03
 _TRIES: Final = 3
 """Tries of a read from a servo that replied to a ping (ours)."""
 _ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
-"""Register 2."""
+"""Orders of the bytes of a value, by the content of register 2."""
 
 
 @dataclass(frozen=True, slots=True)

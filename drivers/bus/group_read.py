@@ -42,9 +42,9 @@ class GroupReadReply(NamedTuple):
     clean: bool
     """Whether only the expected bytes were on the line."""
     whole: bool = False
-    """Known to be complete: a regular reply."""
+    """Whether the reply is known to be complete: a regular reply."""
     flawless: bool = False
-    """Known to be valid from all servos, and none reports an error."""
+    """Whether the reply is known to be valid from all servos, and to report no error."""
 
     @property
     def complete(self) -> bool:
@@ -61,7 +61,7 @@ class GroupReadRequest:
     """Sync read of ``length`` bytes at ``address`` from ``ids``, fast or plain."""
 
     header = HEADER
-    """First bytes of each packet."""
+    """First bytes of each packet of the reply."""
 
     def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
         params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
@@ -72,7 +72,7 @@ class GroupReadRequest:
         """Bytes of one servo in the reply, without stuffing."""
         self.ids = tuple(ids)
         self.length = length
-        """Bytes of the block."""
+        """Bytes of the block that each servo returns."""
         self._index = {servo_id: k for k, servo_id in enumerate(ids)}
         count = len(self.ids)
         share = (count * self.frame_bytes + 1).to_bytes(2, "little")
@@ -85,7 +85,7 @@ class GroupReadRequest:
         self.heads = np.frombuffer(heads, np.uint8).reshape(-1, HEAD).copy()
         """(N, 8) expected heads of the replies; (1, 8) if fast."""
         self.id_bytes = np.array(self.ids, np.uint8)
-        """(N,) ``ids``."""
+        """(N,) IDs of the servos as bytes."""
         self._error = np.zeros(count, np.uint8)
         self._all = _constant(np.ones(count, np.bool_))
         no_error = _constant(np.zeros(count, np.uint8))

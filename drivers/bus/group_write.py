@@ -24,7 +24,7 @@ class GroupWrite:
         self._frame = np.frombuffer(encode_instruction(packet), np.uint8).copy()
         self._values = np.zeros(len(ids), np.int32)
         self.size = len(self._frame)
-        """Bytes of the packet, unless it is stuffed."""
+        """Bytes of the write packet without stuffing."""
 
     def template(self) -> NDArray[np.uint8]:
         """New packet to fill."""

@@ -16,9 +16,8 @@ SPARE_LENGTHS = 16
 class PendingReplies:
     """Pending replies of all servos on one port."""
 
-    def __init__(self, clock: Clock, horizon_s: float = HORIZON_S) -> None:
+    def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._horizon_s = horizon_s
         # servo, fast, length -> time until which such a reply may arrive; may hold expired entries
         self._until_s: dict[tuple[int, bool, int], float] = {}
         self._last_s = 0.0
@@ -32,7 +31,7 @@ class PendingReplies:
 
     def add(self, servo_ids: Iterable[int], length: int, *, fast: bool) -> None:
         """Note that replies of ``length`` bytes did not arrive."""
-        self._last_s = self._clock.now_s() + self._horizon_s
+        self._last_s = self._clock.now_s() + HORIZON_S
         for servo_id in servo_ids:
             self._until_s[servo_id, fast, length] = self._last_s
 

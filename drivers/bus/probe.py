@@ -20,11 +20,11 @@ from snakewalk.drivers.protocol.parser import PacketParser
 
 _PING_BYTES = 3
 _SETTLE_S = 2e-3
-"""Longer than the longest return delay (0.508 ms)."""
+"""Silence after a request, longer than the longest return delay (0.508 ms)."""
 _REST_S = 0.05
-"""How late the rest of a reply may be (ours): a busy computer hands over a part of it first."""
+"""Longest delay of the rest of a reply (ours): a busy computer hands over a part of it first."""
 _OVERHEARD_BYTES = 1 << 16
-"""Bytes that are enough to know who talks."""
+"""Number of overheard bytes that are enough to know who talks."""
 _TURN_S = 3e-3
 """Servos reply to a broadcast ping one behind the other, by their IDs; the SDK waits this long for
 each."""
@@ -45,7 +45,7 @@ class Probe:
     damaged: int
     """Requests after which damaged bytes arrived: two servos, or a bad line."""
     late_s: tuple[float, ...]
-    """How much later than the wire and the return delay allow each reply was complete."""
+    """Delay of each complete reply beyond the time on the wire and the return delay."""
 
 
 def probe(
@@ -145,9 +145,9 @@ class Overheard:
     """Unrequested bytes."""
 
     instructions: int
-    """Instruction packets: only another master sends them."""
+    """Number of instruction packets; only another master sends them."""
     replies: int
-    """Status packets: replies to another master."""
+    """Number of status packets: replies to another master."""
     noise_bytes: int
 
 

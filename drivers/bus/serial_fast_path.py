@@ -19,7 +19,7 @@ _BYTE_NS_BAUD = 10_000_000_000
 
 
 LATENCY_ESTIMATE = 0
-"""In a plan, 2 numbers: from ``new_latency_estimate``."""
+"""Place of the latency estimate in a plan: 2 numbers from ``new_latency_estimate``."""
 ZERO_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
 """Zero of the port's clock; time of the request; longest remaining time of the reply of an
 irregular cycle."""
@@ -31,11 +31,12 @@ ERROR_END = 9
 """Length of the sync write and of the request behind it; where in ``work`` the expected heads of
 the replies end, the IDs, and the error bytes. The reply stands behind them."""
 FAST = 10
-"""1: the request is a fast read."""
+"""Place in a plan of the flag of a fast read: 1 for a fast read."""
 WRITE_NS, REQUEST_NS, REPLY_NS, LATENCY_NS = 11, 12, 13, 14
-"""How long the packets are on the line, and how much later the reply may be."""
+"""Places in a plan of the times of the packets on the line, and of the largest delay of the
+reply."""
 SPIN_NS = 15
-"""Argument of ``receive``."""
+"""Place in a plan of the polling time, an argument of ``receive``."""
 PLAN_SIZE = 16
 _write = types.ExternalFunction("write", intp(int32, intp, uintp))
 _ROW = uint8[::1]

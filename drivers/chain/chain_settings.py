@@ -16,7 +16,7 @@ from snakewalk.drivers.protocol.registers import (
 )
 
 STARTUP = "Startup Configuration"
-"""A firmware before 45 has none."""
+"""Name of a register that firmware before 45 lacks."""
 FEETECH_SETTINGS = ("Lock", "Secondary ID", "Acceleration", "Goal Velocity", "Kp", "Kd", "Ki")
 """Registers that only a chain of Feetech servos sets."""
 

@@ -20,11 +20,11 @@ FINGERPRINT = (
     "Min Voltage Limit",
     "Max Voltage Limit",
 )
-"""Registers of it that come first; a model may lack some, and its file marks others."""
+"""First registers of a servo's fingerprint; a model may lack some, and its file marks others."""
 COMPARED = ("kept", "usual", "fixed")
-"""Marks of the others."""
+"""Marks of the other registers of a fingerprint."""
 Fingerprint = Mapping[str, int]
-"""Values of these registers of one servo."""
+"""Values of the fingerprint registers of one servo."""
 
 
 def fingerprint_registers(facts: ServoModel) -> list[str]:

@@ -32,16 +32,16 @@ class _Difference:
     """A joint whose servo has another goal than the one sent."""
 
     count: int
-    """Reads in a row."""
+    """Number of different reads in a row."""
     write: int
-    """Number of the newest write before the last of them."""
+    """Number of the newest write before the last of the different reads."""
     value: int
     is_constant: bool
-    """Whether all of them returned the same value."""
+    """Whether all different reads returned the same value."""
     is_foreign: bool
-    """Whether one of them returned a goal that was never sent."""
+    """Whether a different read returned a goal that was never sent."""
     lag: int
-    """Number of newer goals than the returned one, in all of them; 0 if it varies."""
+    """Number of goals that are newer than the returned one; 0 if it varies."""
 
 
 class GoalCheck:

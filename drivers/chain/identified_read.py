@@ -77,7 +77,7 @@ class _Block:
 
     joints: list[int]
     registers: tuple[Register, ...]
-    """In the order of their addresses."""
+    """Registers of the read, in the order of their addresses."""
     cycle: GroupCycle
 
     @classmethod

@@ -34,19 +34,20 @@ class JointUnits:
     zero_position: Int32s
     """(J,) raw position of a straight joint."""
     rad_per_position: Floats
-    """(J,)"""
+    """(J,) radians per unit of a raw position."""
     rad_s_per_velocity: Floats
-    """(J,)"""
+    """(J,) radians a second per unit of a raw velocity."""
     a_per_current: Floats
-    """(J,)"""
+    """(J,) amperes per unit of a raw current."""
     limits_raw: Int32s
     """(J, 2) least and greatest raw goal; in position mode the servo checks them."""
     measures_current: Bools
-    """(J,) False if the current is the share of full output, times the stall current."""
+    """(J,) whether a servo measures its current; otherwise it is the share of full output times the
+    stall current."""
     limits_current: Bools
-    """(J,) False if the servo has no current-based position control."""
+    """(J,) whether a servo has current-based position control."""
     stall_current_a: Floats
-    """(J,)"""
+    """(J,) stall currents of the servos, A."""
     full_pwm: Int32s
     """(J,) Goal PWM of full output."""
     current_mode: Bools
@@ -226,7 +227,7 @@ class Readings:
         self.alert = False
         """Whether a servo's newest reply says that it has an alarm."""
         self.slow_at_s = -math.inf
-        """When the oldest temperature and voltage were measured; before the first, -inf."""
+        """Time at which the oldest temperature and voltage were measured; -inf before the first."""
         self._flags = self._frozen_flags()
 
     def update(

@@ -84,7 +84,7 @@ class LivenessCheck:
             else next((c for c in self._fingerprint if c.name == "Operating Mode"), None)
         )
         self._missed: list[RegisterCheck] = []
-        """Not all servos replied to these; the oldest first."""
+        """Checks to which not all servos replied; the oldest first."""
 
     def check_goals(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
         """Read the goals back, once per round and after a difference; return the group read.
@@ -211,9 +211,9 @@ class RegisterCheck:
     cycle: GroupCycle
     ids: tuple[int, ...]
     expected: Mapping[int, int]
-    """By joint, in the order of ``ids``."""
+    """Expected values by joint, in the order of ``ids``."""
     raw: bytes
-    """Bytes of the block, in that order, as in the reply."""
+    """Bytes of the block of each servo as in the reply, in the order of ``ids``."""
 
     @classmethod
     def of(

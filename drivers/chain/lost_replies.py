@@ -4,12 +4,12 @@ from collections import deque
 
 LOSS_READS = 100
 LOSSES = 4
-"""This many losses within this many reads show a bad line (ours). A servo that falls silent, or a
+"""Losses within ``LOSS_READS`` reads that show a bad line (ours). A servo that falls silent, or a
 computer that stalls for a while, is one loss."""
 
 
 LATE_READS = 3
-"""This many reads whose reply arrived after the time-out show a slow adapter (ours)."""
+"""Reads with a reply after the time-out that show a slow adapter (ours)."""
 
 
 class LostReplies:

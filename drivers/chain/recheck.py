@@ -27,7 +27,7 @@ class Recheck:
     """Joints whose torque is off, or whose registers are not as they were set: their servos have
     rebooted, or another program has written to them."""
     names: tuple[str, ...]
-    """Names of these joints."""
+    """Names of the joints whose servos have rebooted or were changed."""
     moved_rad: Floats
     """(J,) from where each joint was believed to be to where it is; NaN where it was not read."""
     position_rad: Floats

@@ -89,11 +89,12 @@ class ServoChain:
         """
         self.robot = robot
         self.inspection: Inspection | None = None
-        """The servos as found by the last ``enable``."""
+        """Servos that the last ``enable`` found."""
         self.on_event: Callable[[str], None] = lambda line: None
-        """Gets a line on each changed setting, and on each fault that does not end a run."""
+        """Function that gets a line on each changed setting, and on each fault that does not end a
+        run."""
         self.on_state: Callable[[JointState], None] = lambda state: None
-        """Gets each state that was read."""
+        """Function that gets each state that was read."""
         self._bus = bus
         self._port = bus.port_of(robot.servo_ids[0])
         self._clock = self._port.clock

@@ -47,7 +47,7 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 RAM_SETTINGS = ("Position P Gain", "Goal PWM", "Goal Current")
-"""Settings that a reboot or another program would undo, and that are compared while it runs."""
+"""RAM settings that a reboot or another program would undo; a run compares them."""
 SHAPING_SETTINGS = (
     "Position I Gain",
     "Position D Gain",
@@ -56,9 +56,10 @@ SHAPING_SETTINGS = (
     "Profile Acceleration",
     "Profile Velocity",
 )
-"""Those that another program would change, and a reboot would not."""
+"""Settings that another program would change, and a reboot would not."""
 IDENTITY = "Velocity I Gain"
-"""Stores the joint number: in RAM, unused by position control, reset by a change of mode."""
+"""Register that stores the joint number: in RAM, unused by position control, reset by a change of
+mode."""
 _REPORTED = (
     "Firmware Version",
     "Hardware Error Status",
@@ -90,9 +91,9 @@ _SETTINGS = (
 _TURNING_RAD_S = 0.2
 """Velocity of a servo that does not hold its position (ours)."""
 _FEW = 3
-"""Up to this number of servos of another model, each has a line of its own (ours)."""
+"""Largest number of servos of another model that are reported in a line each (ours)."""
 ALL_REPLY = 2
-"""Status Return Level(68)."""
+"""Value of Status Return Level(68) at which a servo replies to every instruction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +254,7 @@ class ServoSettings:
     ram: Mapping[str, int]
     """Registers that a reboot or another program would change."""
     fingerprint: Fingerprint
-    """Registers of its EEPROM."""
+    """Values of the fingerprint registers in its EEPROM."""
 
 
 def configure(

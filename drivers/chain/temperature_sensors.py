@@ -20,8 +20,8 @@ COOLING_S = 300.0
 EXPECTED_RISE_K = 4.0
 """Expected rise from which on a reading must have changed (ours)."""
 EXPECTED_ALONE_K = 12.0
-"""The same where no joint's reading has changed (ours): a chain that is warm at the start may stay
-as it is for a while."""
+"""Expected rise where no joint's reading has changed (ours): a chain that is warm at the start may
+stay as it is for a while."""
 CHANGED_K = 3.0
 """Change that shows a sensor that works (ours)."""
 JUMP_K = 8.0

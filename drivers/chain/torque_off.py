@@ -12,10 +12,10 @@ from snakewalk.drivers.protocol.registers import WATCHDOG
 _GROUP_ROUNDS = 8
 """Group reads in which the servos may confirm that their torque is off (ours)."""
 _ASK_S = 1.0
-"""How long servos that do not confirm are asked one by one, s (ours)."""
+"""Longest time for which servos that do not confirm are asked one by one, s (ours)."""
 _PORT_PATIENCE_S = 2.0
 _REOPEN_S = 0.1
-"""How long torque off waits for a port that is gone, and the time between tries, s (ours)."""
+"""Longest wait for a port that is gone, and the time between tries, s (ours)."""
 
 
 class TorqueOff:

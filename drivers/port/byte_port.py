@@ -19,7 +19,7 @@ class SdkPort(Protocol):
     """Calls of ``dynamixel_sdk``, with its names and units."""
 
     is_using: bool
-    """True between an instruction and its reply; the handler of an exception clears it."""
+    """Whether an instruction waits for its reply; the handler of an exception clears it."""
 
     def openPort(self) -> bool:
         """Open (again) at the current baud rate; True on success."""

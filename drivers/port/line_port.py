@@ -13,9 +13,9 @@ from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
 
 _PIECE_BYTES = 256
-"""How much is read at a time, and thrown away."""
+"""Number of bytes that are read at a time, and thrown away."""
 _SDK_WAIT_S = 0.01
-"""How long a read of the SDK waits for the first byte, so that it does not spin (ours)."""
+"""Longest wait of a read of the SDK for the first byte, so that it does not spin (ours)."""
 
 
 class LinePort(ABC):
@@ -29,7 +29,7 @@ class LinePort(ABC):
     line_errors: ClassVar[tuple[type[Exception], ...]] = (serial.SerialException, OSError)
     """Exceptions of a line that is gone."""
     grace_ms: ClassVar[float]
-    """How late a reply may be besides its wire time, for the SDK's own time-outs."""
+    """Largest delay of a reply besides its wire time, for the SDK's own time-outs."""
 
     def __init__(self, name: str, baud: int, clock: Clock | None) -> None:
         self.is_using = False

@@ -19,7 +19,7 @@ from snakewalk.drivers.port.line_port import LinePort
 from snakewalk.drivers.port.serial_port import SerialPort
 
 NETWORK_LATENCY_S: Final = 0.1
-"""How late a reply may be besides its wire time: a local network and its server (ours)."""
+"""Largest delay of a reply besides its wire time: a local network and its server (ours)."""
 _POLL_S: Final = 0.001
 """Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
 _FIXED: Final = ("socket",)

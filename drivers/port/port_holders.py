@@ -12,11 +12,11 @@ except ImportError:  # Windows has no /proc either
     pwd = None  # type: ignore[assignment]
 
 PROC = "/proc"
-"""Processes and locks of all users; Linux has it."""
+"""Folder with the processes and locks of all users on Linux."""
 _OWN: Final = "snakewalk"
-"""Name of the program."""
+"""Name of this program."""
 _MASTERS: Final = ("/dev/ptmx", "/dev/pts/ptmx")
-"""Other ends of pseudo-terminals."""
+"""Devices of the other ends of pseudo-terminals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class PortHolder:
     program: str
     """Name: snakewalk with its command line, Python with its script or module."""
     user: str
-    """Name of its user."""
+    """Name of the user of the program."""
     files: tuple[str, ...]
     """Paths of its open files; none if they are hidden, as those of other users are."""
 

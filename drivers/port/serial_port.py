@@ -24,9 +24,9 @@ except ImportError:  # Windows
     fcntl = termios = None  # type: ignore[assignment]
 
 _LATENCY_MS = 16.0
-"""How long an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
+"""Time for which an FTDI adapter holds bytes back by default (its ``latency_timer``)."""
 _PROGRAM_S = 0.02
-"""How late a program at the other end of a pseudo-terminal may be: it has to be scheduled."""
+"""Largest delay of a program at the other end of a pseudo-terminal: it has to be scheduled."""
 _STUCK_S = 1.0
 """A device that accepts no bytes for this time is gone."""
 _BUSY = (errno.EBUSY, errno.EAGAIN)

@@ -24,7 +24,8 @@ _POLLIN = 1
 _SECOND_NS = 1_000_000_000
 _TCIFLUSH = 0
 _PIECE = 64
-"""The kernel hands over a terminal's bytes in pieces of this size; a smaller one was the last."""
+"""Size of the pieces in which the kernel hands over a terminal's bytes; a smaller one is the
+last."""
 _TIMER_SLACK_NS = 50_000
 """Linux ends a sleep up to this much late, so that it can end several at once (prctl(2))."""
 _GAIN = 8

@@ -18,7 +18,7 @@ WITH_ERRORS = 2
 HEAD = 8
 """Bytes of a status packet before its error byte, and of a fast reply before its parts."""
 PARAMS_AT, VALUES_AT = 8, 12
-"""In a sync write: where its parameters begin, and, behind address and length, the entries."""
+"""Places in a sync write: its parameters, and its entries behind address and length."""
 ENTRY_BYTES = 5
 """Entry of one servo: ID and value."""
 

@@ -35,7 +35,7 @@ class ImuRegisters:
     """Registers of one device."""
 
     model_number: int | None
-    """None where it is not published."""
+    """Model number of the device; None where it is not published."""
     registers: Mapping[str, Register]
     address: int
     """First byte of the block that is read in every cycle."""
@@ -45,7 +45,7 @@ class ImuSample(NamedTuple):
     """One reading in the device's own axes."""
 
     rate_rad_s: Floats
-    """(3,)"""
+    """(3,) rates of turning about the axes of the device, rad/s."""
     acceleration_m_s2: Floats | None
     """(3,) specific force: at rest it points up; None where the device shows none."""
     rotation: Floats | None

@@ -13,7 +13,7 @@ from snakewalk.drivers.protocol.crc import crc16
 
 HEADER = b"\xff\xff\xfd\x00"
 BITS_PER_BYTE = 10
-"""On the line: start, eight data bits, stop."""
+"""Bits of a byte on the line: start, eight data bits, stop."""
 BROADCAST_ID = 0xFE
 MAX_ID = 0xFC
 STATUS = 0x55
@@ -63,7 +63,7 @@ class InstructionPacket:
     instruction: int
     """An ``Instruction``; other numbers are kept, so that a servo can refuse them."""
     params: bytes = b""
-    """Without stuffing."""
+    """Parameters of the packet without stuffing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ class StatusPacket:
     servo_id: int
     error: int
     params: bytes = b""
-    """Without stuffing."""
+    """Parameters of the packet without stuffing."""
 
     @property
     def result(self) -> int:

@@ -20,15 +20,15 @@ LOAD_UNIT = 1e-3
 VOLTAGE_UNIT_V = 0.1
 """Present Input Voltage(144), all series of Protocol 2.0."""
 WATCHDOG = "Bus Watchdog"
-"""Register 98; Feetech servos have none."""
+"""Name of register 98, the bus watchdog; Feetech servos have none."""
 WATCHDOG_UNIT_S = 0.02
-"""Bus Watchdog(98)."""
+"""Unit of Bus Watchdog(98)."""
 WATCHDOG_TICKS_MAX = 127
-"""Greatest time of it, in its units."""
+"""Greatest time of Bus Watchdog(98), in its units."""
 WATCHDOG_TRIPPED = 0xFF
-"""Bus Watchdog(98) reads -1 in its error state."""
+"""Value of Bus Watchdog(98) in its error state."""
 RETURN_DELAY_UNIT_S = 2e-6
-"""Return Delay Time(9)."""
+"""Unit of Return Delay Time(9)."""
 CURRENT_MODE, VELOCITY_MODE, POSITION_MODE, EXTENDED_MODE = 0, 1, 3, 4
 CURRENT_POSITION_MODE = 5
 PWM_MODE = 16
@@ -39,7 +39,7 @@ SECONDARY_ID_LIMIT = 252
 REVERSE = 0x01
 TIME_PROFILE = 0x04
 TORQUE_ON_BY_GOAL = 0x08
-"""Drive Mode(10), bits 0, 2 and 3."""
+"""Bits 0, 2 and 3 of Drive Mode(10)."""
 SHUTDOWN_ALARMS = 0x34
 """Shutdown(63): the alarms that switch a servo off by its factory setting: overload, electrical
 shock, overheating."""
@@ -79,7 +79,7 @@ class ServoUnits:
     full_pwm: int
     """Goal PWM of full output."""
     stall_current_a: float
-    """NaN if the model's file does not give it."""
+    """Stall current of the motor; NaN if the model's file does not give it."""
     limits_current: bool
     """Whether the model has current-based position control."""
 

@@ -39,9 +39,9 @@ class ChainLoad:
         self.winding_k = np.zeros(motor.shape[1])
         """(J,) by which the windings are hotter than their housings."""
         self.current_a = 0.0
-        """Drawn by the chain now."""
+        """Current that the chain draws now, A."""
         self.charge_ah = 0.0
-        """Drawn since the start."""
+        """Charge that the chain has drawn since the start, A h."""
         self.hottest_c = -math.inf
         """Temperature of the hottest winding; -inf before one is known."""
         self._time_s = math.inf
@@ -65,7 +65,7 @@ class ChainLoad:
 
     def winding_c(self, state: JointState) -> Floats:
         """(J,) winding temperatures; NaN if the housing's is unknown."""
-        return np.asarray(state.temperature_c + self.winding_k)
+        return state.temperature_c + self.winding_k
 
 
 def motor_columns(robot: RobotConfig) -> Floats:

@@ -23,7 +23,7 @@ from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointState
 
 IDLE_TIME_S = 0.3
-"""How long in all a joint may draw no current although it should (ours)."""
+"""Total time for which a joint may draw no current although it should (ours)."""
 IDLE_SHARE = 0.1
 """Share of the expected current below which a motor draws none (ours)."""
 IDLE_OUTPUT = 0.25
@@ -43,7 +43,8 @@ CHANGED_OUTPUT = 0.2
 that stands has to draw another current (ours). The current in a supply line grows with the square
 of the output: a sensor there shows at least a fifth of the change."""
 CHANGED_LIMIT = 0.6
-"""The same as a share of a lower limit of the current (ours): the limit varies with the supply."""
+"""Least change of the expected current, as a share of a lower limit of the current, during which a
+standing joint has to draw another current (ours): the limit varies with the supply."""
 AT_LIMIT = 0.15
 """A current this close to a joint's own limit, as a share of it, is at the limit (ours). Towards
 the goal it shows that the motor pushes: a soft joint is held off its goal by the ground."""

@@ -31,28 +31,28 @@ class SafetyLimits:
     limit_rad: Floats
     """(J,) half range of the goals."""
     limit_slack_rad: float
-    """How far beyond it a joint may be *measured*, bent by force or by overshoot."""
+    """Largest measured angle of a joint beyond its limit, bent by force or by overshoot."""
     goal_rate_rad_s: float
     goal_lead_rad: float
-    """Goal minus measured."""
+    """Largest lead of a goal: goal minus measured angle."""
     current_limit_a: float
     current_time_s: float
-    """How long the current may be exceeded."""
+    """Longest time for which the current may exceed its limit."""
     temperature_limit_c: float
     voltage_min_v: float
     voltage_max_v: float
     voltage_time_s: float
-    """How long the supply may be too low."""
+    """Longest time for which the supply may be too low."""
     stale_limit_s: float
     slow_stale_limit_s: float
-    """The same for temperature and voltage."""
+    """Largest age of temperature and voltage."""
     following_limit_rad: Floats
     """(J,) how far a joint may be from its goal."""
     following_effort_a: Floats
     """(J,) a joint that pushes towards its goal with this current is held off; infinite where the
     current is not limited."""
     following_time_s: float
-    """How long a joint may not follow."""
+    """Longest time for which a joint may not follow its goals."""
     output: Floats | None = None
     """(3, J) output of each joint's motor: share of full output for each radian of error; current
     at full output and at rest, A; limit of the current, A. None: no joint is judged by it."""
@@ -63,7 +63,7 @@ class SafetyLimits:
     """Greatest lasting current of the whole chain."""
     winding_limit_c: float = math.inf
     step_rate_rad_s: float = math.inf
-    """How far a joint may be measured from its last angle: slack, and so much for each second."""
+    """Largest change of a measured angle: slack, and an angle for each second."""
 
     @staticmethod
     def from_config(robot: RobotConfig, safety: SafetyConfig) -> "SafetyLimits":

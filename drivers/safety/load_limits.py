@@ -15,7 +15,7 @@ class LoadLimits:
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
         self.load = None if limits.motor is None else ChainLoad(limits.motor)
-        """The estimates; None without records of the motors."""
+        """Estimates of the chain's load; None without records of the motors."""
         self._over_since_s = math.nan
 
     def update(self, state: JointState) -> str | None:

@@ -101,7 +101,7 @@ class Recovery(Generic[C]):
         self._confirm = confirm
         self._on_event = on_event
         self.overload_reboots = overload_reboots
-        """How many are left."""
+        """Number of reboots after an overload that are left."""
         self.refusal: str | None = None
         """Why the last interruption was not recovered from; None if the policy forbids it."""
 

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any
 
 from snakewalk.drivers.clock import Clock
@@ -32,7 +32,7 @@ from snakewalk.drivers.safety.vet import (
 from snakewalk.drivers.types import JointCommand, JointState
 
 RESTART_S = 2.0
-"""After a servo's reboot the goals' rate grows for this time until it is the limit again (ours)."""
+"""Time after a servo's reboot in which the goals' rate grows to the limit again (ours)."""
 TORQUE_IS_OFF = "torque is off"
 """Note on an error that ended the context, after every servo has confirmed it."""
 _DOUBTS = 10
@@ -121,12 +121,7 @@ class SafeLink:
                     self._handlers[number] = signal.signal(number, handler)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         for number in self._handlers:
             signal.signal(number, signal.SIG_IGN)  # torque off must not be interrupted
         try:

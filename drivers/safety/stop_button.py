@@ -17,7 +17,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Final, Self
 
 from snakewalk.config.errors import InputError
@@ -56,9 +55,9 @@ class StoppableRun:
     name: str
     """Name of the run, for people."""
     ports: tuple[str, ...]
-    """As ``resolved`` says them; none in simulation."""
+    """Names of the run's ports, as ``resolved`` returns them; none in simulation."""
     folder: str | None
-    """Where its log is; absolute."""
+    """Absolute path of the folder with the run's log."""
 
 
 class StopButton:
@@ -103,12 +102,7 @@ class StopButton:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         notes = notes_of(error)
         reasons = [str(error)] if isinstance(error, Exception) else []  # else a signal, or the exit
         self.end("; ".join([*reasons, *notes]) or (str(error) if error is not None else ""))
@@ -183,7 +177,7 @@ class PressedButton:
             run_facts = _parsed(_read_text(self._map, _RUN))
             self.run = StoppableRun(**run_facts | {"ports": tuple(run_facts["ports"])})
             self.since_s = info.st_mtime
-            """Time of day at which it was made, s."""
+            """Time of day at which the button was made, s."""
         except BaseException:
             os.close(self._file)
             raise
@@ -191,12 +185,7 @@ class PressedButton:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def close(self) -> None:

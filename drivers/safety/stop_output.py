@@ -10,7 +10,6 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Protocol, Self
 
 import serial
@@ -18,7 +17,7 @@ import serial
 from snakewalk.drivers.errors import PortError
 
 PATIENCE_S = 5.0
-"""How long a program may run, s (ours)."""
+"""Longest time that a program for the stop output may need, s (ours)."""
 _LINES = ("rts", "dtr")
 
 
@@ -43,12 +42,7 @@ class StopOutput(Protocol):
         """Prepare the output."""
         ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Release it."""
         ...
 
@@ -59,12 +53,7 @@ class _Plain:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         pass
 
 
@@ -164,12 +153,7 @@ class StopLine:
             ) from None
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         if self._port is not None:
             self._port.close()
             self._port = None

@@ -30,20 +30,20 @@ class CheckedState(NamedTuple):
     state: JointState
     limits: SafetyLimits
     age_max_s: float
-    """Greatest age in it."""
+    """Largest age of a value in the state."""
 
 
 class SafetyMemory(NamedTuple):
     """Results of the last check for the next one."""
 
     time_s: float
-    """When ``goal_rad`` was sent."""
+    """Time at which ``goal_rad`` was sent."""
     goal_rad: Floats
     """(J,) last goals that passed; at the start the measured angles."""
     over_current_since_s: Floats
     """(J,) time of the first reading above the limit; NaN below it."""
     under_voltage_since_s: Floats
-    """(J,) the same for a supply below its limit."""
+    """(J,) time of the first reading of a supply below its limit; NaN above it."""
     checked_state: CheckedState | None = None
     """The state that was checked last, if it kept the limits."""
 
@@ -66,7 +66,7 @@ class Verdict(NamedTuple):
     clamped: Bools
     """(J,) goals that were changed."""
     memory: SafetyMemory
-    """``last`` of the next call."""
+    """Memory for the next call (its argument ``last``)."""
 
 
 def vet(

@@ -26,7 +26,7 @@ ALARMS: Mapping[str, int] = {
     "overheating": Error1.OVERHEATING,
     "voltage": Error1.VOLTAGE,
 }
-"""By the words of a fault file; it has no others."""
+"""Alarms by their names in a fault file; the servo has no others."""
 
 
 class Ax12Alarms:
@@ -53,7 +53,7 @@ class Ax12Alarms:
         self._slow_rad_s = np.full(servos, SLOW * motor.no_load_rad_s)
         self._latched = np.zeros(servos, np.uint8)
         self.shown = np.zeros(servos, np.uint8)
-        """(S,) bits of the answers."""
+        """(S,) alarm bits in the replies of the servos."""
         self.temperature_c = np.full(servos, AMBIENT_C)
         """(S,) of the housings: first order in the winding's loss."""
 

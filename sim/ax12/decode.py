@@ -22,9 +22,9 @@ from snakewalk.sim.ax12.table import MODEL
 from snakewalk.sim.sniff.decode import DecodedPacket
 
 GAP_S = 5e-3
-"""After such a silence servos give up a partial packet."""
+"""Silence after which a servo gives up a partial packet."""
 REPLY_MAX_S = 0.1
-"""No reply comes later than that."""
+"""Longest time between a request and its reply."""
 
 
 class Decoder1:

@@ -50,7 +50,7 @@ class BatchBodies(ABC):
         if fault is not None:
             raise InputError(f"{fault}; use the backend processes")
         self.template = MujocoPlant(robot, world, None, step_s)
-        """One such body: it is placed here, and then copied to a world."""
+        """Body that is placed, and then copied to a world."""
         joints = robot.joint_count
         self.count = count
         self.step_s = self.template.step_s
@@ -59,12 +59,13 @@ class BatchBodies(ABC):
         self.pwm_limit, self.supply_v = np.ones((2, count, joints))
         self.current_limit_a = np.full((count, joints), np.inf)
         self.friction: Floats = np.tile(np.array(self.template.mechanics.mu), (count, 1))
-        """(W, 4) ``FrictionConfig.grip``."""
+        """(W, 4) coefficients of the worlds' friction (``FrictionConfig.grip``)."""
         self.motors = MotorColumns(motors_of(robot))
         self.qpos, self.qvel = np.zeros((count, 7 + joints)), np.zeros((count, 6 + joints))
         self.current_a, self.pwm = np.zeros((2, count, joints))
         self.energies_j = np.zeros((4, count, joints))
-        """Drawn, returned, heat, work at the shaft; of each motor since its world was placed."""
+        """Energies of each motor since its world was placed: drawn, returned, heat, work at the
+        shaft."""
         self.totals = np.zeros((count, 2))
         """Friction loss, J, and distance slipped across the links, m."""
         self._load, self._before = np.zeros((count, joints + 1)), np.zeros((count, joints + 1, 3))

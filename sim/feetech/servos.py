@@ -29,7 +29,7 @@ ALARMS: Mapping[str, int] = {
     "voltage": FeetechAlarm.VOLTAGE,
     "encoder": FeetechAlarm.ENCODER,
 }
-"""By the words of a fault file."""
+"""Alarms by their names in a fault file."""
 _TIME_UNIT_S = 0.01
 
 
@@ -57,7 +57,7 @@ class FeetechAlarms(Ax12Alarms):
     def _full_output(self) -> Floats:
         if "overload" not in self.known:
             return np.full(len(self.shown), np.inf)
-        return np.asarray(self._register("Overload Torque") / 100.0)
+        return self._register("Overload Torque") / 100.0
 
     def _overload_s(self) -> Floats | float:
         if "overload" not in self.known:
@@ -290,11 +290,11 @@ class FeetechServos(SimulatedServos):
     def _ticks(self) -> Floats:
         """(S,) positions of all turns, without offset."""
         units = self.facts.units
-        return np.asarray(self._servo_rad() * self.facts.positions_per_rad + units.zero_position)
+        return self._servo_rad() * self.facts.positions_per_rad + units.zero_position
 
     def _turn(self) -> Floats:
         turn = self.facts.units.positions_per_turn
-        return np.asarray(np.floor((np.rint(self._ticks()) - self._offset()) / turn))
+        return np.floor((np.rint(self._ticks()) - self._offset()) / turn)
 
     def _update_drive(self, seconds: float) -> None:
         drive = self.drive

@@ -42,7 +42,7 @@ class GroupRead(ABC):
         self.length = length
         self.motion = address in MOTION and address + length <= MOTION.stop
         self.delay_s = delays_s[0]
-        """Until the first servo replies."""
+        """Time until the first servo replies."""
         self._rows = rows
         self._block = np.array([address, length, status])
         self._delays_s = delays_s

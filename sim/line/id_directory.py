@@ -22,7 +22,7 @@ class IdDirectory:
         self.mute = np.zeros(len(bank), bool)
         """(S,) servos that receive and obey but whose replies are lost."""
         self.deaf = np.zeros(len(bank), bool)
-        """(S,) servos that ignore sync writes."""
+        """(S,) whether a servo ignores sync writes."""
         self.rows = np.full(256, NOBODY, np.intp)
         """(256,) row of each ID that belongs to one servo, which replies; else a constant above."""
         self._looked_up = b""

@@ -24,7 +24,7 @@ class Noise:
         self._senders = senders
         self._faults: list[plan.NoiseFault] = []
         self.counts: dict[str, int] = {}
-        """Packets changed so far, by kind."""
+        """Number of changed packets by kind of fault."""
 
     def add(self, fault: plan.NoiseFault) -> None:
         """Add a fault; faults act in this order."""

@@ -91,15 +91,16 @@ class RxQueue:
 LATENCY_S = 0.016
 """The SDK's allowance for the adapter's latency timer; a packet may need two of them and 2 ms."""
 GAP_S = 5e-3
-"""After such a silence the servos treat the next byte as the start of a packet (ours)."""
+"""Silence after which the servos treat the next byte as the start of a packet (ours)."""
 INSTANT_S = 1e-9
-"""Times closer than this are the same."""
+"""Largest difference between two times that count as the same."""
 HOLD_UP_MAX_S = 0.01
 """A reply that is later than this does not hold up the servos behind it (ours)."""
 SLICE_S: Final = 2e-3
 """Longest step in which the servos of several lines advance one after the other (ours)."""
 PacketTap = Callable[[float, bool, bytes], None]
-"""Called with every packet on the wire: time of its end, whether the host sent it, its bytes."""
+"""Function that gets every packet on the wire: time of its end, whether the host sent it, its
+bytes."""
 
 
 class Wire(ABC):

@@ -25,7 +25,7 @@ _WORD = 8
 _DEEP_M = 1e-3
 """Depth of the contacts that give the constants."""
 _SAFE = 1.0 + 1e-9
-"""Over the distance at which links can touch, against rounding."""
+"""Factor on the distance at which links can touch, against rounding."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from snakewalk.sim.physics.obstacles import obstacle_mjcf
 from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES
 
 STOP_MARGIN_RAD = 0.1
-"""The mechanical stop is this far beyond the limit that a plan may use."""
+"""Distance of the mechanical stop beyond the limit that a plan may use."""
 NOTCH = 0.6
 """Largest gap between a capsule and a straight joint, in radii: the notch is a fifth of one
 deep."""
@@ -33,7 +33,7 @@ CONTACT_TIME_S = 0.015
 body's weight."""
 
 _NO_SAME_FRAME = 0
-"""``mjSAMEFRAME_NONE``; MuJoCo 3.2.0 has no name for it in Python."""
+"""Value of ``mjSAMEFRAME_NONE``; MuJoCo 3.2.0 has no name for it in Python."""
 GEAR_IMPEDANCE = "0.999 0.999"
 """Impedance of friction in the gears: a joint that it holds creeps at a thousandth of its free
 acceleration times the step."""

@@ -44,9 +44,9 @@ class StepLayout:
     data: Mapping[str, int]
     """Addresses of ``step_memory.POINTERS`` in ``mjData``."""
     contact: Mapping[str, int]
-    """``step_memory.CONTACT``."""
+    """Layout of a contact in memory (``step_memory.CONTACT``)."""
     functions: Mapping[str, int]
-    """``step_memory.FUNCTIONS``: all, or the first three."""
+    """Addresses of MuJoCo's functions (``step_memory.FUNCTIONS``): all, or the first three."""
 
     @property
     def has_parts(self) -> bool:

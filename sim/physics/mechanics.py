@@ -39,7 +39,7 @@ class Mechanics:
     model: mujoco.MjModel
     data: mujoco.MjData
     mu: tuple[float, float, float, float]
-    """``FrictionConfig.grip`` of the ground."""
+    """Coefficients of the ground's friction (``FrictionConfig.grip``)."""
     spine_links: int
     link_mass_kg: Floats
     """(L,) of each link; a leg's counts as a plain one of the spine."""
@@ -51,13 +51,13 @@ class Mechanics:
     planes: TangentPlanes
     """Planes that support the body on a height field."""
     contact_role: NDArray[np.int32]
-    """(geoms,) ``GROUND``, ``FOOT``, or 0."""
+    """(geoms,) role of a geom in contacts: ``GROUND``, ``FOOT``, or 0 for others."""
     load_n: Floats
     """(L,) what the ground bore of each link in the last step, N."""
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats
-    """(L, 9) ``sim.physics.water.water_constants``."""
+    """(L, 9) constants of the water forces (``sim.physics.water.water_constants``)."""
     rotor: Floats
     """(5, J) state of the backlash, as ``sim.servo.backlash`` has it."""
     totals: Floats = field(default_factory=lambda: np.zeros(3))

@@ -28,9 +28,10 @@ TAIL_UP_M = 0.01
 COIL_MIN_RAD = 2.0
 """A body that turns less about its axis is not a coil."""
 START_DEPTH_M = 0.005
-"""How deep in an obstacle a body may start: contacts are soft, and it is pushed out at once."""
+"""Largest depth in an obstacle at which a body may start: contacts are soft and push it out at
+once."""
 OBSTACLE = "obstacle"
-"""Begins the names of its geoms."""
+"""Prefix of the names of an obstacle's geoms."""
 
 
 def obstacle_mjcf(world: WorldConfig) -> tuple[str, str]:
@@ -171,7 +172,7 @@ class Coil:
     radius_m: Floats
     """(L,) distance of each link's centre from the axis."""
     wound_rad: float
-    """How far the body goes round."""
+    """Angle by which a body winds around a pole or a pipe."""
 
 
 def fit_coil(links_m: Floats) -> Coil:

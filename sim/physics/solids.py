@@ -19,7 +19,7 @@ STAVE_COUNT = 24
 """Number of boxes of a pipe: its wall is flat by less than 1 % of its radius."""
 STAVE_M = 0.02
 CLEAR_M = 0.2
-"""Between the floor and what lies level, on the outside."""
+"""Gap between the floor and the outside of a level solid."""
 WOOD = (0.55, 0.42, 0.30, 1.0)
 GLASS = (0.55, 0.68, 0.78, 0.22)
 """Red, green, blue, opacity (ours)."""
@@ -35,9 +35,9 @@ class Solid:
     half_m: tuple[float, ...]
     """Radius and half length, or half edges."""
     centre_m: Floats
-    """(3,)"""
+    """(3,) centre of the solid, m."""
     axes: Floats
-    """(3, 3) columns."""
+    """(3, 3) axes of the solid, in columns."""
     colour: tuple[float, float, float, float]
 
 

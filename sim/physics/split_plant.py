@@ -14,7 +14,7 @@ FOLLOW_STRENGTH = 4.0
 """Supply of these motors, as a multiple of the nominal one (ours): they carry every load that a
 real servo carries."""
 AHEAD_S = 0.1
-"""How far a measured velocity is extrapolated, at most (ours)."""
+"""Longest time over which a measured velocity is extrapolated (ours)."""
 _INPUTS = 9
 """Columns of a drive that servos write; the plant writes the others."""
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats
 
 Lanes = tuple[Floats, NDArray[np.int64]]
-"""``friction.make_lanes``."""
+"""Type of the lanes that ``friction.make_lanes`` returns."""
 
 
 class State(NamedTuple):
@@ -23,15 +23,15 @@ class Chain(NamedTuple):
     """Poses of the B bodies: row 0 is the world, row 1 + i is link i."""
 
     centre: Floats
-    """(B, 3) centres of mass."""
+    """(B, 3) centres of mass of the bodies."""
     rotation: Floats
-    """(B, 9) rows of their matrices."""
+    """(B, 9) rotation matrices of the bodies, row by row."""
     anchor: Floats
     """(L, 3) points on the joints' axes; row 0 is the head's free joint."""
     axis: Floats
     """(L, 3) directions of the joints' axes."""
     parents: NDArray[np.int32]
-    """(B,) bodies that they hang on."""
+    """(B,) parents of the bodies in the tree."""
 
 
 class Links(NamedTuple):
@@ -40,7 +40,7 @@ class Links(NamedTuple):
     velocity: Floats
     """(L, 3) of the centres, in the last step."""
     spin: Floats
-    """(L, 3)"""
+    """(L, 3) angular velocities of the links."""
     wrench: Floats
     """(L, 6) force, and torque about the world's origin."""
     depth: Floats
@@ -51,7 +51,7 @@ class Links(NamedTuple):
     """(L,) force that the ground bore in the last step."""
     mass_kg: Floats
     water: Floats
-    """(L, 9) ``sim.physics.water.water_constants``."""
+    """(L, 9) constants of the water forces (``sim.physics.water.water_constants``)."""
 
 
 class Geoms(NamedTuple):
@@ -99,7 +99,7 @@ class Law(NamedTuple):
     """Constants of ground friction."""
 
     mu: tuple[float, float, float, float]
-    """``FrictionConfig.grip``."""
+    """Coefficients of the ground's friction (``FrictionConfig.grip``)."""
     radius_m: float
     step_s: float
     spine: int
@@ -115,7 +115,7 @@ class Body(NamedTuple):
     geoms: Geoms
     law: Law
     totals: Floats
-    """(3,) ``Mechanics.totals``."""
+    """(3,) energies lost since the reset (``Mechanics.totals``)."""
 
 
 class Shafts(NamedTuple):

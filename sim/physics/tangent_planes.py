@@ -276,7 +276,7 @@ class TangentPlanes:
     balls: NDArray[np.int32]
     """(B,) geoms of the bellies; none on a level floor."""
     planes: NDArray[np.int32]
-    """(B, PLANES) their planes."""
+    """(B, PLANES) planes at each ball."""
     radius_m: Floats
     """(B,) of the balls."""
     z_m: Floats

@@ -26,11 +26,11 @@ class BodyChain:
     """One body in one frame."""
 
     points_m: Floats
-    """(n, 3) head first."""
+    """(n, 3) points of the body's axis, head first, m."""
     radius_m: Floats
-    """(n,) there."""
+    """(n,) radii of the body at its points."""
     kind: int
-    """Number of its colours."""
+    """Number of the body's colours."""
     level: int
     """Level of detail from 0, the farthest."""
 
@@ -40,7 +40,7 @@ class CrowdShot:
     """One frame: an orbiting camera, and the bodies in view."""
 
     lookat_m: Floats
-    """(3,)"""
+    """(3,) point that the camera looks at, m."""
     distance_m: float
     azimuth_deg: float
     elevation_deg: float

@@ -63,7 +63,7 @@ class TubeGrid:
         a, b = ring * self.sides + side, ring * self.sides + (side + 1) % self.sides
         c, d = a + self.sides, b + self.sides
         both = np.stack([np.stack([a, b, c], -1), np.stack([b, d, c], -1)], axis=2)
-        return np.asarray(both.reshape(-1, 3))
+        return both.reshape(-1, 3)
 
     @property
     def uv(self) -> Floats:
@@ -155,7 +155,7 @@ class CrowdMeshes:
 def _along(rings: int) -> Floats:
     """(rings,) places along a body, denser at its ends."""
     even = np.linspace(0.0, 1.0, rings)
-    return np.asarray(even - 0.6 * np.sin(2.0 * np.pi * even) / (2.0 * np.pi))
+    return even - 0.6 * np.sin(2.0 * np.pi * even) / (2.0 * np.pi)
 
 
 def _unit(vectors: Floats) -> Floats:
@@ -185,7 +185,7 @@ def _shadow_corners(lines: Floats, ground: HeightField) -> Floats:
 def _ribbon_faces() -> Ints:
     a = 2 * np.arange(_SHADOW_RINGS - 1)
     both = np.stack([np.stack([a, a + 1, a + 2], 1), np.stack([a + 2, a + 1, a + 3], 1)], axis=1)
-    return np.asarray(both.reshape(-1, 3))
+    return both.reshape(-1, 3)
 
 
 def _ribbon_uv() -> Floats:

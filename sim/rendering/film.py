@@ -29,9 +29,9 @@ class Style:
     size: tuple[int, int] = (960, 540)
     """Even width and height, pixels."""
     title: str = ""
-    """Shown in the caption."""
+    """Title in the caption of a film."""
     look: SkinLook | None = None
-    """The body's skin; None is a capsule a link."""
+    """Skin of the body; None draws a capsule for each link."""
     fine: bool = False
     """Smooth edges, at three times the cost."""
 

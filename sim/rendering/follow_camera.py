@@ -11,10 +11,11 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.sim.rendering.view_frustum import camera_axes
 
 SMOOTHING_S: Final = 1.2
-"""The camera's smoothing, in seconds of film."""
+"""Time constant of the camera's smoothing, in seconds of film."""
 TURN_SMOOTHING_S: Final = 4.0
 STRIDING_TURN_S: Final = 1.5
-"""The same for a body that stands on legs: its heading does not sway with waves."""
+"""Time constant of the camera's turn around a body on legs, whose heading does not sway with
+waves."""
 DISTANCE_LENGTHS: Final = 1.2
 """Distance of the camera from the body, in lengths of the body."""
 UPRIGHT_LENGTHS: Final = 1.4
@@ -56,7 +57,7 @@ class BodyTrack:
     @property
     def heading(self) -> Floats:
         """(F, 2) from the tail to the head."""
-        return np.asarray(self.parts_m[:, 0, :2] - self.parts_m[:, self.spine - 1, :2])
+        return self.parts_m[:, 0, :2] - self.parts_m[:, self.spine - 1, :2]
 
     @property
     def is_upright(self) -> bool:
@@ -167,4 +168,4 @@ def _spread(values: Floats, fps: int) -> Floats:
     """Smooth values (F,) that never fall below the given ones by much."""
     window = 2 * round(SMOOTHING_S * fps) + 1
     widest = maximum_filter1d(values, window, mode="nearest")
-    return np.asarray(gaussian_filter1d(widest, 0.4 * SMOOTHING_S * fps, mode="nearest"))
+    return gaussian_filter1d(widest, 0.4 * SMOOTHING_S * fps, mode="nearest")

@@ -30,9 +30,9 @@ class TileMesh:
     """One level of a tile."""
 
     corners_m: Floats
-    """(V, 3)"""
+    """(V, 3) corners of the mesh, m."""
     normals: Floats
-    """(V, 3)"""
+    """(V, 3) unit normals of the ground at the corners."""
     uv: Floats
     """(V, 2) in the texture, whose first row has the largest y."""
     faces: Ints

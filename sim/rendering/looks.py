@@ -46,15 +46,15 @@ class SkinLook:
     """An animal's skin on the links, in place of capsules; the body at rest lies along -x."""
 
     vertices_m: Floats
-    """(V, 3)"""
+    """(V, 3) corners of the skin at rest, m."""
     uv: Floats
-    """(V, 2)"""
+    """(V, 2) places of the corners in the texture, 0 to 1."""
     faces: Ints
-    """(F, 3)"""
+    """(F, 3) triangles of the skin, as numbers of corners."""
     link: Ints
     """(V, B) links that carry a corner."""
     share: Floats
-    """(V, B) of each; they sum to 1."""
+    """(V, B) shares of the links in each corner; they sum to 1."""
     rest_m: Floats
     """(L, 3) origins of the links' bodies at rest: the middle of the head, then the joints."""
     texture: Image | None
@@ -71,10 +71,10 @@ class FloorPrint:
     """A printed sheet on level ground, its upper edge to the north."""
 
     place_m: tuple[float, float]
-    """Position of its middle."""
+    """Position of the middle of the print."""
     side_m: float
     picture: Image
-    """(N, N) grey."""
+    """(N, N) grey picture of the print."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +82,12 @@ class Marks:
     """Marks drawn on the ground."""
 
     waypoints_m: Sequence[tuple[float, float]] = ()
-    """Drawn as rings."""
+    """Waypoints that a film draws as rings."""
     waypoint_radius_m: float = 0.3
     reached_s: Sequence[float] = ()
-    """When the first, second, ... of them turn green."""
+    """Times at which the rings of the waypoints turn green, in order."""
     paths: Sequence[tuple[float, Floats]] = ()
-    """Each the time from when it is in force and (P, 2) points; drawn as dots."""
+    """Paths that a film draws as dots: the time from which each is in force, and (P, 2) points."""
     hollow: bool = False
     """Whether the arrivals are not measured: rings are dashed then, without poles."""
 
@@ -445,4 +445,4 @@ def _thickness_m(robot: RobotConfig) -> Floats:
     along = np.arange(links) / (links - 1)
     thick = 0.80 + 0.20 * np.sin(np.pi * np.minimum(along / 0.55, 1.0) / 2)
     thick *= 1.0 - 0.55 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
-    return np.asarray(np.array(robot.link_radii_m) * thick)
+    return np.array(robot.link_radii_m) * thick

@@ -14,10 +14,10 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 
 SUN_DIRECTION = np.array([0.48, 0.52, -0.7071])
-"""In which its light travels."""
+"""Direction in which the sunlight travels."""
 DARK = np.array([0.02, 0.03, 0.06, 0.30], dtype=np.float32)
 LIFT_M = 0.002
-"""Above the ground, so that the two do not flicker into each other."""
+"""Height of the shadow above the ground, so that the two do not flicker into each other."""
 
 SHADE = "shade"
 """Name of the skin and the texture of a soft shadow."""
@@ -131,7 +131,7 @@ def link_surface_m(links_m: Floats, forward: Floats, robot: RobotConfig) -> Floa
     along = links_m[:, None] + forward[:, None] * (half_m * np.linspace(-1.0, 1.0, 12))[:, None]
     across = radius_m[:, None] * np.linspace(-1.0, 1.0, 7)
     points = along[:, :, None] + (across[..., None] * side[:, None])[:, None]
-    return np.asarray(points.reshape(-1, 3))
+    return points.reshape(-1, 3)
 
 
 def _half_sizes_m(robot: RobotConfig, links: int) -> tuple[float, Floats]:

@@ -29,7 +29,7 @@ class CameraFrame:
     """Pose of a camera."""
 
     at_m: Floats
-    """(3,) its lens."""
+    """(3,) position of the lens."""
     axes: Floats
     """(3, 3) columns: right, down and forward in the world."""
 

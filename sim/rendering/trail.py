@@ -14,7 +14,7 @@ from snakewalk.config.heightfield import HeightField
 
 Rgba = tuple[float, float, float, float]
 PATH: Final[Rgba] = rgba(colours.PATH)
-"""Colour of the path in force."""
+"""Colour of the path that the run follows."""
 FORMER: Final[Rgba] = rgba(colours.PATH, 0.35)
 """Colour of a path that another one replaced."""
 TRAIL: Final[Rgba] = rgba(colours.HEAD)
@@ -22,15 +22,15 @@ TRAIL: Final[Rgba] = rgba(colours.HEAD)
 CENTRE: Final[Rgba] = rgba(colours.CENTRE)
 """Colour of the trail of the body's centre."""
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
-"""The world's x and y."""
+"""Colours of the world's x and y axes."""
 AXES_GEOMS: Final = 5
 _AXES_SAMPLES: Final = 9
 """Points of each rod at which the ground is looked up (ours)."""
 LIFT_M = 0.004
 SPACING_M = 0.12
-"""Between dots of a path."""
+"""Distance between the dots of a path, m."""
 STEP_M = 0.03
-"""Between points of the trail."""
+"""Distance between the points of the head's trail, m."""
 MOST = 400
 """Dots of a path, pieces of the trail: its end is drawn."""
 
@@ -42,7 +42,7 @@ class TrailLine:
     time_s: Floats
     """(H,) when it was at each point of the line."""
     points_m: Floats
-    """(H, 3), on the ground."""
+    """(H, 3) points of the head's trail, on the ground."""
     rgba: Rgba
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
@@ -62,7 +62,7 @@ class Trail:
     starts_s: Floats
     """(K,) from when on each path is in force, increasing."""
     dots_m: tuple[Floats, ...]
-    """K times (D, 3), on the ground."""
+    """Dots of K paths, (D, 3) each, on the ground."""
     lines: tuple[TrailLine, ...]
     """Lines of the head and of the body's centre."""
 

@@ -13,7 +13,7 @@ class ViewFrustum:
     """Eye, axes and opening of a camera."""
 
     eye_m: Floats
-    """(3,)"""
+    """(3,) position of the camera, m."""
     axes: Floats
     """(3, 3) rows: forward, right, up."""
     half_tan: tuple[float, float]
@@ -44,7 +44,7 @@ class ViewFrustum:
 
     def in_camera(self, points_m: Floats) -> Floats:
         """(3, N) depth and offsets to the right and upwards of points (N, 3)."""
-        return np.asarray(self.axes @ (points_m - self.eye_m).T)
+        return self.axes @ (points_m - self.eye_m).T
 
     def touches(self, centre_m: Floats, radius_m: Floats) -> Bools:
         """(N,) whether spheres with centres (N, 3) and radii (N,) touch the view."""

@@ -26,7 +26,7 @@ class ChainSpec:
     """Servos along the chain."""
 
     ids: tuple[int, ...]
-    """In the order of the chain."""
+    """IDs of the servos in the order of the chain."""
     models: tuple[str, ...]
     """Name or file of each servo's model."""
 

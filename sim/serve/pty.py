@@ -23,7 +23,7 @@ from snakewalk.drivers.protocol.registers import BAUDS
 from snakewalk.sim.line.wire import Wire
 
 IDLE_S = 0.02
-"""How often physics catches up while no client talks."""
+"""Period with which the physics catches up while no client talks."""
 SPIN_S = 1e-3
 """Shorter waits poll: on a busy machine a sleep may end 10 ms late."""
 LATE_S = 0.1
@@ -73,7 +73,7 @@ class PtyServer:
         over; all flushes between two looks count as one."""
         self._link_checked_s = clock.now_s()
         self.path = ""
-        """The device to open as a serial port; empty while the port has vanished."""
+        """Path of the device to open as a serial port; empty while the port has vanished."""
         self._open()
 
     def __enter__(self) -> "PtyServer":

@@ -44,7 +44,7 @@ class ServoBus:
         device = None if imu is None else parse_imu(imu)
         chain = parse_chain(servos if isinstance(servos, str) else ",".join(map(str, servos)))
         self.line = bench_line(chain, baud, start_rad, device)
-        """The bus as a port in simulated time."""
+        """Port of the simulated bus, in simulated time."""
         plan = load(Path(faults), FaultPlan) if isinstance(faults, str | Path) else faults
         self._faults = None if plan is None else FaultPlayer(self.line, plan)
         self.packets: list[DecodedPacket] = []

@@ -53,7 +53,7 @@ class ServoScales:
     lowest_position: Floats
     """Limit within one turn."""
     homing_limit: Floats
-    """Infinite without a limit."""
+    """Largest homing offset in raw positions; infinite without a limit."""
 
     @staticmethod
     def of(models: Sequence[ServoModel]) -> "ServoScales":
@@ -137,7 +137,7 @@ class ServoBank:
         self.measures_current = np.array(
             [registers.measures_current for registers in self._of_row], bool
         )
-        """(S,) False where a servo has no current sensor."""
+        """(S,) whether a servo measures its current."""
         self.false_alert = np.zeros(len(self.ids), bool)
         """(S,) servos that set the alert bit of their replies without an error."""
         self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)

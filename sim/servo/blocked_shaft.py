@@ -12,7 +12,7 @@ from snakewalk.sim.plant import ServoDrive
 STIFF_PER_RAD = 20.0
 """PWM fraction a radian of the brake: an order above the servos' own gains."""
 STRENGTH = 4.0
-"""Brake over stall torque."""
+"""Torque of the brake on a blocked shaft over the stall torque."""
 
 
 class BlockedShaft:
@@ -22,7 +22,7 @@ class BlockedShaft:
         self._drive = drive
         servos = len(drive.torque_on)
         self.rows = np.zeros(servos, bool)
-        """(S,) blocked."""
+        """(S,) whether the shaft of a servo is blocked."""
         self._at_rad = np.zeros(servos)
         self._output = np.zeros(servos)
         self._gain = np.zeros(servos)

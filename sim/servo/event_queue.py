@@ -11,7 +11,7 @@ class EventQueue:
         self._scheduled: list[tuple[float, int, Callable[[], None]]] = []
         self._count = 0
         self.next_s = float("inf")
-        """Time of the first."""
+        """Time of the first event in the queue."""
 
     def schedule(self, time_s: float, action: Callable[[], None]) -> None:
         """Run ``action`` at ``time_s``, or at the next ``run_due`` if that is past."""

@@ -39,7 +39,7 @@ from snakewalk.sim.servo.register_rules import PROFILE
 from snakewalk.sim.servo.servo_loops import accept_goals
 
 ROUNDING_S = 1e-9
-"""Times closer than this are the same."""
+"""Largest difference between two times that count as the same."""
 
 
 class Watchdog:
@@ -48,12 +48,12 @@ class Watchdog:
     def __init__(self, bank: ServoBank, time_s: float) -> None:
         self._bank = bank
         self.fed_s = time_s
-        """When they were last fed."""
+        """Time at which the servos' watchdogs were last fed."""
         self.timeout_s = np.inf
-        """How long the most impatient of them waits."""
+        """Shortest timeout of the servos' watchdogs."""
         self._watched = np.zeros(len(bank), bool)
         self.due_s = np.inf
-        """When the first of them runs out."""
+        """Time at which the first watchdog expires."""
 
     def arm(self, on: Bools) -> None:
         """Read the register; ``on`` (S,) marks servos with torque."""
@@ -120,7 +120,8 @@ class Firmware:
         self._last_mode = bank["Operating Mode"].copy()
         self._held = np.zeros(joints, bool)
         self.powered = np.ones(joints, bool)
-        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        """(S,) whether a servo has a supply; without one it receives nothing, and its shaft is
+        limp."""
         self.no_output = np.zeros(joints, bool)
         """(S,) whether the output stage is dead: registers show a servo that works."""
         self._readings = ConstantReadings(bank.__getitem__)

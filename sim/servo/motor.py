@@ -209,7 +209,7 @@ class Gearbox:
     """
 
     armature_kg_m2: Floats | float
-    """The rotor, seen through the gears."""
+    """Inertia of the rotor as seen through the gears."""
     dry_n_m: Floats | float
     viscous_n_m_s: Floats | float
     stribeck_n_m: Floats | float
@@ -219,12 +219,12 @@ class Gearbox:
     by_load: Floats | float
     """Share of the load's torque that friction consumes."""
     by_load_slow: Floats | float
-    """Additional share while the shaft is slow."""
+    """Additional share of the load's torque that friction consumes while the shaft is slow."""
     by_motor_slow: Floats | float = 0.0
     stribeck_exponent: Floats | float = 2.0
     by_motor_square: Floats | float = 0.0
     by_load_square: Floats | float = 0.0
-    """In 1/(N m)."""
+    """Share of the load's torque that friction consumes, per unit of this torque, 1/(N m)."""
     backlash_rad: Floats | float = 0.0
     """Play of the shaft from end to end while the rotor rests (``sim.servo.backlash``)."""
 

@@ -28,7 +28,7 @@ class MotorOutput:
         self.limited = False
         """Whether the mode of any servo limits its current."""
         self.current_a: Callable[[], Floats] = blocked_shaft.current_a
-        """(S,) as measured."""
+        """(S,) measured motor currents, A."""
         self._heat_j, self._since_j = drive.heat_j.copy(), np.zeros_like(drive.heat_j)
 
     def take_heat_j(self, seconds: float) -> Floats:

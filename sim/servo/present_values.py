@@ -115,7 +115,7 @@ class PresentValues:
     def turning(self) -> NDArray[np.bool_]:
         """(S,) faster than Moving Threshold(24)."""
         threshold = self._bank["Moving Threshold"] * self._scales.rad_s_per_velocity
-        return np.asarray(np.abs(self._plant.velocity_rad_s) > threshold)
+        return np.abs(self._plant.velocity_rad_s) > threshold
 
     def supply(self) -> None:
         """Present Input Voltage and Temperature(144, 146)."""

@@ -28,13 +28,14 @@ from snakewalk.sim.servo.servo_loops import (
 from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling, Supply, servo_voltages
 
 SLICE_S = 0.05
-"""Period of the checks."""
+"""Period of the checks of a servo's protection."""
 SLOW = 0.05
 """Share of the no-load speed below which a motor is taken to be held (ours)."""
 STARVED = 0.6
 """Share of Min Voltage Limit(34) below which a powered motor is "insufficient power" (ours)."""
 OVERLOAD_S = 1.0
-"""How long a motor at full output may be held ("persistent load", e-manual; the time is ours)."""
+"""Longest time at full output against a held shaft ("persistent load", e-manual; the time is
+ours)."""
 ENCODER_ERROR, SHOCK_ERROR = 0x08, 0x10
 """Bits of Hardware Error Status(70) and Shutdown(63)."""
 ALARMS: Mapping[str, int] = {
@@ -44,7 +45,7 @@ ALARMS: Mapping[str, int] = {
     "encoder": ENCODER_ERROR,
     "shock": SHOCK_ERROR,
 }
-"""By the words of a fault file."""
+"""Alarms by their names in a fault file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ class SupplyAndAmbient:
     """Supply and air."""
 
     supply_v: float | None = None
-    """None: the nominal voltage of each servo's model."""
+    """Supply voltage of the servos; None: the nominal voltage of each servo's model."""
     supply_ohm: float = SOURCE_OHM
     """Resistance of battery and cable together; servos of one voltage share a cable."""
     ambient_c: float = 25.0

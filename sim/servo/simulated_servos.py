@@ -57,7 +57,8 @@ class SimulatedServos(ABC):
         self.events = EventQueue()
         """Events that happen to the servos at a time of their own, such as faults."""
         self.powered = np.ones(servos, bool)
-        """(S,) False while a servo has no supply: it receives nothing, and its shaft is limp."""
+        """(S,) whether a servo has a supply; without one it receives nothing, and its shaft is
+        limp."""
         self._no_output = np.zeros(servos, bool)
         self._readings = ConstantReadings(self.__getitem__)
         self._registered: dict[int, tuple[int, bytes]] = {}

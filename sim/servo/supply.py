@@ -88,7 +88,7 @@ class Cabling:
 
     def cable_a(self, servo_v: Floats) -> Floats:
         """(S - 1,) current through each cable, positive away from the first servo."""
-        return np.asarray((servo_v[:-1] - servo_v[1:]) / self.cable_ohm)
+        return (servo_v[:-1] - servo_v[1:]) / self.cable_ohm
 
 
 @compiled(f"void(float64, float64, {_ROW}, {_ROW}, {_ROW}, {_ROW}, float64[::1])")

@@ -40,15 +40,15 @@ class DecodedPacket:
 
     time_s: float
     kind: str
-    """"question", "answer" or "noise"."""
+    """Kind of the packet: "question", "answer" or "noise"."""
     servo_id: int
-    """254: all; -1: not known."""
+    """ID of the servo; 254: all servos; -1: not known."""
     name: str
-    """Instruction, or its result."""
+    """Name of the instruction, or of the result of a reply."""
     values: Mapping[str, object]
     """Registers by servo and name, where they are known."""
     raw: str
-    """Bytes in hexadecimal."""
+    """Bytes of the packet in hexadecimal."""
 
     def to_dict(self) -> dict[str, object]:
         """Fields for JSON."""

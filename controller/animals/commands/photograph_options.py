@@ -24,10 +24,10 @@ class Shot:
     """A photograph, as it was asked for."""
 
     view: str
-    """One of ``VIEWS``."""
+    """Name of the view of a photograph, one of ``VIEWS``."""
     file: Path
     frame: int
-    """Row of the skeleton that lies in it."""
+    """Row of the skeleton that lies in the photograph."""
 
 
 @dataclass(frozen=True, slots=True)

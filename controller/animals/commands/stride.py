@@ -19,9 +19,9 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.result_files import (
-    atomic_write,
     check_picture,
     refuse_to_overwrite,
+    write_result,
 )
 from snakewalk.controller.track.readers.keypoints import choice_of
 from snakewalk.controller.track.readers.load import load_keypoints
@@ -86,8 +86,7 @@ def stride(
         keypoints, rate, min_score, choice_of(individual, None, plane)
     )
     measured = measure_animal(keypoints_of_film, names, animal, output.stem, length_m, view)
-    with atomic_write(output) as part:
-        part.write_text(measured.text(), encoding="utf-8")
+    write_result(output, measured.text())
     if picture is not None:
         from snakewalk.controller.animals.plots.stride import draw_stride  # noqa: PLC0415  --picture: an extra
 

@@ -101,7 +101,7 @@ def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floa
     half_px = np.maximum(np.median(np.array(rows), axis=0), 0.5)
     soft = np.convolve(np.pad(half_px, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     soft[[0, -1]] = np.minimum(soft[[0, -1]], 0.02 * model.length_px)
-    return np.asarray(soft[:STATIONS] / model.length_px)
+    return soft[:STATIONS] / model.length_px
 
 
 def _size(model: FishModel, frame: SilhouetteFrame, match: Match) -> tuple[float, float]:

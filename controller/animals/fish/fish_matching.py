@@ -50,7 +50,7 @@ class MatchedRecording:
     postures: Postures
     facts: MatchFacts
     film: FilmMatch | None
-    """None of midlines."""
+    """Result of the matching to the film; None for tracked midlines."""
 
 
 def match_footage(

@@ -12,6 +12,7 @@ from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
+from snakewalk.config.rounding import rounded
 from snakewalk.controller.animals.fish.piece_graph import PieceGraph, piece_graph
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.segments import (
@@ -44,7 +45,7 @@ class SynthesisFacts:
     """Counts of a synthesis, and the joint steps at its joins."""
 
     segments: dict[str, int]
-    """By kind."""
+    """Number of segments by kind."""
     beats_merged: int
     pieces_used: int
     seconds: float
@@ -65,7 +66,8 @@ class SynthesisFacts:
     """Largest joint step where one piece ends and the next begins; None with one piece."""
     join_step_blended_deg: float | None = None
     height_range: list[float] | None = None
-    """From where it starts, body lengths or m; None of a film without a side view."""
+    """Lowest and highest place relative to the start, body lengths or m; None of a film without a
+    side view."""
     pitch_range_deg: list[float] | None = None
 
     def to_dict(self) -> dict[str, object]:
@@ -84,7 +86,7 @@ class SynthesisedMotion:
     sequence: PieceSequence
     motion: Postures
     joints_rad: Floats
-    """(T, joints) of the robot."""
+    """(T, joints) joint angles of the robot, rad."""
     facts: SynthesisFacts
 
     def save(self, file: Path) -> None:
@@ -153,8 +155,8 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         reached_s=[],
         robot=robot.name,
         pieces_too_close=sequence.crowded if around.any else None,
-        wall_distance=_rounded(around.wall_distance(motion)),
-        fish_distance=_rounded(around.fish_distance(motion)),
+        wall_distance=rounded(around.wall_distance(motion), 4),
+        fish_distance=rounded(around.fish_distance(motion), 4),
     )
     facts = replace(facts, **reached)
     if motion.height is not None and motion.pitch_rad is not None:
@@ -218,10 +220,6 @@ def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
     x, y, head_deg = options.start
     start = x, y, float(np.radians(head_deg))
     return Surroundings(tank, tuple(others), options.apart * source.length, start)
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)
 
 
 def _steps(parts: list[Floats]) -> Floats:

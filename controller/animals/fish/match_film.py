@@ -19,7 +19,7 @@ from snakewalk.controller.animals.fish.side_view import SideCamera, SideView, al
 from snakewalk.controller.animals.fish.top_view import Match, search
 
 Film = Callable[[], Iterator[SilhouetteFrame]]
-"""Opens a film from its start."""
+"""Function that opens a film from its start."""
 SAMPLE = 9
 """Frames from which the model is calibrated."""
 _HEIGHT_FACTORS = np.array([0.55, 0.75, 1.0, 1.33, 1.8])
@@ -47,9 +47,9 @@ class TrackedFrame:
     """The match of one frame, or the reason for its absence."""
 
     match: Match | None
-    """None where the fish was not found; the frame is left out, not guessed."""
+    """Matched posture; None where the fish was not found: the frame is left out, not guessed."""
     reason: str = ""
-    """Why, for a frame without a match."""
+    """Reason why a frame has no match."""
 
 
 def match_film(

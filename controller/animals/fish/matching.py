@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.controller.animals.fish.raster import Window, draw_area, draw_edge, draw_pieces
 
 EDGE_WEIGHT = 0.3
-"""W of Eq. 3."""
+"""Weight W of the edges in Eq. 3."""
 LEAST_VALUE = 0.3
 """A posture of a smaller V explains nothing: the fish is lost."""
 
@@ -33,7 +33,7 @@ class SilhouetteFrame:
     """One frame of one camera."""
 
     grey: Image
-    """(H, W) as filmed."""
+    """(H, W) grey image as filmed."""
     mask: Bools
     """(H, W) where the fish differs from the background."""
     reason: str = ""

@@ -40,7 +40,7 @@ class FishModel:
     half_height: Floats
     """(STATIONS,) half height in the side view."""
     build: str = ""
-    """Its name, as of ``fish_model``."""
+    """Name of the build of a fish (``fish_model``)."""
     fin: float = 0.0
     """Length of the pectoral fins as seen from above, stiff plates on the body; 0: none."""
     _turns: Floats = field(init=False, repr=False)
@@ -116,7 +116,7 @@ class FishModel:
                     (other, reach * (-_ASIDE * left[k] - _BACK * along[k])),
                 )
             )
-        return np.asarray(np.concatenate([side_line, other[::-1]]))
+        return np.concatenate([side_line, other[::-1]])
 
 
 def pitched(points: Floats, head_rad: Floats, pitch_rad: Floats) -> Floats:

@@ -24,15 +24,15 @@ class Piece:
 
     kind: Kind
     base: Floats
-    """(n, 2)"""
+    """(n, 2) positions of the base of the head, from the origin."""
     head_rad: Floats
-    """(n,) unwrapped, from 0."""
+    """(n,) unwrapped headings of the head, from 0."""
     angles_rad: Floats
-    """(n, J)"""
+    """(n, J) joint angles of the segment, rad."""
     begin_speed: float
     end_speed: float
     origin: str
-    """Frames that it was cut from."""
+    """Frames of the recording from which the segment was cut."""
     rise: Floats | None = None
     """(n, 2) height from 0, and pitch; None of a film without a side view."""
 

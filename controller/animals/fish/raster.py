@@ -24,7 +24,7 @@ class Window:
     top: int
     width: int
     height: int
-    """In pixels of the full frame."""
+    """Height of the raster in pixels of the full frame."""
     scale: float
     """Canvas pixels per frame pixel, at most 1."""
 

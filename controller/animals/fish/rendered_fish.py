@@ -22,7 +22,7 @@ class FilmConditions:
     ground: float = 175.0
     fish: float = 70.0
     light: float = 25.0
-    """How much brighter one corner is than the middle."""
+    """Additional brightness of one corner of the tank over its middle."""
     marks: float = 10.0
     """Standard deviation of the pattern of the ground and of the back."""
     shadow: float = 18.0

@@ -15,7 +15,7 @@ class Surroundings:
     tank: Floats | None = None
     """(2, 2) lowest and highest x and y; None: no walls."""
     others: tuple[Floats, ...] = ()
-    """Each (T, 2) the base of the head in every frame; after its end a fish stays."""
+    """(T, 2) positions of the base of the head of each other fish; after its end a fish stays."""
     apart: float = 0.0
     """Least distance from the walls and from the heads of other fish, in the recording's unit."""
 

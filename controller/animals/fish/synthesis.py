@@ -38,9 +38,9 @@ class PieceSequence:
     forced: int
     """Joins that no rule permits, made because nothing else was left."""
     reached_s: tuple[float, ...] = ()
-    """When each control point was reached."""
+    """Times at which the control points were reached."""
     reached_at: tuple[int, ...] = ()
-    """Frame of the motion at that time."""
+    """Frames of the motion in which the control points were reached."""
     crowded: int = 0
     """Pieces that come too near to a wall or another fish, as no other choice was left."""
 
@@ -51,13 +51,13 @@ class _Node:
 
     order: tuple[int, ...]
     base: Floats
-    """(2,) or with the height (3,)."""
+    """(2,) position of the base of the head, or (3,) with its height."""
     head_rad: float
     samples: int
     forced: int
     reached_at: tuple[int, ...]
     way: float = 0.0
-    """Distance swum since the last control point."""
+    """Distance that the fish has swum since the last control point."""
     crowded: int = 0
     """Pieces that come too near to a wall or another fish."""
     clearance: float = np.inf

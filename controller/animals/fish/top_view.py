@@ -34,7 +34,7 @@ class Match:
     parameters: Floats
     """(3 + J,) base x, base y (px, y up), head direction, spine angles (rad)."""
     value: float
-    """V of Eq. 3."""
+    """Misfit V of Eq. 3 between model and picture."""
 
 
 def window_of(

@@ -8,6 +8,7 @@ import numpy as np
 from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.rounding import rounded
 from snakewalk.config.template import template
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.animals.legged.prototype import LEGS
@@ -26,11 +27,11 @@ class Names:
     """Which keypoints are what."""
 
     spine: tuple[str, ...]
-    """Head first."""
+    """Names of the keypoints of the spine, head first."""
     girdles: tuple[str, ...]
-    """The two of the spine at the front and the hind legs."""
+    """Names of the keypoints of the spine at the front and the hind legs."""
     feet: tuple[str, ...]
-    """In the order of ``LEGS``."""
+    """Names of the keypoints of the feet, in the order of ``LEGS``."""
 
     @classmethod
     def of(cls, spine: str, girdles: str, feet: str) -> "Names":
@@ -82,11 +83,11 @@ class MeasuredAnimal:
             "stride_body_lengths": round(measured_stride.stride, 4),
             "speed_m_s": round(animal.speed_m_s, 4),
             "duty": {leg: round(foot.duty, 3) for leg, foot in self._feet()},
-            "duty_sd": {leg: _rounded(foot.duty_sd) for leg, foot in self._feet()},
+            "duty_sd": {leg: rounded(foot.duty_sd, 3) for leg, foot in self._feet()},
             "comes_down_cycles": {leg: round(foot.down, 3) for leg, foot in self._feet()},
             "fit_rms_body_lengths": {leg: round(foot.residual, 4) for leg, foot in self._feet()},
-            "girdle_turn_rad": [_rounded(turn) for turn in measured_stride.turn_rad],
-            "lift_body_lengths": [_rounded(lift) for lift in measured_stride.lift],
+            "girdle_turn_rad": [rounded(turn, 3) for turn in measured_stride.turn_rad],
+            "lift_body_lengths": [rounded(lift, 3) for lift in measured_stride.lift],
         }
 
     def _feet(self) -> "zip[tuple[str, Foot]]":
@@ -152,7 +153,3 @@ def _even(keypoints: Keypoints, places: Floats) -> Floats:
     even_places = np.full((int(index[-1]) + 1, *places.shape[1:]), np.nan)
     even_places[index] = places
     return even_places
-
-
-def _rounded(value: float) -> float | None:
-    return round(value, 3) if np.isfinite(value) else None

@@ -31,7 +31,7 @@ class SynthesisedAnimal:
     path: SplinePath
     rate_hz: float
     waypoints_m: Floats
-    """(W, 2)"""
+    """(W, 2) waypoints of the animal, m."""
     waypoint_radius_m: float
     ground: HeightField | None
 

@@ -31,13 +31,13 @@ class Contact:
     """One foot over the cycle."""
 
     duty: float
-    """Share of the cycle on the ground."""
+    """Share of the cycle in which the foot is on the ground."""
     down: float
-    """When it comes down, cycles, 0 to 1."""
+    """Time at which the foot comes down, in cycles, 0 to 1."""
     ahead: float
     """Middle of a step, ahead of the trunk's place."""
     residual: float
-    """RMS of the fit."""
+    """Root mean square error of the fit."""
 
 
 def step(phase: Floats, stride: float, duty: Floats | float, shape: tuple[float, float]) -> Floats:

@@ -14,7 +14,7 @@ from snakewalk.config.animal import LegPairConfig
 from snakewalk.config.arrays import Complexes, Floats
 
 _KNEE_UP = 0.45
-"""How far a knee that points out also points up (ours)."""
+"""Upward part of the direction of a knee that points out (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +22,11 @@ class LegFrame:
     """Directions of a body in T frames, unit vectors."""
 
     ahead: Floats
-    """(T, 3)"""
+    """(T, 3) unit vectors ahead."""
     left: Floats
-    """(T, 3)"""
+    """(T, 3) unit vectors to the left."""
     up: Floats
-    """(T, 3)"""
+    """(T, 3) unit vectors up."""
 
 
 def leg_joints_m(

@@ -21,7 +21,7 @@ from snakewalk.controller.animals.legged.prototype import Prototype
 from snakewalk.controller.terrain.path import SplinePath
 
 _KNOT_M = 0.03
-"""Between the knots of the smooth curve: a path is tabulated every centimetre."""
+"""Distance between the knots of the smooth curve: a path is tabulated every centimetre."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +29,9 @@ class AnimalMotion:
     """An animal on the ground of a world: T frames, m."""
 
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the frames, s."""
     spine_m: Floats
-    """(T, S + 1, 3) head first."""
+    """(T, S + 1, 3) points of the spine, head first, m."""
     joints_m: tuple[Floats, Floats, Floats, Floats]
     """(T, J, 3) of each leg, from its root to its toe: front left, front right, hind left, hind
     right."""
@@ -42,7 +42,7 @@ class AnimalMotion:
     up: Floats
     """(T, 3) normal of the local ground plane."""
     on_ground: Bools
-    """(T, 4)"""
+    """(T, 4) whether each foot is on the ground."""
 
     @property
     def hip_m(self) -> Floats:
@@ -53,7 +53,7 @@ class AnimalMotion:
     def end_m(self) -> Floats:
         """(T, 4, 3) where the legs end: at the feet, if they reach."""
         end = np.stack([leg[:, -1] for leg in self.joints_m], axis=1)
-        return np.asarray(end - self.sole_m[:, None] * self.up[:, None])
+        return end - self.sole_m[:, None] * self.up[:, None]
 
     def knee_m(self, animal: AnimalConfig) -> Floats:
         """(T, 4, 3) knees or elbows: the lower ends of the upper segments."""

@@ -21,7 +21,7 @@ _SIDES = np.array([1.0, -1.0])
 _STRAIGHTENS = 0.06
 """Share of the body's length over which the heading changes from the head's to the body's."""
 _TAIL_WAVES = 0.5
-"""On the tail, where it swings."""
+"""Waves on the tail, where it swings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,13 +29,13 @@ class Prototype:
     """T frames; x along the line, y to its left, z above the ground, m."""
 
     time_s: Floats
-    """(T,)"""
+    """(T,) times of the frames, s."""
     spine_m: Floats
-    """(T, SEGMENTS + 1, 3) head first."""
+    """(T, SEGMENTS + 1, 3) points of the spine, head first, m."""
     hip_m: Floats
     """(T, 4, 3) in the order of ``LEGS``."""
     foot_m: Floats
-    """(T, 4, 3)"""
+    """(T, 4, 3) positions of the feet, m."""
     on_ground: Bools
     """(T, 4) the time chart of contacts ([KP] Fig. 13)."""
     air: Floats
@@ -171,7 +171,7 @@ def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
         * tail
         * np.sin(TURN * (cycles[:, None] - hind.left - _TAIL_WAVES * tail))
     )
-    return np.asarray(turned @ _girdle_shares((front.at, hind.at), along).T + swung)
+    return turned @ _girdle_shares((front.at, hind.at), along).T + swung
 
 
 def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, phase: Floats) -> Floats:

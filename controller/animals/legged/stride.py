@@ -34,11 +34,11 @@ class Foot:
     """One foot over the cycle."""
 
     duty: float
-    """Share of the cycle on the ground."""
+    """Share of the cycle in which the foot is on the ground."""
     duty_sd: float
     """Spread of single cycles; NaN for fewer than three."""
     down: float
-    """When it comes down, in cycles after the front left foot."""
+    """Time at which the foot comes down, in cycles after the front left foot."""
     step: float
     """Way over the trunk on the ground, body lengths."""
     ahead: float
@@ -55,9 +55,9 @@ class Stride:
 
     cycle_s: float
     cycles: float
-    """How many were seen."""
+    """Number of cycles in the recording."""
     stride: float
-    """Way of a cycle, body lengths."""
+    """Distance travelled in a cycle, body lengths."""
     length: float
     """Length of the spine, in the unit of the tracks."""
     at: tuple[float, float]
@@ -65,13 +65,13 @@ class Stride:
     turn_rad: tuple[float, float]
     """Turn of the girdles, to either side; NaN from the side."""
     feet: tuple[Foot, Foot, Foot, Foot]
-    """In the order of ``LEGS``."""
+    """Motion of each foot, in the order of ``LEGS``."""
     phase: Floats
     """(T,) cycles since the front left foot first came down."""
     ahead: Floats
     """(T, 4) of the feet ahead of their girdles' mean places, body lengths; NaN where not seen."""
     shape: tuple[float, float]
-    """p and q of the way of the feet in the air (``contact_fit``)."""
+    """Shape parameters p and q of the feet's motion in the air (``contact_fit``)."""
     lift: tuple[float, float]
     """Heights of a step of the front and the hind feet, body lengths; NaN from above."""
 

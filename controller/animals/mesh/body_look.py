@@ -18,7 +18,7 @@ from snakewalk.controller.runlog.record import Header
 from snakewalk.sim.rendering.looks import SkinLook
 
 _PLAIN = "snake"
-"""The animal of a run whose recording holds no widths."""
+"""Animal of a run whose recording holds no widths."""
 
 
 @plugin("look", "body")

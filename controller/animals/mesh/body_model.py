@@ -53,7 +53,7 @@ class Silhouettes:
     points: Floats
     """(T, P, 2), in the file's unit."""
     radius: Floats
-    """(T, P) in the same unit."""
+    """(T, P) radii in the file's unit."""
     length_m: float | None
     pixels: bool
     """Whether the points are pixels, rows downwards."""

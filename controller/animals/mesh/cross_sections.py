@@ -35,11 +35,11 @@ class CrossSections:
     """Curves of a body; a tip is a curve of one place."""
 
     curves_m: Floats
-    """(K, C, 3)"""
+    """(K, C, 3) points of the curves, m."""
     stations: Floats
     """(K,) places along the body, 0 to 1."""
     length_m: float
-    """1 where the body has no scale."""
+    """Length of the body; 1 without a scale."""
     axis_m: float
     """Height of the line that bends."""
 

@@ -102,7 +102,7 @@ def round_tips(model: BodyModel, s: Floats) -> Floats:
     """Factor on the radii: the skeleton ends on the boundary, which no circle may cross."""
     head, tail = tips(model)
     near = np.minimum(s / head, (1.0 - s) / tail)
-    return np.asarray(np.sqrt(np.clip(1.0 - np.clip(1.0 - near, 0.0, 1.0) ** 2, 0.0, None)))
+    return np.sqrt(np.clip(1.0 - np.clip(1.0 - near, 0.0, 1.0) ** 2, 0.0, None))
 
 
 def tube_faces(points: int, around: int) -> Ints:

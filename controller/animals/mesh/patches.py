@@ -28,7 +28,7 @@ class Tube:
     """A body's skin: patches from curve to curve, head first."""
 
     patches: tuple[PdeSurface, ...]
-    """(K - 1,)"""
+    """(K - 1,) patches between the curves."""
     stations: Floats
     """(K,) places of the curves along the body, 0 to 1."""
 

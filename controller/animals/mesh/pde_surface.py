@@ -33,7 +33,7 @@ class PdeSurface:
     """The surface through 2N curves of C points; ``u`` from 0 to 1, ``v`` from 0 to 2 pi."""
 
     spread: float
-    """a: how fast the detail of a curve fades from it."""
+    """Parameter a: the rate at which the detail of a curve fades from it."""
     at: tuple[float, ...]
     """(2N,) where along u the curves lie."""
     slopes: tuple[int, ...]
@@ -43,7 +43,7 @@ class PdeSurface:
     cosine: Floats
     """(M, 2N, 3) of each mode's functions of u."""
     sine: Floats
-    """(M, 2N, 3)"""
+    """(M, 2N, 3) coefficients of the sines."""
     left_out: Floats
     """(2N, C, 3) remainder's functions of u, at the curves' own samples of v."""
 

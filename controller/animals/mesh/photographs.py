@@ -39,7 +39,7 @@ class Photograph:
     image: Image
     """(H, W) or (H, W, 3)"""
     points_px: Floats
-    """(P, 2) skeleton in it, rows downwards, head first."""
+    """(P, 2) skeleton in the photograph, rows downwards, head first."""
     radius_px: Floats
     """(P,) distances to the boundary."""
     turn_rad: float
@@ -97,7 +97,7 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
 def row_turn_rad() -> Floats:
     """(AROUND,) angles around the body of the picture's rows: -90 degrees is the belly."""
     share = 1.0 - (np.arange(AROUND) + 0.5) / AROUND
-    return np.asarray(2.0 * np.pi * (share - 0.25))
+    return 2.0 * np.pi * (share - 0.25)
 
 
 def _seen_from(
@@ -162,7 +162,7 @@ def _filled(mean: Floats, total: Floats) -> Floats:
     is_known: Bools = weights > 0.0
     colour = sums / np.where(is_known, weights, 1.0)[..., None]
     if is_known.all():
-        return np.asarray(colour)
+        return colour
     three = np.tile(~is_known, (3, 1))
     place = distance_transform_edt(
         three, sampling=(1.0, 4.0 * AROUND), return_distances=False, return_indices=True

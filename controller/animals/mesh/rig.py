@@ -16,7 +16,7 @@ class Rig:
 
     mesh: Mesh
     held: Weights
-    """Weights of its corners."""
+    """Weights of the corners."""
     rest_m: Floats
     """(K, 3) fronts of the bones at rest."""
     parent: Ints

@@ -50,7 +50,7 @@ class Weights:
     bones: Ints
     """(V, 3) the bone before, the bone at the corner's place, and the one behind."""
     shares: Floats
-    """(V, 3) of them; they sum to 1."""
+    """(V, 3) shares of the bones in each corner; they sum to 1."""
 
 
 def pde_skin(sections: CrossSections, tube: Tube, fins: tuple[Fin, ...] = ()) -> Skin:

@@ -79,15 +79,15 @@ class BodyPart:
     """One tube of the body: its curves, and the bones that carry them."""
 
     name: str
-    """trunk, leg, arm or shoe."""
+    """Name of the part of the body: trunk, leg, arm or shoe."""
     curves_m: Floats
     """(K, AROUND, 3) at rest; a tip is a curve of one place."""
     stations: Floats
     """(K,) place along the part, 0 to 1."""
     bones: Ints
-    """(K, 3) of each curve."""
+    """(K, 3) numbers of the bones of each curve."""
     shares: Floats
-    """(K, 3) of them; they sum to 1."""
+    """(K, 3) shares of the bones in each curve; they sum to 1."""
 
     def moved_m(self, front_m: Floats, rotation: Floats, rest_m: Floats) -> Floats:
         """(K, AROUND, 3) the curves in a pose: bones (B, 3), turned by (B, 3, 3) from rest."""
@@ -212,7 +212,7 @@ def _shoe(girth: float) -> BodyPart:
 def _onto(curve: Floats, surface: Floats) -> Floats:
     """(AROUND, 3) the curve on a surface's points that are nearest."""
     points = surface.reshape(-1, 3)
-    return np.asarray(points[cKDTree(points).query(curve)[1]])
+    return points[cKDTree(points).query(curve)[1]]
 
 
 def _stations(curves: Sequence[Floats]) -> Floats:

@@ -44,19 +44,19 @@ class FootParameters:
     """Parameters of Eq. 10, metres; those of one foot are zero by default, as in the paper."""
 
     height_m: float
-    """H, height of a step."""
+    """Height H of a step."""
     length_m: float
     """L, half the length of a step over the trunk."""
     duty: float
     """Share of a cycle on the ground, of planted feet (ours)."""
     right_height_m: float = 0.0
-    """H_R"""
+    """Step height H_R of the right foot."""
     left_height_m: float = 0.0
     right_initial_m: float = 0.0
-    """H_RF"""
+    """Initial height H_RF of the right foot."""
     left_initial_m: float = 0.0
     right_length_m: float = 0.0
-    """L_R"""
+    """Step length L_R of the right foot."""
     left_length_m: float = 0.0
 
 
@@ -71,9 +71,9 @@ class Feet:
     at: Floats
     """(T, 2) cycles since each foot came down, 0 to 1."""
     on_ground: Floats
-    """(T, 2) 1 on the ground, 0 in the air."""
+    """(T, 2) 1 for a foot on the ground, 0 for a foot in the air."""
     duty: float
-    """Share of a cycle on the ground."""
+    """Share of a cycle in which a foot is on the ground."""
 
 
 def feet(law: FeetLaw, given: FootParameters, phase: Floats) -> Feet:
@@ -112,9 +112,9 @@ class PersonGait:
     name: str
     cycle_s: float
     height: float
-    """H of Eq. 10."""
+    """Step height H of Eq. 10."""
     length: float
-    """L of Eq. 10."""
+    """Step length L of Eq. 10."""
     duty: float
     middle: float
     """Middle of the steps, ahead of the hips."""
@@ -179,12 +179,10 @@ def animate(
     cycles: int = 1,
     frames: int = FRAMES,
     in_place: bool = False,
-    parameters: FootParameters | None = None,
 ) -> PersonMotion:
     """Return whole cycles of a gait; the last pose repeats the first, farther ahead.
 
-    ``frames`` is the number of poses in a cycle; ``in_place`` is a walk on the spot. ``parameters``
-    of Eq. 10 are those of the gait by default.
+    ``frames`` is the number of poses in a cycle; ``in_place`` is a walk on the spot.
 
     Raises:
         InputError: fewer than one cycle, or fewer than four poses in it.
@@ -193,7 +191,7 @@ def animate(
     if cycles < 1 or frames < 4:
         raise InputError("people: a motion needs one cycle or more, of four poses or more")
     size = skeleton.stature_m
-    given = parameters or FootParameters(size * gait.height, size * gait.length, gait.duty)
+    given = FootParameters(size * gait.height, size * gait.length, gait.duty)
     phase = np.arange(cycles * frames + 1) / frames
     ways = feet(law, given, phase)
     speed_m_s = 2.0 * given.length_m / ways.duty / gait.cycle_s
@@ -363,7 +361,7 @@ def _arm(gait: PersonGait, phase: Floats, side: int) -> tuple[Floats, Floats, Fl
 
 def _pitched(angle: Floats) -> Floats:
     """(T, 3, 3) turns about the left axis; above 0 the front rises."""
-    return np.asarray(Rotation.from_euler("Y", -angle[:, None]).as_matrix())
+    return Rotation.from_euler("Y", -angle[:, None]).as_matrix()
 
 
 def _hanging(down: Floats) -> Floats:

@@ -10,8 +10,8 @@ class FeetLaw(StrEnum):
     """Equations of the feet."""
 
     PRINTED = "printed"
-    """Eq. 9 and 10 as printed."""
+    """The law of Eq. 9 and 10 as printed."""
     PHASES = "phases"
     """Eq. 9 and 10, the feet half a cycle apart and never below the ground."""
     PLANTED = "planted"
-    """In addition a foot keeps its place while it is on the ground."""
+    """The law of Eq. 9 and 10 with feet that keep their place while they are on the ground."""

@@ -28,7 +28,7 @@ from snakewalk.controller.images.mesh import Mesh
 _ROWS = 3
 """Rows of the mesh from one curve to the next."""
 _BANDS = {"trunk": (0.0, 0.4), "arm": (0.4, 0.6), "leg": (0.6, 0.8), "shoe": (0.8, 1.0)}
-"""Where the parts lie in the texture, along u."""
+"""Ranges of the texture, along u, of the parts of the body."""
 _SKIN = (222, 178, 148)
 _HAIR = (70, 46, 32)
 _SHIRT = (52, 104, 150)

@@ -46,7 +46,6 @@ def draw_animal(animal_motion: SynthesisedAnimal, file: Path, title: str) -> Non
         _contacts(chart, animal_motion)
         _feet(feet, animal_motion.animal)
         _heights(height, animal_motion)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

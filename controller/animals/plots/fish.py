@@ -48,7 +48,6 @@ def draw_match(
             postures.angles_rad.shape[1], 1, sharex=True, sharey=True, squeeze=False
         )
         _angles(list(rows[:, 0]), postures, true_postures)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

@@ -35,7 +35,6 @@ def draw_synthesis(file: Path, motion: SynthesisedMotion, options: SynthesisOpti
         _pieces(left, motion)
         _graph(right, motion)
         _path(lower.subplots(1, 1), motion, options)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

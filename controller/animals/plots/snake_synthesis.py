@@ -64,7 +64,6 @@ def draw_walk(walk: SynthesisedWalk, ground: HeightField | None, file: Path, tit
         axes.set_ylim(low[1], high[1])
         _map(axes, walk, ground, title)
         _over_time(lower.subplots(4, 2, sharex=True).T.ravel(), walk)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

@@ -33,7 +33,6 @@ def draw_stride(stride: Stride, file: Path, title: str) -> None:
         figure.suptitle(title)
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

@@ -27,7 +27,7 @@ class FilmStates:
     """
 
     states: Complexes
-    """(S, n)"""
+    """(S, n) states of the recording."""
     frame: Ints
     """(S,) number of the frame, increasing."""
     pulse_points: Floats

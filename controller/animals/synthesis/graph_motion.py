@@ -27,7 +27,7 @@ straight, because neighbouring states differ little at the head."""
 def leading(points: int) -> Floats:
     """m(s_k) of Eq. 9, (points,): 1 at the head, 0 from ``HEAD_SHARE`` on."""
     along = np.arange(points) / (HEAD_SHARE * points)
-    return np.asarray(1.0 - smoothstep.cubic(np.clip(along, 0.0, 1.0)))
+    return 1.0 - smoothstep.cubic(np.clip(along, 0.0, 1.0))
 
 
 def handed_down(wanted_rad: Floats, before_rad: Floats, m: Floats) -> Floats:

@@ -55,29 +55,29 @@ class SynthesisedWalk:
     """A motion over a world, and how it came about."""
 
     plan: Locomotion
-    """In the plane: [PT]'s prototype."""
+    """Motion in the plane: [PT]'s prototype."""
     skeleton: GroundedSkeleton
-    """On the ground."""
+    """Skeleton on the ground of the world."""
     half_height_m: Floats
     """(N + 1,) radius of the body at the skeleton's points."""
     rate_hz: float
     path: SplinePath
     targets: Targets
     states: list[tuple[int, int]]
-    """(frame, state) of each decision."""
+    """Frame and state of each decision."""
     library: StateLibrary
     sliding: Floats
-    """(T, N) w_d."""
+    """(T, N) sliding w_d along the body: share of the pulse that is lost."""
     pulse_m_s: Floats
-    """(T, N) g."""
+    """(T, N) pulse speed g along the body, m/s."""
     head_held: Floats
-    """(T,)"""
+    """(T,) share of the body's mean heading in the head and neck, 0 to 1."""
     calm_tail: Floats
-    """(T,)"""
+    """(T,) share by which the bends of the tail are flattened, 0 to 1."""
     tongue: Floats
-    """(T,) heights, 0 drawn in, 1 out."""
+    """(T,) position of the tongue: 0 drawn in, 1 out."""
     tongue_evidence: str
-    """measured or assumed, and the source."""
+    """Evidence of the tongue's motion: measured or assumed, and the source."""
 
     @property
     def complete(self) -> bool:

@@ -37,11 +37,11 @@ class Behaviour:
     sliding: Schedule = 0.0
     """w_d in 0..1: share of the pulse that is lost. At 1 the shape is frozen."""
     pulse_m_s: Schedule = 0.0
-    """g of Eq. 13, added to the speed of the body."""
+    """Pulse speed g of Eq. 13, added to the speed of the body."""
     head_held: Schedule = 0.0
-    """0..1: share of the body's mean heading in the head and neck (ours)."""
+    """Share of the body's mean heading in the head and neck, 0 to 1 (ours)."""
     calm_tail: Schedule = 0.0
-    """0..1: how far the bends of the tail are flattened (ours)."""
+    """Share by which the bends of the tail are flattened, 0 to 1 (ours)."""
 
     def __post_init__(self) -> None:
         if isinstance(self.sliding, float | int) and not 0.0 <= self.sliding <= 1.0:
@@ -112,7 +112,7 @@ class Sampling(NamedTuple):
     dt_s: float
     """Time between frames."""
     segment_m: float
-    """r, the body's length over N."""
+    """Length r of a segment: the body's length over N."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class Start:
     heading_rad: float = 0.0
     """Rotation from the track's angles to the world."""
     speed_m_s: float = 0.0
-    """v."""
+    """Speed v of the body."""
 
 
 def synthesise(
@@ -287,19 +287,19 @@ class Targets:
         self.points_m = np.empty((0, 2))
         """(L, 2); after a miss, the reached ones and those of the new path."""
         self.required = np.empty(0, dtype=bool)
-        """(L,) whether each is a waypoint."""
+        """(L,) whether each control point is a waypoint."""
         self._marks_m: list[float] = []
         self._ahead: list[tuple[float, float]] = []
         self._planned: list[tuple[int, SplinePath]] = []
         self.current: list[int] = []
-        """n at each frame."""
+        """Number n of the current control point at each frame."""
         self._extend(path, waypoints_m)
         self.index = 0
-        """n, from 0; L when all are reached."""
+        """Number n of the current control point, from 0; L when all are reached."""
         self.missed = 0
         """Number of waypoints passed by, after which a new path was planned."""
         self.distance_m: list[float] = []
-        """D_n at each frame, to the target after it."""
+        """Distance D_n to the next target at each frame."""
 
     def _extend(self, path: SplinePath, waypoints_m: Floats) -> None:
         """Go on along a path through waypoints (W, 2)."""

@@ -32,10 +32,10 @@ class TongueRecord:
     """Heights of a tongue over time, to learn from."""
 
     heights: Floats
-    """(T,) 0 drawn in, 1 out."""
+    """(T,) position of the tongue: 0 drawn in, 1 out."""
     rate_hz: float
     evidence: str
-    """measured, by a file; or assumed."""
+    """Evidence of the motion: measured, by a file; or assumed."""
     source: str
 
     @classmethod

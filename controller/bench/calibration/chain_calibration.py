@@ -38,9 +38,9 @@ from snakewalk.drivers.protocol.control_table import model_of
 CURRENT_A = 0.3
 """Goal current by default, A: an XM430 turns with an eighth of its stall torque (ours)."""
 BEYOND_RAD = 0.25
-"""How far beyond the limit of the robot the sweep looks for a stop (ours)."""
+"""Angle beyond the robot's limit up to which the sweep looks for a stop (ours)."""
 MARGIN_RAD = 0.1
-"""How far before a stop the limit is set; the simulator's stops are as far beyond limits (ours)."""
+"""Distance of the limit from the stop; the simulator's stops are as far beyond limits (ours)."""
 LEAST_LIMIT_RAD = 0.1
 """A joint with less range is of no use (ours)."""
 _SCANS = 3
@@ -73,7 +73,7 @@ class ChainCalibration:
 
     robot: RobotConfig
     ranges: tuple[JointRange, ...]
-    """One value per joint, head first; empty if no range was swept."""
+    """Range of each joint, head first; empty if no range was swept."""
     notes: tuple[str, ...]
     """Joints to look at: those with less range than the others, or without a stop."""
 

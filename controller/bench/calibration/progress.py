@@ -12,7 +12,7 @@ from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 
 
 class SeenBend(Strict):
@@ -23,14 +23,15 @@ class SeenBend(Strict):
     direction: Literal[1, -1] = Field(
         description="1 if the joint turns like the servo, -1 if it turns the other way"
     )
-    """1: first it bent the head side to the left (yaw), or lifted it (pitch); -1: the other way."""
+    """Direction of the first motion; 1: the head side was bent to the left (yaw) or lifted (pitch);
+    -1: the other way."""
 
 
 class JointRange(Strict):
     """Angles at which a joint met its stops."""
 
     low_rad: float | None = Field(description="lowest angle; none: not measured")
-    """None: not within ``BEYOND_RAD`` of the robot's limit."""
+    """Lowest angle of the joint; None: not within ``BEYOND_RAD`` of the robot's limit."""
     high_rad: float | None = Field(description="highest angle; none: not measured")
 
 
@@ -92,7 +93,7 @@ class ProgressFile:
 
     def __init__(self, robot_file: Path) -> None:
         self.path = robot_file.with_name(f"{robot_file.name}.part")
-        """``my-robot.toml.part``."""
+        """Path of the saved progress: ``my-robot.toml.part``."""
 
     def start(self, robot: RobotConfig, *, resume: bool, force: bool) -> Journal:
         """Return the journal to continue, or an empty one, which saves to the file.
@@ -127,8 +128,7 @@ class ProgressFile:
         """Write the file, whole or not at all; without an answer there is nothing to keep."""
         if not progress.bends:
             return
-        with atomic_write(self.path) as part:
-            part.write_text(progress.model_dump_json(indent=1), encoding="utf-8")
+        write_result(self.path, progress.model_dump_json(indent=1))
 
     def remove(self) -> None:
         """Delete the file: the robot's file holds everything."""

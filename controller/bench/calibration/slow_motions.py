@@ -35,7 +35,7 @@ from snakewalk.drivers.safety.vet import stale_fault
 from snakewalk.drivers.types import JointCommand, JointState
 
 WIGGLE_RAD = 0.25
-"""How far a joint is wiggled (ours)."""
+"""Amplitude with which a joint is wiggled (ours)."""
 WIGGLE_S = 0.8
 """Duration of the way there, and of the way back (ours)."""
 MOVED_SHARE = 0.5
@@ -52,7 +52,7 @@ STOP_EFFORT = 0.8
 STOP_S = 0.2
 """... for this time, s, has met its stop (ours)."""
 REST_S = 0.3
-"""How long a joint may come to rest before the next moves, s (ours)."""
+"""Longest time for a joint to come to rest before the next moves, s (ours)."""
 RANGE_RAD = 3.1
 """A servo knows one turn only."""
 BUS_TRIES = 6

@@ -11,7 +11,7 @@ from snakewalk.controller.bench.eeprom_backup import back_up_all, backup_text
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import ChainPort, Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 
 
 @command(
@@ -29,6 +29,5 @@ def backup(
     """Write the EEPROM of all servos on the bus into a file; changes nothing."""
     with open_lines(port, baud) as lines:
         backup_data = back_up_all(lines, lambda step: typer.echo(step, err=True))
-    with atomic_write(out) as part:
-        part.write_text(backup_text(backup_data), encoding="utf-8")
+    write_result(out, backup_text(backup_data))
     show({"servos": [servo.id for servo in backup_data.servos], "backup": str(out)}, as_json)

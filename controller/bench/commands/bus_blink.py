@@ -11,7 +11,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import ChainPort, Json, show
 
 _BLINK_S = 0.3
-"""How long a LED is on, and then off."""
+"""Time for which a LED is on, and then off."""
 
 
 @command("bus blink", examples=("bus blink --id 7 --times 10",))

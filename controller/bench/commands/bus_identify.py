@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
@@ -14,8 +13,8 @@ from snakewalk.controller.bench.commands.bus_options import Bauds
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import ChainPort, Force, Json, console
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.options import ChainPort, Force, Json, console, print_table
+from snakewalk.controller.console.result_files import write_result
 
 
 @command(
@@ -65,14 +64,13 @@ def bus_identify(
         text = inventory.robot_skeleton(
             out.stem, [entry for _, entry in entries], segments if lines.several else (), axes=axes
         )
-        with atomic_write(out) as part:
-            part.write_text(text, encoding="utf-8")
+        write_result(out, text)
     if as_json:
         servos = [entry.to_dict() | {"port": name} for name, entry in entries]
         print(json.dumps({"port": lines.port, "servos": servos, "robot": out and str(out)}))
         return
     heads = ("ID", "model", "firmware", "baud", "volt", "Celsius", "torque", "fault")
-    table = Table(*heads, *(["port"] if lines.several else []), box=None)
+    rows = []
     for name, entry in entries:
         servo = entry.found
         state = entry.report
@@ -81,10 +79,8 @@ def bus_identify(
             torque = "on" if state.torque_on else "off"
             state_told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
         about = (servo.servo_id, servo.model, servo.firmware, servo.baud)
-        table.add_row(
-            *map(str, about), *state_told, entry.fault, *([name] if lines.several else [])
-        )
-    console.print(table)
+        rows.append((*about, *state_told, entry.fault, *([name] if lines.several else [])))
+    print_table((*heads, *(["port"] if lines.several else [])), rows)
     if out is not None:
         console.print(
             f"robot {out}: check its joint_axes, then: snakewalk bus calibrate --robot {out}"

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.config.errors import InputError
@@ -14,7 +13,7 @@ from snakewalk.controller.bench.eeprom_backup import RestoreJournal, load_backup
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.bench.servo_settings import apply
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import ChainPort, Json, console
+from snakewalk.controller.console.options import ChainPort, Json, console, print_table
 
 
 @command(
@@ -47,13 +46,15 @@ def restore(
         buses = {restored_id: lines.open_servo(restored_id) for restored_id in chosen_ids}
         changed = plan_all(buses, servos)
         if not as_json:
-            table = Table("ID", "register", "now", "then", box=None)
-            for restored_id, changes in changed.items():
-                for change in changes:
-                    table.add_row(
-                        str(restored_id), change.register, str(change.before), str(change.after)
-                    )
-            console.print(table if changed else "nothing to restore")
+            rows = [
+                (restored_id, change.register, change.before, change.after)
+                for restored_id, changes in changed.items()
+                for change in changes
+            ]
+            if rows:
+                print_table(("ID", "register", "now", "then"), rows)
+            else:
+                console.print("nothing to restore")
         written = (
             bool(changed)
             and not dry_run

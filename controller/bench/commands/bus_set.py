@@ -4,7 +4,6 @@ import json
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench.commands.bus_options import Baud, DryRun, Yes, confirmed
@@ -18,7 +17,7 @@ from snakewalk.controller.bench.servo_settings import (
     plan,
 )
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import ChainPort, Json, console
+from snakewalk.controller.console.options import ChainPort, Json, console, print_table
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.registers import BAUDS
 
@@ -102,7 +101,7 @@ def _show(servo_id: int, model: str, changes: tuple[SettingChange, ...]) -> None
     if not changes:
         console.print(f"servo {servo_id} ({model}): nothing to change")
         return
-    table = Table(f"servo {servo_id} ({model})", "now", "then", "", box=None)
-    for change in changes:
-        table.add_row(change.register, str(change.before), str(change.after), change.meaning)
-    console.print(table)
+    print_table(
+        (f"servo {servo_id} ({model})", "now", "then", ""),
+        ((change.register, change.before, change.after, change.meaning) for change in changes),
+    )

@@ -3,14 +3,13 @@
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import PowerConfig
 from snakewalk.controller.bench.cable_drop import CONTACT_LIMIT_A, best_injection, drop_along
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
-from snakewalk.controller.console.options import Json, RobotName, console, show
+from snakewalk.controller.console.options import Json, RobotName, print_table, show
 from snakewalk.sim.servo.supply import Cabling
 
 
@@ -66,10 +65,7 @@ def power(
     show(facts | ({"servos": rows} if as_json else {}), as_json)
     if as_json:
         return
-    table = Table("ID", "V", "cable behind it, A", box=None)
-    for row in rows:
-        table.add_row(*("" if value is None else str(value) for value in row.values()))
-    console.print(table)
+    print_table(("ID", "V", "cable behind it, A"), (row.values() for row in rows))
     if low_v < robot.servo.supply_limits_v[0]:
         LOGGER.warning("a run stops below %.1f V", robot.servo.supply_limits_v[0])
     if most_a > CONTACT_LIMIT_A:

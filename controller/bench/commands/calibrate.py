@@ -22,7 +22,7 @@ from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.port.network_port import open_port
@@ -184,8 +184,7 @@ def _saved(answers: ProgressFile) -> Iterator[None]:
 
 
 def _write(out: Path, text: str) -> None:
-    with atomic_write(out) as part:
-        part.write_text(text, encoding="utf-8")
+    write_result(out, text)
 
 
 def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:

@@ -2,15 +2,13 @@
 
 import json
 
-from rich.table import Table
-
 from snakewalk.config.constants import DEFAULT_BAUD
 from snakewalk.controller.bench import scan as scanning
 from snakewalk.controller.bench.commands.bus_options import Bauds
 from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER, stderr_console
-from snakewalk.controller.console.options import ChainPort, Json, console
+from snakewalk.controller.console.options import ChainPort, Json, console, print_table
 
 
 @command("bus scan", examples=("bus scan", "bus scan --port /dev/ttyUSB0 --baud 57600 --json"))
@@ -55,11 +53,12 @@ def scan(
 
 def _print_servos(results: list[tuple[str, scanning.ScanResult]], several: bool) -> None:
     """Print a table, with the port if there are ``several``."""
-    table = Table("ID", "model", "firmware", "baud", *(["port"] if several else []), box=None)
-    for name, servo in results:
-        shown = (servo.servo_id, servo.model, servo.firmware, servo.baud)
-        table.add_row(*map(str, shown), *([name] if several else []))
-    console.print(table)
+    heads = ("ID", "model", "firmware", "baud", "port")
+    rows = [
+        (servo.servo_id, servo.model, servo.firmware, servo.baud, name) for name, servo in results
+    ]
+    count = 5 if several else 4
+    print_table(heads[:count], (row[:count] for row in rows))
     for _, servo in results:
         if servo.secondary_id is not None:
             console.print(

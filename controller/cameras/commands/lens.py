@@ -31,7 +31,7 @@ from snakewalk.drivers.clock import WallClock
 
 _ENDINGS = (".yml", ".yaml", ".xml", ".json")
 _PAUSE_S = 0.7
-"""Between pictures of a device: time to move the board."""
+"""Time between pictures of a device, in which a user moves the board."""
 
 
 @command(

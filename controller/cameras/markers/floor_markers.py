@@ -42,10 +42,10 @@ class FloorFit:
     floor_from_px: Floats
     """(3, 3) homography of pixels without distortion to metres."""
     residual_m: Mapping[int, float]
-    """By marker: how far its middle lies from where it was measured. Four markers without a lens
-    fit always."""
+    """Distance of each marker's middle from its measured place. Four markers without a lens fit
+    always."""
     side_m: Mapping[int, float]
-    """By marker: its side as the homography has it."""
+    """Side of each marker according to the homography."""
     lens_m: Floats | None
     """(3,) where the camera's lens is, where its matrix is known."""
 
@@ -60,7 +60,7 @@ class Bump:
     """Move of a camera's picture since its set-up."""
 
     shift_px: tuple[float, float]
-    """x, y: of the picture's middle."""
+    """Shift of the picture's middle in x and y."""
     turn_rad: float = 0.0
     """Turn of the picture, clockwise for the viewer."""
     left_out: tuple[int, ...] = ()
@@ -325,7 +325,7 @@ def _pose(floor: Floats, px: Floats, matrix: Floats) -> tuple[Floats, Floats]:
 def _over_floor(pose: tuple[Floats, Floats], matrix: Floats) -> Floats:
     """(3, 3) pixels from floor."""
     rotation, shift = pose
-    return np.asarray(matrix @ np.column_stack([rotation[:, :2], shift]))
+    return matrix @ np.column_stack([rotation[:, :2], shift])
 
 
 def middle_of(corners: Floats) -> Floats:

@@ -21,7 +21,7 @@ class TagPicture:
     """The tags of one picture."""
 
     time_s: float
-    """When the picture was taken."""
+    """Time at which the picture was taken."""
     corners_px: Corners
 
 

@@ -43,9 +43,9 @@ class HeadFit:
     """Pose of the head link in the world, from one picture."""
 
     position_m: Floats
-    """(3,)"""
+    """(3,) position of the head link in the world, m."""
     rotation: Floats
-    """(3, 3)"""
+    """(3, 3) axes of the head link in the world, in columns."""
     covariance: Floats
     """(6, 6) of position (m) and of rotations about the world's axes (rad)."""
     error_px: float
@@ -60,7 +60,7 @@ class _Seen:
 
     tags: tuple[int, ...]
     points_m: Floats
-    """(4 k, 3)"""
+    """(4 k, 3) corners of the tags in the head's axes, m."""
     pixels: Floats
     """(4 k, 2) without distortion."""
 
@@ -198,7 +198,7 @@ class TagFit:
         places = sighting.points_m @ turn.T + place_m
         ahead = np.maximum(places[:, 2:], _NEAR_M)
         shown = places[:, :2] / ahead @ self.view.lens.matrix[:2, :2].T
-        return np.asarray(shown + self.view.lens.matrix[:2, 2] - sighting.pixels)
+        return shown + self.view.lens.matrix[:2, 2] - sighting.pixels
 
     def _slope(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
         """Derivatives (8 k, 6) by position and rotation, in the camera's axes."""

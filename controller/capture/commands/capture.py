@@ -5,13 +5,19 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.controller.capture.capturing import capture_recording, correct_recording
 from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import FilmRate, Force, Json, console, show
+from snakewalk.controller.console.options import (
+    FilmRate,
+    Force,
+    Json,
+    console,
+    print_table,
+    show,
+)
 
 Footage = Annotated[
     Path,
@@ -189,19 +195,17 @@ def show_several(facts: AnimalsFacts, *, as_json: bool) -> None:
 
 def _print_animals(facts: AnimalsFacts) -> None:
     """One row for each animal."""
-    table = Table(title=f"{facts.recording}: {facts.frames} frames", title_justify="left", box=None)
+    rows: list[tuple[object, ...]] = []
     heads = ("animal", "track", "frames used", "in contact", "length, px", "identity uncertain")
-    for head in heads:
-        table.add_column(head)
     for animal in facts.animals:
         after = ", ".join(map(str, animal.identity_uncertain_after))
         unsure = f"after frame {after}" if after else "no"
         if animal.capture is None:
-            table.add_row(str(animal.animal), "-", "0", "-", "-", unsure)
+            rows.append((animal.animal, "-", 0, "-", "-", unsure))
             continue
         used = animal.capture.frames_used
         length = f"{animal.capture.length_px:g}"
-        merged = str(animal.frames_merged)
-        table.add_row(str(animal.animal), animal.capture.track, str(used), merged, length, unsure)
-    console.print(table)
+        merged = animal.frames_merged
+        rows.append((animal.animal, animal.capture.track, used, merged, length, unsure))
+    print_table(heads, rows, f"{facts.recording}: {facts.frames} frames")
     console.print(f"other objects, not captured: {facts.left_out}; background: {facts.background}")

@@ -54,7 +54,6 @@ def draw_analysis(analysis: Analysis, file: Path) -> None:
             for axes in (speeds, errors, against):
                 axes.set_axis_off()
             speeds.text(0.0, 0.5, f"pulse speed unknown:\n{unknown}", fontsize=9, wrap=True)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

@@ -34,7 +34,6 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
             body_map(figure, right, track, swing, "tangent angle (rad)")
             right.set_title("angle about the mean heading")
             left.set_title(caption)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)
 
 

@@ -38,7 +38,8 @@ class AnimalsFound:
     """The animals of a film."""
 
     identities: tuple[Identity, ...]
-    """In the order of their tracks: from left to right where they are first seen."""
+    """Identities of the animals in the order of their tracks: from left to right where they are
+    first seen."""
     left_out: int
     """Blobs that were followed, but not long enough for an animal."""
     usual_px: float

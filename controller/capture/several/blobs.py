@@ -31,7 +31,7 @@ class Blobs:
     boxes: Ints
     """(n, 4) left, top, width, height, px."""
     area_px: Floats
-    """(n,)"""
+    """(n,) areas of the blobs, px."""
     middle_px: Floats
     """(n, 2) x, y of the centroid."""
     shape: Floats
@@ -219,4 +219,4 @@ def others_mask(blobs: Blobs, number: int, window: tuple[slice, slice], reach_px
         return np.zeros(label.shape, dtype=bool)
     box = np.ones((2 * reach_px + 1, 2 * reach_px + 1), np.uint8)
     near_own = cv2.dilate(is_blob.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return np.asarray((cv2.dilate(other, box) > 0) & ~near_own)
+    return (cv2.dilate(other, box) > 0) & ~near_own

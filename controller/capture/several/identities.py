@@ -78,7 +78,8 @@ class _Link:
 
 
 _Costs = dict[int, dict[int, float]]
-"""By end and later start, numbers of tracklets; a missing pair cannot be the same animal."""
+"""Costs by the numbers of two tracklets, end and later start; a missing pair cannot be the same
+animal."""
 
 
 def identities_of(tracklets: Sequence[Tracklet]) -> list[Identity]:

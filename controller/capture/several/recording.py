@@ -48,7 +48,7 @@ class AnimalFacts:
     identity_uncertain_after: tuple[int, ...]
     """Frames after which it may be another animal."""
     capture: CaptureFacts | None
-    """None: it has no track; ``fault`` says why."""
+    """Facts of the capture; None: the animal has no track, and ``fault`` says why."""
     fault: str | None
 
 

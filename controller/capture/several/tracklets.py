@@ -30,11 +30,11 @@ class Tracklet:
     """One animal alone, in consecutive frames."""
 
     begins_in: int | None
-    """The crossing that it comes from; None: it appears."""
+    """Crossing from which the tracklet comes; None: it appears."""
     ends_in: int | None = None
-    """The crossing that it goes to; None: it vanishes."""
+    """Crossing to which the tracklet goes; None: it vanishes."""
     first: int = 0
-    """The first of its frames, which have no gap."""
+    """First frame of the tracklet; its frames have no gap."""
     blobs: "array[int]" = field(default_factory=lambda: array("H"))
     """Number of the blob in each of these frames, from 0."""
     area_px: float = 0.0
@@ -166,7 +166,7 @@ class TrackletBuilder:
                 nearest = int(np.argmin(away[lone]))
                 if int(np.argmin(away[:, nearest])) == lone:
                     links[lone, nearest] = True
-        return np.asarray(links)
+        return links
 
     def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
         """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""

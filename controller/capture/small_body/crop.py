@@ -27,7 +27,7 @@ class Crop:
     image: DeepImage
     ground: DeepImage
     origin_px: tuple[int, int]
-    """x, y of its first pixel."""
+    """Position x, y of the crop's first pixel."""
 
     def shows(self, points_px: Floats) -> bool:
         """Whether any of (P, 2) points lies in it."""
@@ -165,9 +165,9 @@ class View:
     picture: Floats
     """(h, w) contrast, above 0 where the body is."""
     use: Floats
-    """(h, w) 1 near the body."""
+    """(h, w) 1 near the body, 0 elsewhere."""
     first: tuple[int, int]
-    """x, y of the first pixel on the working grid."""
+    """Position x, y of the first pixel on the working grid."""
     start: Floats
     """(FRAME,) a first guess; places relative to the first pixel."""
 

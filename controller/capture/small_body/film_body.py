@@ -56,7 +56,7 @@ class Fit:
     """One frame fitted with a known body."""
 
     frame: Floats
-    """(FRAME,)"""
+    """(FRAME,) parameters of the body in the frame."""
     noise: float
     """Standard deviation of the residual, raised where its neighbouring pixels correlate."""
     inverse: Floats
@@ -265,7 +265,7 @@ def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:
     """(FRAME + body + 1, pixels) slopes, and the residual last."""
     shown, slopes = ribbon.picture(frame, body, patch.picture.shape)
     rows = np.concatenate([slopes, (patch.picture - shown)[None]]) * patch.use
-    return np.asarray(rows.reshape(len(rows), -1))
+    return rows.reshape(len(rows), -1)
 
 
 def _eliminated(

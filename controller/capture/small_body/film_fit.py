@@ -66,7 +66,7 @@ class FittedFilm:
     expected_px: Floats
     """(T,) expected mean error of a point; NaN without a fit."""
     body: FilmBody | None
-    """None without a fit: the bodies are long against their blur, or too few."""
+    """Body of the film; None without a fit: the bodies are long against their blur, or too few."""
 
 
 def fit_film(
@@ -324,9 +324,9 @@ class FilmGround:
     """Contrast of the bare ground of a film on the working grid."""
 
     pattern: Floats
-    """(H, W)"""
+    """(H, W) contrast of the bare ground."""
     first: tuple[int, int]
-    """x, y of its first pixel."""
+    """Position x, y of the pattern's first pixel."""
 
     @classmethod
     def of(cls, views: Mapping[int, View], fits: Mapping[int, Fit], body: FilmBody) -> "FilmGround":
@@ -359,4 +359,4 @@ class FilmGround:
         rows, columns = view.picture.shape
         cover = Ribbon(body.grid).cover(fit.frame, body.values, view.picture.shape)
         visible_pattern = self.pattern[y : y + rows, x : x + columns]
-        return np.asarray(visible_pattern * np.clip(1.0 - cover, 0.0, 1.0))
+        return visible_pattern * np.clip(1.0 - cover, 0.0, 1.0)

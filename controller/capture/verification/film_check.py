@@ -153,7 +153,7 @@ def _along_a_ray(rings: Floats) -> Floats:
     """(2,) contrast that goes on through all rings (2, rings, angles) in one direction."""
     is_known: Bools = np.asarray(np.isfinite(rings).any(axis=2))
     lowest = np.nanmin(np.where(is_known[..., None], rings, np.inf), axis=1)
-    return np.asarray(np.where(is_known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan))
+    return np.where(is_known.sum(axis=1) >= 3, lowest.max(axis=1), np.nan)
 
 
 def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:

@@ -16,9 +16,9 @@ class CutOut:
     """A part of a frame."""
 
     image: DeepImage
-    """(h, w[, C])"""
+    """(h, w[, C]) pixels of the cut-out."""
     origin_px: tuple[int, int]
-    """x, y of its first pixel."""
+    """Position x, y of the cut-out's first pixel."""
 
 
 @dataclass(slots=True)

@@ -88,7 +88,7 @@ def _squares(places: Floats, line: Floats) -> Floats:
     """(P, A, Q) squared distances of places (P, A, 2) from the points of a line (Q, 2)."""
     x = places[..., 0, None] - line[:, 0]
     y = places[..., 1, None] - line[:, 1]
-    return np.asarray(x * x + y * y)
+    return x * x + y * y
 
 
 def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floats) -> Floats:

@@ -10,7 +10,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, RobotName, show
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.exchange.robot_export import CONTACT_NOTES, mjcf_text, urdf_text
 
 
@@ -71,8 +71,7 @@ def export_robot(
         require_extra("MuJoCo models need", "mujoco")
         texts[mjcf] = mjcf_text(robot, actuators, contact or "rollers")
     for path, text in texts.items():
-        with atomic_write(path) as part:
-            part.write_text(text, encoding="utf-8")
+        write_result(path, text)
     result = {"robot": robot.name, "urdf": urdf and str(urdf), "mjcf": mjcf and str(mjcf)}
     if mjcf is not None:
         result["contact"] = CONTACT_NOTES[contact or "rollers"]

@@ -9,7 +9,7 @@ from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.template import robot_toml
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Assume, Force, Json, console, show
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.exchange.robot_import import robot_import
 
 
@@ -51,8 +51,7 @@ def import_robot(
     joints = ", ".join(imported.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
     comment += [f"- {note}" for note in imported.notes]
-    with atomic_write(out) as part:
-        part.write_text(robot_toml(imported.robot, "\n".join(comment)), encoding="utf-8")
+    write_result(out, robot_toml(imported.robot, "\n".join(comment)))
     facts: dict[str, object] = {
         "robot": str(out),
         "joints": imported.robot.joint_count,

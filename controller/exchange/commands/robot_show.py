@@ -1,10 +1,8 @@
 """``snakewalk robot show``: a robot in figures."""
 
-from rich.table import Table
-
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, RobotName, console, show
+from snakewalk.controller.console.options import Json, RobotName, print_table, show
 
 
 @command("robot show", examples=("robot show alternating16", "robot show my.toml"))
@@ -52,7 +50,5 @@ def show_robot(name: RobotName, as_json: Json = False) -> None:
     show(facts | ({"joints": joints, "each_link": links} if as_json else {}), as_json)
     for rows in () if as_json else (joints, links):
         if rows:
-            table = Table(*(key.replace("_", " ") for key in rows[0]), box=None)
-            for row in rows:
-                table.add_row(*map(str, row.values()))
-            console.print(table)
+            heads = (key.replace("_", " ") for key in rows[0])
+            print_table(heads, (row.values() for row in rows))

@@ -26,7 +26,7 @@ class Hinge:
 
     name: str
     joint: int
-    """In the model."""
+    """Number of the joint in the model."""
     anchor_m: Floats
     axis: Floats
 
@@ -37,7 +37,7 @@ class MovingBody:
 
     name: str
     bodies: list[int]
-    """In the model; empty between two hinges of one body."""
+    """Numbers of the bodies in the model; empty between two hinges of one body."""
     hinges: list[Hinge] = field(default_factory=list)
     parent: "MovingBody | None" = None
     children: list["MovingBody"] = field(default_factory=list)

@@ -135,9 +135,9 @@ def _up(
         if max(upright) <= math.sqrt(0.5):
             notes.append(f"no axis is vertical in the model: that of {name} is taken as yaw")
             up = axes[0]
-        return np.asarray(up * math.copysign(1.0, float(up[2]) or 1.0))
+        return up * math.copysign(1.0, float(up[2]) or 1.0)
     if abs(float(forward[2])) > math.sqrt(0.5):
         notes.append("the body stands upright in the model: its joints are taken as yaw")
         return first
     up = np.cross(forward, first)
-    return np.asarray(up * math.copysign(1.0, float(up[2])))
+    return up * math.copysign(1.0, float(up[2]))

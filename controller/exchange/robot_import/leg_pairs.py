@@ -44,7 +44,7 @@ class _Leg:
     signs: list[int]
     limits_rad: list[float]
     ahead_m: float
-    """Distance ahead of its link's middle."""
+    """Distance of the leg ahead of its link's middle."""
 
 
 def leg_pairs(

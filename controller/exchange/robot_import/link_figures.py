@@ -29,7 +29,7 @@ _THINNEST = 0.05
 _THICKEST = 1.0
 """Radius over length of a mean link: an inertia that asks for another is a placeholder (ours)."""
 _ASSUMED_RADIUS: Final = 0.4
-"""The same of links of which nothing states a thickness (ours)."""
+"""Radius over length of links without a stated thickness (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class LinkFigures:
 
     length_m: float
     mass_kg: float
-    """0 for a link between two hinges of one body."""
+    """Mass of the link; 0 between two hinges of one body."""
     radius_m: float
     offset: float
     """Distance of the centre of mass from the middle over the length."""

@@ -47,7 +47,7 @@ _NEXT_TO_NOTHING_KG: Final = 2e-4
 _POSES: Final = 20
 _TORQUE_N_M = (0.1, 100.0)
 _SPEED_RAD_S = (0.1, 20.0)
-"""Beyond these, a stated limit is a placeholder (ours)."""
+"""Limits of torque and speed beyond which a stated limit is a placeholder (ours)."""
 _HELD_SHARE: Final = 2.0 / 2.3
 """Share of a servo's stall torque, up to which a run goes on: as for its current (ours)."""
 _LENGTH_M = (0.0, 1.0)
@@ -62,7 +62,7 @@ class ImportedRobot:
 
     robot: RobotConfig
     joint_names: tuple[str, ...]
-    """As the model has them, in the order of the servos' IDs."""
+    """Names of the joints in the model, in the order of the servos' IDs."""
     notes: tuple[str, ...]
     """Parts that were dropped, changed or assumed."""
     kinematics_error_m: float
@@ -399,4 +399,4 @@ def _on_line_m(hinges: list[Hinge], directions: ChainDirections, index: int) -> 
         ]
         if some:
             place = place + float(np.median(some)) * aside
-    return np.asarray(place)
+    return place

@@ -14,7 +14,7 @@ from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, Workers, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.learning.wave_search import (
     SearchProgress,
     search_progress,
@@ -70,8 +70,7 @@ def learn_policy(
         )
 
     def save(progress: SearchProgress) -> None:
-        with atomic_write(part_file) as part:
-            part.write_text(progress.model_dump_json(indent=1), encoding="utf-8")
+        write_result(part_file, progress.model_dump_json(indent=1))
         note = f"{fmean(progress.rewards_m[-1]):.2f} m an episode"
         bar.update(len(progress.rewards_m), note=note)
 
@@ -85,8 +84,7 @@ def learn_policy(
             if part_file.exists():
                 stop.add_note(f"{part_file}: holds the generations so far; continue by --resume")
             raise
-    with atomic_write(out) as part:
-        part.write_text(policy.toml(), encoding="utf-8")
+    write_result(out, policy.toml())
     part_file.unlink(missing_ok=True)
     console.print(f"{out}: {policy.origin.steps} steps in all; snakewalk gait policy run {out}")
 

@@ -2,11 +2,9 @@
 
 import json
 
-from rich.table import Table
-
 from snakewalk.config.loader import shipped
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, console
+from snakewalk.controller.console.options import Json, print_table
 from snakewalk.controller.motion.policy import load_policy
 
 
@@ -26,23 +24,11 @@ def list_policies(as_json: Json = False) -> None:
         ]
         print(json.dumps({"policies": rows}))
         return
-    table = Table(box=None, pad_edge=False)
-    for title in (
-        "policy",
-        "robot",
-        "world",
-        "law",
-        "learnt by",
-        "seed",
-        "steps",
-        "Hz",
-        "made with",
-    ):
-        table.add_column(title, justify="right" if title in {"seed", "steps", "Hz"} else "left")
+    lines = []
     for policy in policies:
         origin = policy.origin
         hz = "changing" if policy.network else f"{policy.wave.frequency_hz:.2f}"
-        ground = (origin.world, origin.law)
-        numbers = (str(origin.seed), str(origin.steps), hz)
-        table.add_row(policy.name, policy.robot, *ground, origin.method, *numbers, origin.software)
-    console.print(table)
+        learnt = (origin.world, origin.law, origin.method, origin.seed, origin.steps)
+        lines.append((policy.name, policy.robot, *learnt, hz, origin.software))
+    heads = ("policy", "robot", "world", "law", "learnt by", "seed", "steps", "Hz", "made with")
+    print_table(heads, lines)

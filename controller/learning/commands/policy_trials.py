@@ -7,7 +7,6 @@ from statistics import fmean, stdev
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console import completion
@@ -18,7 +17,7 @@ from snakewalk.controller.console.options import (
     RunSeconds,
     Seeds,
     Workers,
-    console,
+    print_table,
 )
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.learning import policy_trials as study
@@ -80,8 +79,7 @@ def policy_trials(
         trials = [asdict(trial) | asdict(result) for trial, result in trial_results]
         print(json.dumps({"table": [asdict(row) for row in table], "trials": trials}))
         return
-    grid = Table(box=None, pad_edge=False)
-    for title in (
+    heads = (
         "motion",
         "world",
         "m/s",
@@ -91,11 +89,8 @@ def policy_trials(
         "course\nrad",
         "trips",
         "pose",
-    ):
-        grid.add_column(title, justify="left" if title in {"motion", "world", "pose"} else "right")
-    for row in table:
-        grid.add_row(*["-" if value is None else str(value) for value in asdict(row).values()])
-    console.print(grid)
+    )
+    print_table(heads, (asdict(row).values() for row in table))
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,7 +64,7 @@ class LocalModel:
     @property
     def valid(self) -> Bools:
         """(H, W) the valid region of the maps."""
-        return np.asarray(np.isfinite(self.points_m[..., 2]))
+        return np.isfinite(self.points_m[..., 2])
 
     @property
     def error_m(self) -> Floats:
@@ -83,7 +83,7 @@ def _is_plain(image: Image) -> Bools:
     window = (_WINDOW_PX, _WINDOW_PX)
     spread = cv2.blur(grey * grey, window) - cv2.blur(grey, window) ** 2
     plain = (spread < _LEAST_SPREAD).astype(np.uint8)
-    return np.asarray(cv2.dilate(plain, np.ones(window, np.uint8)) > 0)
+    return cv2.dilate(plain, np.ones(window, np.uint8)) > 0
 
 
 def project(camera: Floats, points_m: Floats) -> Floats:
@@ -92,7 +92,7 @@ def project(camera: Floats, points_m: Floats) -> Floats:
         depth = np.where(points_m[..., 2] > 1e-6, points_m[..., 2], np.nan)
         u = camera[0, 0] * points_m[..., 0] / depth + camera[0, 2]
         v = camera[1, 1] * points_m[..., 1] / depth + camera[1, 2]
-    return np.asarray(np.stack([u, v], axis=-1))
+    return np.stack([u, v], axis=-1)
 
 
 def joined(depth_m: Floats, axis: int) -> Bools:
@@ -105,4 +105,4 @@ def joined(depth_m: Floats, axis: int) -> Bools:
     )
     with np.errstate(invalid="ignore"):
         together = np.abs(near_m - two) <= LARGEST_STEP * np.minimum(near_m, two)
-    return np.asarray(np.moveaxis(together, 0, axis))
+    return np.moveaxis(together, 0, axis)

@@ -100,7 +100,7 @@ def _relative(first: LocalModel, second: LocalModel) -> Floats | None:
             best = agree
     if best.sum() < _LEAST:
         return None
-    return np.asarray(Rotation.align_vectors(ray_one[best], ray_two[best])[0].as_matrix())
+    return Rotation.align_vectors(ray_one[best], ray_two[best])[0].as_matrix()
 
 
 def _rays(camera: Floats, places_px: Floats) -> Floats:

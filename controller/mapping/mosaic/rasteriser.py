@@ -30,7 +30,7 @@ class Canvas:
     """A picture with its depth buffer."""
 
     colour: NDArray[np.uint8]
-    """(H, W, 3)"""
+    """(H, W, 3) colours of the picture."""
     depth_m: Floats
     """(H, W); infinite where nothing was drawn."""
 
@@ -42,7 +42,7 @@ class Canvas:
     @property
     def drawn(self) -> Bools:
         """(H, W) pixels that a triangle covers."""
-        return np.asarray(np.isfinite(self.depth_m))
+        return np.isfinite(self.depth_m)
 
     def fill(self, other: "Canvas") -> None:
         """Copy another canvas to the uncovered pixels."""
@@ -70,7 +70,7 @@ def cells(points_m: Floats) -> Bools:
     """(H - 1, W - 1) grid cells whose four corners belong to one surface."""
     depth = points_m[..., 2]
     along, across = joined(depth, 1), joined(depth, 0)
-    return np.asarray(along[:-1] & along[1:] & across[:, :-1] & across[:, 1:])
+    return along[:-1] & along[1:] & across[:, :-1] & across[:, 1:]
 
 
 def draw(

@@ -13,7 +13,7 @@ from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 from snakewalk.controller.mapping.mosaic.scale_matches import ScaleMatches
 
 LEAST_INLIERS: Final = 12
-"""Below it a pose is an accident (ours)."""
+"""Number of inliers below which a pose is an accident (ours)."""
 _TOLERANCE_PX: Final = 3.0
 """Reprojection error of an inlier, per unit of its match's scale (ours)."""
 
@@ -23,9 +23,9 @@ class RelativePose:
     """Pose: a point p of the first position is ``rotation @ p + translation`` at the second."""
 
     rotation: Floats
-    """(3, 3)"""
+    """(3, 3) rotation from the first position to the second."""
     translation_m: Floats
-    """(3,)"""
+    """(3,) translation from the first position to the second, m."""
     inliers: Bools
     """(n,) matches that agree with the pose."""
     error_px: float
@@ -33,11 +33,11 @@ class RelativePose:
 
     def moved(self, points_m: Floats) -> Floats:
         """Points (..., 3) of the first position in the axes of the second."""
-        return np.asarray(points_m @ self.rotation.T + self.translation_m)
+        return points_m @ self.rotation.T + self.translation_m
 
     def back(self, points_m: Floats) -> Floats:
         """Points (..., 3) of the second position in the axes of the first."""
-        return np.asarray((points_m - self.translation_m) @ self.rotation)
+        return (points_m - self.translation_m) @ self.rotation
 
 
 def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) -> RelativePose:

@@ -28,7 +28,7 @@ PATCH_PX: Final = 3
 PENALTY: Final = 0.12
 """Potts constant (ours), of data terms from 0 to 2."""
 LEAST_CORRELATION: Final = 0.5
-"""Below it a pixel has no physical counterpart (ours)."""
+"""Correlation below which a pixel has no physical counterpart (ours)."""
 
 Picture = NDArray[np.float32]
 

@@ -15,13 +15,14 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 
 SCALES: Final = tuple(10.0 / k for k in range(10, 0, -1))
-"""The set S of the paper: 1, 1 / 0.9, ..., 1 / 0.1."""
+"""Scales of the set S of the paper: 1, 1 / 0.9, ..., 1 / 0.1."""
 _MOST_POINTS: Final = 500
 _RADIUS_PX: Final = 7
 """Patches are 15 px wide (ours)."""
 _LEAST_CORRELATION: Final = 0.75
 _UNIQUE: Final = 0.03
-"""The best correlation exceeds any other, more than a patch's radius away, by this (ours)."""
+"""Least lead of the best correlation over any other that is more than a patch's radius away
+(ours)."""
 _WIDE: Final = 0.35
 """Half the width of the search region, in widths of the picture, without a guess (ours)."""
 _NARROW: Final = 0.12
@@ -39,7 +40,7 @@ class ScaleMatches:
     scale: Floats
     """(n,) elements of ``SCALES``: size in the second picture over size in the first."""
     correlation: Floats
-    """(n,)"""
+    """(n,) correlations of the pairs."""
 
 
 def grey(image: Image) -> NDArray[np.float32]:

@@ -48,7 +48,7 @@ class StereoWalk:
 
     models: tuple[LocalModel, ...]
     morphs: tuple[MorphableModel, ...]
-    """One for each pair of successive positions."""
+    """Morph for each pair of successive positions."""
     poses: Floats
     """(n, 3, 4) from each position's camera to the axes of the first one."""
     steps: tuple[Step, ...]

@@ -13,7 +13,7 @@ from snakewalk.controller.mapping.stereo_ground import CameraStand, fit_ground
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 _LEAST_POINTS: Final = 2
-"""In a cell that is known (ours)."""
+"""Least number of points in a known cell (ours)."""
 _HOLE: Final = (150, 150, 150)
 """Colour of unknown ground (ours)."""
 
@@ -23,7 +23,8 @@ class WalkGround:
     """A map of the route, and the first camera's stand."""
 
     field: HeightField
-    """x is where the first camera looks, its origin below this camera."""
+    """Map of the ground; x is the first camera's direction of view, the origin is below this
+    camera."""
     stand: CameraStand
     fitted: bool
     """Whether the stand was fitted to the points."""

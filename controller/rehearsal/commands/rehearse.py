@@ -7,7 +7,6 @@ from statistics import fmean
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.loader import checked
 from snakewalk.config.pose import TrackerConfig
@@ -20,6 +19,7 @@ from snakewalk.controller.console.options import (
     Workers,
     console,
     key_values,
+    print_table,
 )
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
@@ -93,7 +93,10 @@ def rehearse_runs(
     if as_json:
         print(json.dumps({"rehearsals": rows, "file": str(out)}))
     else:
-        console.print(_table(rows))
+        heads = ("run", "truly there", "false claims", "path m", "pose m", "pose deg", *_METRICS)
+        names = dict.fromkeys(row["run"] for row in rows)
+        cells = [_cells(name, [row for row in rows if row["run"] == name]) for name in names]
+        print_table((*heads, "false alarms"), cells)
         for row in rows:
             if not row.get("has_arrived", False):
                 console.print(f"{row['run']}, seed {row['seed']}: {_verdict(row)}")
@@ -108,17 +111,7 @@ def _rehearsal(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _verdict(row: dict[str, Any]) -> str:
-    return row.get("error") or row["verdict"]
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> Table:
-    table = Table(box=None)
-    heads = ("run", "truly there", "false claims", "path m", "pose m", "pose deg", *_METRICS)
-    for head in (*heads, "false alarms"):
-        table.add_column(head, justify="left" if head == "run" else "right")
-    for run in dict.fromkeys(row["run"] for row in rows):
-        table.add_row(*_cells(run, [row for row in rows if row["run"] == run]))
-    return table
+    return str(row.get("error") or row["verdict"])
 
 
 def _worst_errors(metrics: Sequence[dict[str, Any]]) -> tuple[str, ...]:

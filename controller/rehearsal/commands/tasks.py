@@ -7,11 +7,17 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import FirstSeed, Json, Seeds, Workers, console
+from snakewalk.controller.console.options import (
+    FirstSeed,
+    Json,
+    Seeds,
+    Workers,
+    console,
+    print_table,
+)
 from snakewalk.controller.console.pool import each
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.rehearsal.result_lines import append_lines, read_lines
@@ -95,14 +101,11 @@ def tasks(
 
 
 def _print(rows: Sequence[TaskResult], chosen: Sequence[ControllerTask], by: Sequence[str]) -> None:
-    grid = Table("task", *by, box=None)
-    for task in chosen:
-        cells = [
-            [row for row in rows if (row.task, row.controller) == (task.name, controller_name)]
-            for controller_name in by
-        ]
-        grid.add_row(task.name, *map(cell, cells))
-    console.print(grid)
+    def share(name: str, by_name: str) -> str:
+        return cell([row for row in rows if (row.task, row.controller) == (name, by_name)])
+
+    cells = [(task.name, *(share(task.name, by_name) for by_name in by)) for task in chosen]
+    print_table(("task", *by), cells)
     console.print("share of the task, mean duration; - : the controller does not fit the task")
 
 
@@ -150,7 +153,4 @@ def _print_conditions(chosen: Sequence[ControllerTask], as_json: bool) -> None:
     if as_json:
         print(json.dumps({"conditions": rows}))
         return
-    grid = Table(*rows[0], box=None)
-    for row in rows:
-        grid.add_row(*map(str, row.values()))
-    console.print(grid)
+    print_table(rows[0], (row.values() for row in rows))

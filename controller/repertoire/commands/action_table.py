@@ -6,9 +6,8 @@ from types import ModuleType
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from snakewalk.controller.console.options import console
+from snakewalk.controller.console.options import console, print_table
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
 Picture = Annotated[Path | None, typer.Option(help="draw the path of each action here")]
@@ -46,13 +45,7 @@ def show_actions(file: Path, repertoire: Repertoire, as_json: bool) -> None:
         "turn_rad_cycle": "turn, rad\na cycle",
     }
     heads |= {"closure_mm": "closure\nmm", "closure_mrad": "closure\nmrad"}
-    table = Table(box=None, pad_edge=False)
-    for key in rows[0]:
-        name = key == "name"
-        table.add_column(heads.get(key, key), justify="left" if name else "right", no_wrap=name)
-    for row in rows:
-        table.add_row(*(str(value) for value in row.values()))
     console.print(
         f"{file}: {repertoire.robot} on {repertoire.world}, law of friction: {repertoire.law}"
     )
-    console.print(table)
+    print_table((heads.get(key, key) for key in rows[0]), (row.values() for row in rows))

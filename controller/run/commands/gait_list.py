@@ -2,11 +2,9 @@
 
 import json
 
-from rich.table import Table
-
 from snakewalk.config.loader import load_gait, shipped
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Json, console
+from snakewalk.controller.console.options import Json, console, print_table
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.run.commands.gait_options import needed_joints
 
@@ -22,17 +20,8 @@ def list_gaits(as_json: Json = False) -> None:
         ]
         print(json.dumps({"gaits": rows, "sets": [s.model_dump() for s in sets]}))
         return
-    table = Table(box=None, pad_edge=False)
-    for title in ("gait", "needs", ""):
-        table.add_column(title, no_wrap=title != "")
-    for gait in GAITS.values():
-        table.add_row(gait.name, ", ".join(needed_joints(gait)), gait.title)
-    console.print(table)
+    gaits = [(gait.name, ", ".join(needed_joints(gait)), gait.title) for gait in GAITS.values()]
+    print_table(("gait", "needs", ""), gaits)
     if sets:
-        table = Table(box=None, pad_edge=False)
-        for title in ("set", "gait", "robot"):
-            table.add_column(title)
-        for parameters in sets:
-            table.add_row(parameters.name, parameters.gait, parameters.robot)
         console.print()
-        console.print(table)
+        print_table(("set", "gait", "robot"), ((s.name, s.gait, s.robot) for s in sets))

@@ -1,6 +1,5 @@
 """``snakewalk gait run``: a gait on servos or in the simulator."""
 
-import math
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
@@ -11,6 +10,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import BLEND, MOTION_S, SEED, GaitChangeMethod, MotionSeconds, Seed
+from snakewalk.config.rounding import rounded
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Compliant, Robot, Set, Shadow, World, key_values
 from snakewalk.controller.console.progress import TimeBar
@@ -134,11 +134,11 @@ def _facts(prepared: GaitRun, result: RunResult) -> dict[str, object]:
             "cycles": displacement.cycles,
         }
         moved = {
-            "forward_body_lengths_cycle": _digits(displacement.forward_bl),
-            "left_body_lengths_cycle": _digits(displacement.left_bl),
-            "up_body_lengths_cycle": _digits(displacement.up_bl),
-            "turn_rad_cycle": _digits(displacement.turn_rad),
-            "speed_m_s": _digits(displacement.speed_m_s),
+            "forward_body_lengths_cycle": rounded(displacement.forward_bl, 4),
+            "left_body_lengths_cycle": rounded(displacement.left_bl, 4),
+            "up_body_lengths_cycle": rounded(displacement.up_bl, 4),
+            "turn_rad_cycle": rounded(displacement.turn_rad, 4),
+            "speed_m_s": rounded(displacement.speed_m_s, 4),
         }
         facts |= by_evidence(result, moved)
     facts |= {
@@ -182,7 +182,3 @@ def _point(text: str | None) -> tuple[float, float] | None:
     except ValueError:
         raise InputError(f"--look-at {text}: expected X,Y in metres") from None
     return x, y
-
-
-def _digits(value: float) -> float | None:
-    return None if math.isnan(value) else round(value, 4)

@@ -5,10 +5,16 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, Robot, console, show
+from snakewalk.controller.console.options import (
+    Force,
+    Json,
+    Robot,
+    console,
+    print_table,
+    show,
+)
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.gaits.gait import ranges
 from snakewalk.controller.motion.gait_cycle import GaitCycle
@@ -68,13 +74,11 @@ def show_gait(
         return
     facts["needs"] = ", ".join(needed_joints(type(gait)))
     show(facts, as_json=False)
-    table = Table(box=None, pad_edge=False)
-    for title in ("parameter", "value", "least", "most", ""):
-        table.add_column(title, justify="left" if title in {"parameter", ""} else "right")
+    lines = []
     for key, span in spans.items():
         value = values[key]
         shown = str(value) if isinstance(value, bool | int) else f"{value:.4g}"
         least, most = ("", "") if span.kind is bool else (f"{span.low:.4g}", f"{span.high:.4g}")
-        table.add_row(key, shown, least, most, span.description)
+        lines.append((key, shown, least, most, span.description))
     console.print()
-    console.print(table)
+    print_table(("parameter", "value", "least", "most", ""), lines)

@@ -13,7 +13,7 @@ from snakewalk.config.template import template
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 
 _USED_FIRST = ("flat-square", "jacksboro-traverse")
 """Runs that come first among several possible starts."""
@@ -96,11 +96,9 @@ def init(
         raise InputError(f"{folder}: cannot be made: {error.strerror}") from None
     refuse_to_overwrite([folder / name for name in (*texts, *schemas)], force)
     for name, text in texts.items():
-        with atomic_write(folder / name) as part:
-            part.write_text(f"#:schema schema/{name[:-5]}.json\n{text}", encoding="utf-8")
+        write_result(folder / name, f"#:schema schema/{name[:-5]}.json\n{text}")
     for name, described in schemas.items():
-        with atomic_write(folder / name) as part:
-            part.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+        write_result(folder / name, json.dumps(described, indent=1) + "\n")
     show(
         {
             "files": [str(folder / name) for name in (*texts, *schemas)],

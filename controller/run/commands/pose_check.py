@@ -70,7 +70,7 @@ def check(
         if view and prepared is not None:
             page = stack.enter_context(_page(prepared, config, source, view_at))
         feed = stack.enter_context(closing(plugin.open_feed(argument, clock)))
-        on_line = (lambda line: None) if as_json else _print
+        on_line = (lambda line: None) if as_json else console.print
         statistics = watch(feed, clock, seconds, config, on_line, page=page, judge=judge)
     faults = start_faults(statistics, judge)
     mount = {"link": config.link, "offset_m": list(config.offset_m)}
@@ -145,10 +145,6 @@ def _line(statistics: FeedStatistics) -> str:
         f"up {facts['up'][2]:+.2f}"
     )
     return "   ".join([place, *feed_words(facts)])
-
-
-def _print(line: str) -> None:
-    console.print(line)
 
 
 def expected_pose(robot: str | None, prepared: PreparedRun | None) -> tuple[PoseConfig, Judge]:

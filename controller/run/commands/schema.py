@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 from snakewalk.controller.motion.policy import Policy
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ KINDS: Final = (
     "servo",
     "policy",
 )
-"""Names of ``models``, known before they are built."""
+"""Names of the schemas in ``models``, known before they are built."""
 
 
 @command("tools schema", examples=("tools schema run", "tools schema robot -o robot.json"))
@@ -55,8 +55,7 @@ def schema(
     if out is None:
         print(text)
         return
-    with atomic_write(out) as part:
-        part.write_text(text + "\n", encoding="utf-8")
+    write_result(out, text + "\n")
 
 
 def models() -> "dict[str, type[BaseModel]]":

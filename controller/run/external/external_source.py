@@ -34,7 +34,7 @@ class ExternalSource(ABC):
     """Base of external pose sources; a subclass opens the feed."""
 
     name: str
-    """As ``--pose`` names it."""
+    """Name of the source in ``--pose``."""
 
     @abstractmethod
     def open_feed(self, argument: str, clock: Clock) -> ClosingFeed:

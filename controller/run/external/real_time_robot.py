@@ -1,7 +1,6 @@
 """A simulated robot on its ground at a serial device, in real time, by another process."""
 
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import Any, Final, Self
 
 import numpy as np
@@ -57,12 +56,7 @@ class RealTimeRobot:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def qpos(self) -> Floats:

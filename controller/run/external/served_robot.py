@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -61,7 +60,7 @@ class Serving:
     seed: int = 0
     physics_step_s: float | None = None
     baud: int | None = None
-    """None: the robot's."""
+    """Baud rate of the port; None: that of the robot."""
 
 
 def place_of(prepared: PreparedRun) -> Place:
@@ -201,7 +200,7 @@ class ServedRobot:
         )
         imu = partial(physics.plant_imu, robot, self.body, serving.baud or robot.servo.baud)
         self.line = simulated_line(robot, plant, deviation, imu(serving.seed), serving.baud)
-        """The servos, as a byte port."""
+        """Byte port of the simulated servos."""
         self._truth = None
         if truth is not None:
             self._truth = TruthLog(truth, _header(robot, world, place, serving))
@@ -209,14 +208,9 @@ class ServedRobot:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: Any) -> None:
         if self._truth is not None:
-            self._truth.__exit__(kind, error, trace)
+            self._truth.__exit__(*raised)
 
     def _measure(self) -> None:
         head = self.body.head_pose()

@@ -83,7 +83,7 @@ def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
     room = (_MOST - _LINEAR) * limit_rad
     size = np.abs(joints)
     soft = start + room * np.tanh(np.maximum(size - start, 0.0) / room)
-    return np.asarray(np.sign(joints) * np.where(size > start, soft, size))
+    return np.sign(joints) * np.where(size > start, soft, size)
 
 
 @dataclass(frozen=True)

@@ -417,7 +417,7 @@ class WalkRun(PathRun):
     def _shuffled(self, library: StateLibrary) -> Floats:
         """Shapes (S, N) in an order by the seed: W settles ties by the order."""
         order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
-        return np.asarray(library.shapes_rad[order])
+        return library.shapes_rad[order]
 
     def _chooser(self, rollout: Rollout | None = None) -> ShapeChooser:
         if self.run.motion == "serpenoid":

@@ -8,7 +8,6 @@ from statistics import fmean
 from typing import Annotated, NamedTuple
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -27,9 +26,14 @@ from snakewalk.controller.console.options import (
     World,
     check_files,
     console,
+    print_table,
 )
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    refuse_to_overwrite,
+    write_result,
+)
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.identification.friction_fit import (
     Found,
@@ -317,12 +321,12 @@ def _tell_friction(
             result["robot_out"] = str(outs.robot)
         print(json.dumps(result))
         return
-    table = Table("friction", "value", "95 % interval", "", box=None)
+    rows: list[tuple[str, ...]] = []
     for key, estimate in friction_fit.found.items():
         note = "" if estimate.determined else "not identified from these logs"
         interval = f"{estimate.low:.4g} to {estimate.high:.4g}"
-        table.add_row(key.replace("_", " "), f"{estimate.value:.4g}", interval, note)
-    console.print(table)
+        rows.append((key.replace("_", " "), f"{estimate.value:.4g}", interval, note))
+    print_table(("friction", "value", "95 % interval", ""), rows)
     for log_name, ((before_m, before_rad), (after_m, after_rad)) in errors.items():
         console.print(
             f"{log_name}: in a second {1e3 * before_m:.1f} mm and {math.degrees(before_rad):.1f} "
@@ -360,8 +364,7 @@ def _write_mass(out: Path, robot: RobotConfig, mass: Found, paths: list[Path]) -
         f"Mass found by `snakewalk robot identify` from {', '.join(map(str, paths))}:\n"
         f"{mass.value:.4g} times that of {robot.name}, 95 % of {mass.low:.4g} to {mass.high:.4g}"
     )
-    with atomic_write(out) as part:
-        part.write_text(robot_toml(after, comment), encoding="utf-8")
+    write_result(out, robot_toml(after, comment))
 
 
 def _check_one_servo(logs: Sequence[PendulumLog]) -> None:
@@ -404,8 +407,7 @@ def _servo(
                 on_progress=bar.update,
             )
     if out is not None:
-        with atomic_write(out) as part:
-            part.write_text(bam_text(start_constants), encoding="utf-8")
+        write_result(out, bam_text(start_constants))
     forecasts = {}
     if robot_file is not None:
         after = _write_robot(robot_file, start_constants, logs)
@@ -448,7 +450,7 @@ def _servo(
             result |= {"robot_out": str(robot_file.out), "robot_errors_deg": forecasts}
         print(json.dumps(result))
         return
-    console.print(_constants_table(start_constants, reached))
+    _print_constants(start_constants, reached)
     for path, (error, used) in errors.items():
         console.print(
             f"{path}: {error:.2f} degrees off on average{'' if used else ' (not fitted)'}"
@@ -479,20 +481,19 @@ def _reached_bounds(constants: ServoConstants) -> dict[str, tuple[float, str]]:
     return reached
 
 
-def _constants_table(constants: ServoConstants, reached: dict[str, tuple[float, str]]) -> Table:
-    table = Table("constant", "value", "95 % interval", "", box=None)
+def _print_constants(constants: ServoConstants, reached: dict[str, tuple[float, str]]) -> None:
+    rows: list[tuple[str, ...]] = []
     for constant, value, low, high in zip(
         CONSTANTS, constants.values, constants.low, constants.high, strict=True
     ):
         interval = f"{low:.4g} to {high:.4g}" if math.isfinite(low) else "-"
         note = f"{reached[constant.name][1]} end of the range" if constant.name in reached else ""
-        table.add_row(constant.name.replace("_", " "), f"{value:.4g}", interval, note)
-    return table
+        rows.append((constant.name.replace("_", " "), f"{value:.4g}", interval, note))
+    print_table(("constant", "value", "95 % interval", ""), rows)
 
 
 def _write_robot(file: _RobotFile, constants: ServoConstants, logs: list[Path]) -> RobotConfig:
 
     after = with_keys(robot_with(file.before, constants), {"name": file.out.stem}, str(file.out))
-    with atomic_write(file.out) as part:
-        part.write_text(robot_toml(after, robot_comment(constants, logs)), encoding="utf-8")
+    write_result(file.out, robot_toml(after, robot_comment(constants, logs)))
     return after

@@ -22,7 +22,7 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.gaits.gait import fitting_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.studies import tune as search
@@ -96,7 +96,6 @@ def tune(
         ]
         lines += [f"gait = {json.dumps(gait)}", f"robot = {json.dumps(body)}", "", "[parameters]"]
         lines += [f"{key} = {json.dumps(value)}" for key, value in result.parameters.items()]
-        with atomic_write(out) as part:
-            part.write_text("\n".join(lines) + "\n")
+        write_result(out, "\n".join(lines) + "\n")
         facts["set"] = str(out)
     show(facts, as_json)

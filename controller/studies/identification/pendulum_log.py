@@ -31,13 +31,13 @@ class PendulumLog:
     time_s: Floats
     """(N,) rising."""
     goal_rad: Floats
-    """(N,)"""
+    """(N,) goal angles, rad."""
     position_rad: Floats
-    """(N,)"""
+    """(N,) measured angles, rad."""
     supply_v: Floats
-    """(N,)"""
+    """(N,) supply voltages, V."""
     torque_on: Floats
-    """(N,) 1 or 0"""
+    """(N,) 1 while torque was on, else 0."""
     current_limit_a: float = math.inf
     """Goal Current of current-based position mode; infinite in other modes."""
 

@@ -35,9 +35,9 @@ class Constant(NamedTuple):
     """One constant of a servo."""
 
     name: str
-    """With its unit."""
+    """Name of the constant, with its unit."""
     bam: str
-    """In BAM's files."""
+    """Name of the constant in BAM's files."""
     low: float
     high: float
     """Searched range of an XL330 (ours); ``ranges`` has those of other servos."""

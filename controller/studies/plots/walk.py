@@ -54,5 +54,4 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
             axes.set_xlabel("steps / |V| (dot: all seen)")
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=3)
-        file.parent.mkdir(parents=True, exist_ok=True)
         save_picture(figure, file)

@@ -43,9 +43,11 @@ _REFINEMENTS: Final = 4
 _LEAST_STEP: Final = 0.01
 """Least change of ``faulty``: smaller ones have no effect (ours)."""
 _REFINED: Final = dict[Cause, int](friction=1, load=2) | {"weaker servo": 1, "slipped horn": 2}
-"""How many of each kind, those that explain most at first, are followed on the simulator (ours)."""
+"""Number of causes of each kind, those that explain most at first, that are followed on the
+simulator (ours)."""
 SETTLED_S: Final = 1.0
-"""From which on the shadow is compared: it begins at rest, wherever the robot was at (ours)."""
+"""Time from which on the shadow is compared: it begins at rest, wherever the robot was at
+(ours)."""
 MOST_S: Final = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
 LEAST_S: Final = 4.0
@@ -66,7 +68,7 @@ class Goals:
     since_start_s: Floats
     """(T,) when each cycle was due, from the first one."""
     sent_rad: Floats
-    """(T, J)"""
+    """(T, J) goals that were sent, rad."""
 
 
 def is_gap(pause_s: float, run: RunConfig) -> bool:
@@ -213,7 +215,7 @@ class Constants:
         self.healthy = of_each(0.1, 0.03 * mass_kg, 0.05, 0.01)
         """Standard deviation among robots and grounds that are well (ours)."""
         self.faulty = of_each(0.5, 0.1 * mass_kg / 0.11, 0.5, 0.2)
-        """The same of one that is at fault (ours)."""
+        """Standard deviation of each value of a robot or ground that is at fault (ours)."""
         self.never_less = of_each(0, 1, 1, 0) > 0.0
         """Loads and weakness are one-sided."""
         self.causes: list[tuple[Cause, int | None, list[int]]] = [("friction", None, [0, 1])]

@@ -31,7 +31,7 @@ from snakewalk.drivers.types import JointState
 ALARM_A: Final = 0.03
 """Mean difference of a current from which the alarm names a joint (ours)."""
 ALARM_RAD: Final = 0.02
-"""The same of an angle (ours)."""
+"""Mean difference of an angle from which the alarm names a joint (ours)."""
 _MEMORY_S: Final = 2.0
 """Time constant of the alarm's average (ours)."""
 _SMOOTH_S: Final = 0.1

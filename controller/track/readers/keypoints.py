@@ -35,7 +35,7 @@ class Choice:
     keypoints: tuple[str, ...] | None = None
     """Names along the midline, head first; None: all, in the order of the file."""
     plane: str | None = None
-    """One of ``PLANES``; for markers in space. None is xy."""
+    """Plane of markers in space, one of ``PLANES``; None is xy."""
 
     def only(self, file: Path, kind: str, *allowed: str) -> None:
         """Reject options that do not apply to a kind of file.
@@ -96,7 +96,7 @@ class Choice:
 
 
 ALL = Choice()
-"""Nothing is chosen: one animal, all of its keypoints."""
+"""Choice of nothing: one animal, all of its keypoints."""
 
 
 def choice_of(individual: str | None, keypoints: str | None, plane: str | None) -> Choice:
@@ -117,7 +117,7 @@ class Keypoints:
     """The keypoints of one animal."""
 
     file: Path
-    """For faults and the name."""
+    """File of the keypoints, for faults and the name."""
     nodes: Sequence[str]
     """Names of the K keypoints."""
     places: Floats
@@ -127,7 +127,7 @@ class Keypoints:
     rate_hz: float | None
     """Frames a second; None where the file does not say."""
     least_score: float = 0.0
-    """Keypoints below it count as missing."""
+    """Score below which a keypoint counts as missing."""
     frame: Ints | None = None
     """(T,) frame numbers; None: 0, 1, 2..."""
     scale_m: float | None = None
@@ -168,7 +168,7 @@ class Keypoints:
             raise InputError(
                 f"{file}: {', '.join(never)} is never seen: say --keypoints without it"
             )
-        return np.asarray(places)
+        return places
 
     def track(self, choice: Choice) -> Track:
         """Make a track of the midline; an unknown rate is assumed, and marked as such.

@@ -34,7 +34,7 @@ class SleapRows(NamedTuple):
     xy: Floats
     """(T, K, 2) pixels."""
     scores: Floats | None
-    """(T, K)."""
+    """(T, K) scores of the keypoints."""
 
 
 def load_table(

@@ -23,7 +23,8 @@ _MIDLINE: dict[tuple[str, str], float | None] = {
 }
 """Columns of places, and metres in their unit; None: body lengths or pixels, without a scale."""
 _WIDE = {"x_m": 1.0, "x_px": None, "x_lengths": None}
-"""The same of wide rows, whose columns end in the number of the point."""
+"""Columns of places in wide rows, which end in the number of the point, and metres in their
+unit."""
 
 
 def load_csv(

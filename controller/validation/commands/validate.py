@@ -15,7 +15,7 @@ from snakewalk.config.loader import shipped
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, check_picture
+from snakewalk.controller.console.result_files import check_picture, write_result
 from snakewalk.controller.validation.comparison import SHOWN, Compared, compare, median_ratio
 from snakewalk.controller.validation.measurement import PublishedResults, load_measurement
 from snakewalk.controller.validation.page import page_text, ratio_text, value_text
@@ -64,8 +64,7 @@ def validate(
 
         draw_ratios(rows, picture)
     if page is not None:
-        with atomic_write(page) as part:
-            part.write_text(page_text(loaded, rows), encoding="utf-8")
+        write_result(page, page_text(loaded, rows))
     if as_json:
         print(json.dumps(_data(rows)))
     else:

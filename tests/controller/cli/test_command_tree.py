@@ -1,5 +1,7 @@
 """The first level of the command line, and the former names of commands."""
 
+import re
+
 import pytest
 
 from snakewalk.controller.cli import command_line
