@@ -213,9 +213,9 @@ class CommandGroup(TyperGroup):
             formatter.write_usage(ctx.command_path, _USAGE)
             formatter.write(f"{self.help}\n")
             groups: dict[str, list[tuple[str, str]]] = {}
-            for name in self.list_commands(ctx):
-                entry = self.get_command(ctx, name)
-                groups.setdefault(entry.rich_help_panel, []).append((name, entry.help))
+            titles = {_next_word(entry, ""): _title(entry) for entry in _listed("")}
+            for name, title in titles.items():
+                groups.setdefault(title, []).append((name, self.get_command(ctx, name).help))
             for title, rows in groups.items():
                 formatter.write(f"{title}\n")
                 with formatter.indentation():
@@ -317,7 +317,7 @@ def _listed(prefix: str) -> list[Plugin]:
     return sorted(commands.values(), key=order)
 
 
-def _panel(plugin: Plugin) -> str | None:
+def _title(plugin: Plugin) -> str:
     """Return the group of a command, or of its family, in ``--help`` of the first level."""
     first = plugin.name.split()[0]
     if first in _FIRST:
@@ -337,20 +337,14 @@ def _family(path: str, commands: list[Plugin]) -> Any:
     family = typer.Typer(
         cls=group_class, help=about, rich_markup_mode="rich", context_settings=_CONTEXT
     )
-    panel = None if " " in path else _panel(commands[0])
-    family.callback(no_args_is_help=True, help=about, rich_help_panel=panel)(_nothing)
+    family.callback(no_args_is_help=True, help=about)(lambda: None)
     group = typer.main.get_group(family)
     group.name = path.rsplit(maxsplit=1)[-1]
-    group.rich_help_panel = panel
     return group
 
 
-def _nothing() -> None: ...
-
-
 def _stub(name: str, listed: Plugin) -> Any:
-    panel = None if " " in listed.name else _panel(listed)
-    return TyperCommand(name, help=listed.help, rich_help_panel=panel, rich_markup_mode="rich")
+    return TyperCommand(name, help=listed.help, rich_markup_mode="rich")
 
 
 def _full_command(name: str, listed: Plugin) -> Any:

@@ -14,10 +14,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world, shipped
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.rounding import significant
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.plugins import find
+from snakewalk.controller.console.rounding import significant
 from snakewalk.controller.rehearsal.judgement import true_arrivals
 from snakewalk.controller.rehearsal.rehearsal import RehearsalCase, rehearse
 from snakewalk.controller.run.factory import prepare_job, prepare_policy, prepare_source

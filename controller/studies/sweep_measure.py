@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.rounding import significant
+from snakewalk.controller.console.rounding import significant
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.metrics.effort import effort
 from snakewalk.controller.metrics.summary import RunSummary

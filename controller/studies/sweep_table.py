@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from snakewalk.config.rounding import rounded
 from snakewalk.controller.console.parquet import Kind
+from snakewalk.controller.console.rounding import rounded
 from snakewalk.controller.console.table import CsvTable, read_csv_table
 from snakewalk.controller.gaits.gait import Aim
 from snakewalk.controller.gaits.registry import GAITS

@@ -3,7 +3,7 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "demo", "Show a recorded run in the browser at once; then offer the same run live.", "snakewalk.controller.view.commands.demo:demo"),
+    ("command", "demo", "Show a recorded run in the browser at once; offer the same run live.", "snakewalk.controller.view.commands.demo:demo"),
     ("command", "view", "Show a log in the browser: body, path, servos and curves.", "snakewalk.controller.view.commands.view:view"),
     ("observer", "page", "Live web page of a run, with a stop button.", "snakewalk.controller.view.live_view:open_page"),
 )

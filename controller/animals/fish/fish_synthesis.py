@@ -12,7 +12,6 @@ from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.config.rounding import rounded
 from snakewalk.controller.animals.fish.piece_graph import PieceGraph, piece_graph
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.segments import (
@@ -34,6 +33,7 @@ from snakewalk.controller.animals.fish.synthesis import (
     sequence_through,
 )
 from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
+from snakewalk.controller.console.rounding import rounded
 from snakewalk.controller.kinematics.retarget import Retarget
 
 _CAPTURE = 0.5

@@ -8,12 +8,12 @@ import numpy as np
 from snakewalk.config.animal import AnimalConfig
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.rounding import rounded
 from snakewalk.config.template import template
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.animals.legged.stride import Foot, Stride, measure_stride
 from snakewalk.controller.animals.legged.views import VIEWS
+from snakewalk.controller.console.rounding import rounded
 from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
 
 _FEWEST_POINTS = 3

@@ -10,10 +10,10 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import BLEND, MOTION_S, SEED, GaitChangeMethod, MotionSeconds, Seed
-from snakewalk.config.rounding import rounded
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Compliant, Robot, Set, Shadow, World, key_values
 from snakewalk.controller.console.progress import TimeBar
+from snakewalk.controller.console.rounding import rounded
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.metrics.displacement import gait_displacement
 from snakewalk.controller.run.commands.gait_options import Name, Param, parameters

@@ -27,7 +27,7 @@ _NICE: Final = 10
 
 @command("demo", examples=("demo", "demo --view-at 0.0.0.0:8080"))
 def demo(view_at: ViewAt = VIEW_AT) -> None:
-    """Show a recorded run in the browser at once; then offer the same run live.
+    """Show a recorded run in the browser at once; offer the same run live.
 
     The loops are compiled while it plays. Needs no servo. ^C ends it.
     """
