@@ -213,8 +213,7 @@ class CommandGroup(TyperGroup):
             formatter.write_usage(ctx.command_path, _USAGE)
             formatter.write(f"{self.help}\n")
             groups: dict[str, list[tuple[str, str]]] = {}
-            titles = {_next_word(entry, ""): _title(entry) for entry in _listed("")}
-            for name, title in titles.items():
+            for name, title in {_next_word(e, ""): _title(e) for e in _listed("")}.items():
                 groups.setdefault(title, []).append((name, self.get_command(ctx, name).help))
             for title, rows in groups.items():
                 formatter.write(f"{title}\n")
