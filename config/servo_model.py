@@ -12,6 +12,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from snakewalk.config.base import Strict
+from snakewalk.config.value_faults import MARK_PATTERN
 
 TABLE_BYTES: Final = 1024
 """Number of addresses that a control table may use."""
@@ -157,7 +158,7 @@ class RegisterRow(Strict):
     )
     mark: str | None = Field(
         None,
-        pattern="^(set|fixed|usual|kept|ignored: .+)$",
+        pattern=MARK_PATTERN,
         description="treatment by a run: set, fixed (another value than `initial` forbids a "
         "start), usual (doctor reports another value), kept, or ignored with a reason; default: "
         "kept in the EEPROM, set in the RAM",

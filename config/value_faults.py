@@ -8,7 +8,9 @@ _NOT_IN_NAMES: Final = r"/\\\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2
 """Characters that no name contains: those of folders and of ``plain_text``."""
 NAME_PATTERN: Final = f"^[^.{_NOT_IN_NAMES}][^{_NOT_IN_NAMES}]*$"
 STOP_OUTPUT_PATTERN: Final = r"^(-?(rts|dtr):.+|command:/.+)$"
+MARK_PATTERN: Final = "^(set|fixed|usual|kept|ignored: .+)$"
 PATTERNS_IN_WORDS: Final = {
+    MARK_PATTERN: "must be set, fixed, usual, kept, or ignored: REASON",
     NAME_PATTERN: "holds '/', a control character or a leading dot",
     STOP_OUTPUT_PATTERN: "must be rts:PORT, -rts:PORT, dtr:PORT, -dtr:PORT or "
     "command:/PROGRAM ARGUMENT",

@@ -201,7 +201,7 @@ def test_a_stated_accuracy_makes_no_arrival(rehearsed: Rehearse) -> None:
     x_m, y_m = plan.waypoints_m[0]
     centre_m = [x_m + plan.waypoint_radius_m + 0.1, y_m, 0.0]
     near = replace(truth, centre_m=np.tile(centre_m, (len(truth.time_s), 1)))
-    found = judge(near, finished.record, None, "every waypoint reached", position_sd_m=0.06)
+    found = judge(near, finished.record, replace(finished.summary, pose_position_sd_m=0.06))
     assert (found.truly_reached, found.reached_as_stated, found.has_arrived) == (0, 1, False)
     claiming = replace(found, claimed=1)
     assert claiming.is_true

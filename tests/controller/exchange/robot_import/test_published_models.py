@@ -372,8 +372,7 @@ def test_legs_come_back_as_limbs(tmp_path: Path, name: str) -> None:
             assert getattr(ours, key) == getattr(theirs, key)
         assert ours.segments_m == pytest.approx(theirs.segments_m, abs=1e-12)
         assert ours.segment_mass_kg == pytest.approx(theirs.segment_mass_kg)
-    # a joint's stop in the exported model is 0.1 rad beyond its limit
-    np.testing.assert_allclose(made.robot.limit_rad, np.add(robot.limit_rad, 0.1), atol=1e-9)
+    np.testing.assert_allclose(made.robot.limit_rad, robot.limit_rad, atol=1e-9)
 
 
 @pytest.mark.parametrize(
