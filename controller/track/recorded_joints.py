@@ -41,9 +41,9 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
     for rows in np.split(np.arange(len(known_s)), gaps(known_s)):
         ends_s = known_s[rows[[0, -1]]] * recording.rate_hz
         time_s = np.arange(round(ends_s[0]), round(ends_s[1]) + 1) / recording.rate_hz
-        even = [np.interp(time_s, known_s[rows], column) for column in joints[rows].T]
+        even = np.stack([np.interp(time_s, known_s[rows], part) for part in joints[rows].T], axis=1)
         times.append(time_s)
-        parts.append(gaussian_filter1d(np.stack(even, axis=1), width, axis=0, mode="nearest"))
+        parts.append(gaussian_filter1d(even, width, axis=0, mode="nearest") if width else even)
     return np.concatenate(times), np.concatenate(parts)
 
 

@@ -167,7 +167,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installe
 
 def shipped(source: Path) -> set[str]:
     """Every file that a wheel has to hold, as it is named in it."""
-    kinds = {".css", ".html", ".js", ".py", ".toml", ".typed"}
+    kinds = {".css", ".html", ".js", ".mcap", ".py", ".toml", ".typed"}
     found = [file for name in FOLDERS for file in (source / name).rglob("*")]
     own = [file for file in (source / "snakewalk").iterdir() if not file.is_symlink()]
     files = {file.relative_to(source) for file in found if file.suffix in kinds}

@@ -155,11 +155,14 @@ def expected_pose(robot: str | None, prepared: PreparedRun | None) -> tuple[Pose
         return config, lambda sample: None
     config = prepared.robot.pose or PoseConfig()
     height_m = ground_height(prepared.ground)
-    return config, lambda sample: start_fault(
-        sample,
-        prepared.robot,
-        config,
-        prepared.run.start_m,
-        height_m,
-        prepared.start_heading_rad,
-    )
+    # the body lies straight, or in the shape in which the run begins
+    headings_rad = prepared.start_heading_rad, prepared.initial_pose().heading_rad
+
+    def judge(sample: PoseSample) -> str | None:
+        faults = [
+            start_fault(sample, prepared.robot, config, prepared.run.start_m, height_m, heading_rad)
+            for heading_rad in headings_rad
+        ]
+        return faults[0] if all(faults) else None
+
+    return config, judge

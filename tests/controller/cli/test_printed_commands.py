@@ -69,6 +69,8 @@ NOT_RUN = {
     "--live": "needs keys of a terminal: tests/controller/run/test_gait_command.py",
     "--view": "serves a page until it is closed: tests/controller/view",
     "view": "serves a page until it is closed: tests/controller/view",
+    "demo": "serves a page until it is closed: tests/controller/view/test_demo.py",
+    "setup": "asks at a terminal: tests/controller/bench/test_setup.py",
     "ros": "holds a robot until it is stopped: tests/controller/ros",
     "--ros": "needs the extra ros and a graph: tests/controller/ros",
     "pose calibrate 0": "needs a camera: tests/controller/cameras/test_camera_command.py",
