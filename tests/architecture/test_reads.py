@@ -11,6 +11,8 @@ import pytest
 
 from tests.architecture.tokens import sizes
 
+pytestmark = pytest.mark.costs("reads every file of the library")
+
 ROOT: Final = Path(__file__).resolve().parents[2]
 OPENINGS: Final = {
     "config/archive.py": "bounds every read",

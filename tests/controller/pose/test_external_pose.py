@@ -153,6 +153,7 @@ def test_the_accuracy_grows_with_the_distance_from_the_start() -> None:
     assert scene.pose.position_sd_m > 1.3 * near
 
 
+@pytest.mark.costs("feeds poses and joints for a long walk")
 def test_a_turn_at_the_start_makes_the_accuracy_worse() -> None:
     """Nothing shows whether the robot lies turned, or its source's frame is."""
     turn = turned((0.0, 0.0, 10.0))
@@ -169,6 +170,7 @@ def test_a_turn_at_the_start_makes_the_accuracy_worse() -> None:
     assert wrong.pose.position_sd_m > 1.5 * sound.pose.position_sd_m
 
 
+@pytest.mark.costs("feeds poses and joints for a long walk")
 def test_drift_in_motion_makes_the_accuracy_worse() -> None:
     """A source that drifts to the side by 2 cm/s from 6 s on."""
 
