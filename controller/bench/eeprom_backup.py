@@ -15,7 +15,7 @@ from snakewalk.config.base import Strict
 from snakewalk.config.loader import checked
 from snakewalk.controller.bench.port_lines import PortLines
 from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_scan import find_feetech
 from snakewalk.drivers.errors import ChainError, ServoError
@@ -187,9 +187,8 @@ class RestoreJournal:
             before = {c.register: c.before for c in changes if c.register != "Torque Enable"}
             before |= old[servo_id].registers if servo_id in old else {}
             servos[servo_id] = ServoBackup(id=servo_id, model=models[servo_id], registers=before)
-        with atomic_write(self.path) as part:
-            text = backup_text(BackupFile(servos=tuple({**old, **servos}.values())))
-            part.write_text(text, encoding="utf-8")
+        text = backup_text(BackupFile(servos=tuple({**old, **servos}.values())))
+        write_result(self.path, text)
 
     def remove(self) -> None:
         """Forget the former values: every servo has those of the backup."""

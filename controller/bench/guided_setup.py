@@ -12,7 +12,7 @@ import typer
 
 from snakewalk.config.archive import read_json_object
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import write_result
 
 _GAIT: Final = "lateral-undulation"
 _GENTLE: Final = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
@@ -162,8 +162,7 @@ class GuidedSetup:
             self._do(step)
             self._done.append(step.name)
             text = json.dumps({"port": self.files.port, "done": self._done})
-            with atomic_write(self._file) as part:
-                part.write_text(f"{text}\n", encoding="utf-8")
+            write_result(self._file, f"{text}\n")
 
     def _do(self, step: SetupStep) -> None:
         """Run the step's command until it succeeds, is skipped, or the person stops."""

@@ -15,6 +15,7 @@ from typing import IO, Final
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.child_process import start_module
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.fallbacks import fallbacks_in_use
 
@@ -49,6 +50,15 @@ def loop_modules(package: str) -> list[str]:
         if file.exists() and f"from {_COMPILED} import" in file.read_text(encoding="utf-8"):
             modules.append(module_info.name)
     return modules
+
+
+def compile_with_progress(shares: tuple[tuple[str, ...], ...] = ALL) -> int:
+    """Compile loops like ``compile_loops``, with a progress bar."""
+    with ProgressBar("compiling loops") as bar:
+        return compile_loops(
+            lambda done, total, name: bar.update(done, total, note=name.rpartition(".")[2]),
+            shares,
+        )
 
 
 def compile_loops(

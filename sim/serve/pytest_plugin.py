@@ -16,7 +16,6 @@ import pytest
 
 if TYPE_CHECKING:
     from snakewalk.sim.serve.servo_bus import ServoBus
-    from snakewalk.sim.sniff.decode import DecodedPacket
 
 
 _SHOWN = 20
@@ -32,13 +31,10 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
     if report.when == "call" and report.failed:
         buses = [bus for node in item.listchain() for bus in node.stash.get(_BUSES, [])]
         for bus in buses:
-            lines = [*([bus.lateness] if bus.lateness else []), *map(_text, bus.packets[-_SHOWN:])]
+            lines = [bus.lateness] if bus.lateness else []
+            lines += [packet.text() for packet in bus.packets[-_SHOWN:]]
             if lines:
                 report.sections.append(("servo_bus", "\n".join(lines)))
-
-
-def _text(packet: "DecodedPacket") -> str:
-    return packet.text()
 
 
 def _buses(node: pytest.Item) -> "Iterator[Callable[..., ServoBus]]":

@@ -2,6 +2,7 @@
 
 import queue
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -47,11 +48,11 @@ class ServoBus:
         """Port of the simulated bus, in simulated time."""
         plan = load(Path(faults), FaultPlan) if isinstance(faults, str | Path) else faults
         self._faults = None if plan is None else FaultPlayer(self.line, plan)
-        self.packets: list[DecodedPacket] = []
-        """Requests and replies so far, decoded."""
+        self._packets: list[DecodedPacket] = []
+        self._heard: deque[tuple[float, bytes]] = deque()  # decoded when a test asks
         records = dict(zip(chain.ids, chain.records(), strict=True))
-        decoder = decoder_for(records[chain.ids[0]], records)
-        self.line.taps.append(lambda at_s, _, data: self.packets.extend(decoder.feed(at_s, data)))
+        self._decoder = decoder_for(records[chain.ids[0]], records)
+        self.line.taps.append(lambda at_s, _, data: self._heard.append((at_s, bytes(data))))
         self._baud = baud
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
@@ -123,6 +124,13 @@ class ServoBus:
             self._faults.add(plan, "fault")
 
         self._do(begin)
+
+    @property
+    def packets(self) -> list[DecodedPacket]:
+        """Requests and replies so far, decoded."""
+        while self._heard:
+            self._packets += self._decoder.feed(*self._heard.popleft())
+        return self._packets
 
     @property
     def lateness(self) -> str | None:

@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.bench.loop_compiler import ALL, FOR_RUNS, compile_loops
+from snakewalk.controller.bench.loop_compiler import ALL, FOR_RUNS, compile_with_progress
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, show
-from snakewalk.controller.console.progress import ProgressBar
 
 
 @command("tools compile", examples=("tools compile", "tools compile --runs"))
@@ -25,10 +24,5 @@ def compile_all(
     """Compile all loops once, after installation, so that no later command waits for it."""
     if importlib.util.find_spec("numba") is None:
         raise InputError("compile: numba is not installed, and loops run uncompiled")
-    with ProgressBar("compiling loops") as bar:
-
-        def on_module(done: int, total: int, name: str) -> None:
-            bar.update(done, total, note=name.rpartition(".")[2])
-
-        count = compile_loops(on_module, FOR_RUNS if runs else ALL)
+    count = compile_with_progress(FOR_RUNS if runs else ALL)
     show({"compiled_loops": count}, as_json)

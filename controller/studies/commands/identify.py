@@ -30,7 +30,6 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
-    atomic_write,
     refuse_to_overwrite,
     write_result,
 )
@@ -263,9 +262,8 @@ def _friction(
             on_progress=bar.update,
         )
     if out is not None:
-        with atomic_write(out) as part:
-            text = template(friction_fit.world(ground), "\n".join(friction_fit.comment(paths)))
-            part.write_text(text, encoding="utf-8")
+        text = template(friction_fit.world(ground), "\n".join(friction_fit.comment(paths)))
+        write_result(out, text)
     if friction_fit.mass is not None and outs.robot is not None:
         _write_mass(outs.robot, first.robot, friction_fit.mass, paths)
     kept, _ = resistance_of(friction_fit.world(ground))

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Final
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_loops
+from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_with_progress
 from snakewalk.controller.console.child_process import run_command, start
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
-from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.log_page import LogPage, play
@@ -37,27 +36,20 @@ def demo(view_at: ViewAt = VIEW_AT) -> None:
     page.toggle()
     print(f"{page.url}  (a recorded run; ^C ends)", flush=True)
     compiler = start(_compile_behind, daemon=True)
-    offers = (line for line in (f"{_LIVE}  runs the same live; Enter does it now",))
-
-    def wants_live() -> bool:
-        if compiler.is_alive():
-            return False
-        for line in offers:
-            print(line, flush=True)
-        return sys.stdin.isatty() and bool(select.select([sys.stdin], [], [], 0.0)[0])
-
-    play(page, WallClock(), wants_live)
+    clock = WallClock()
+    play(page, clock, lambda: not compiler.is_alive())
+    print(f"{_LIVE}  runs the same live; Enter does it now", flush=True)
+    play(page, clock, _is_enter_pressed)
     page.server.stop()
     raise SystemExit(run_command([*_LIVE.split()[1:], "--view-at", view_at]))
 
 
+def _is_enter_pressed() -> bool:
+    return sys.stdin.isatty() and bool(select.select([sys.stdin], [], [], 0.0)[0])
+
+
 def _compile_behind() -> None:
     """In a child: compile the loops of runs at a low priority."""
-    if importlib.util.find_spec("numba") is None:
-        return
-    os.nice(_NICE)
-    with ProgressBar("compiling loops") as bar:
-        compile_loops(
-            lambda done, total, name: bar.update(done, total, note=name.rpartition(".")[2]),
-            FOR_RUNS,
-        )
+    if importlib.util.find_spec("numba") is not None:
+        os.nice(_NICE)
+        compile_with_progress(FOR_RUNS)
