@@ -38,23 +38,27 @@ _TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 _REASONED: Final = ("nightly", "costs")
 
 
-def _descendants(pid: str) -> Iterator[str]:
+def descendants(pid: str) -> Iterator[str]:
     """Process IDs of the living descendants of a process (Linux; elsewhere none)."""
-    for file in Path("/proc", pid, "task").glob("*/children"):
+    try:  # a process may end at any time
+        files = list(Path("/proc", pid, "task").glob("*/children"))
+    except OSError:
+        return
+    for file in files:
         try:
             children = file.read_text().split()
         except OSError:
             continue
         for child in children:
             yield child
-            yield from _descendants(child)
+            yield from descendants(child)
 
 
 def cpu_s() -> float:
     """Return the CPU time of this process and its descendants so far."""
     ended = resource.getrusage(resource.RUSAGE_CHILDREN)
     total_s = time.process_time() + ended.ru_utime + ended.ru_stime
-    for pid in _descendants("self"):
+    for pid in descendants("self"):
         try:
             fields = Path("/proc", pid, "stat").read_text().rpartition(")")[2].split()
         except OSError:

@@ -11,7 +11,17 @@ from typing import Any
 
 import pytest
 
-from tests.tiers.costs import LIMIT_S, MARGIN, TRIES, Meter, Table, cpu_s, measure_again, reason_of
+from tests.tiers.costs import (
+    LIMIT_S,
+    MARGIN,
+    TRIES,
+    Meter,
+    Table,
+    cpu_s,
+    descendants,
+    measure_again,
+    reason_of,
+)
 
 BURN = "import time\nwhile time.process_time() < 0.1: pass"
 
@@ -120,3 +130,9 @@ def test_a_marker_without_a_reason_is_rejected(arguments: tuple[object, ...]) ->
 def test_a_reason_is_read() -> None:
     assert reason_of(item(pytest.mark.costs("a film").mark), "costs") == "a film"
     assert reason_of(item(), "costs") is None
+
+
+def test_a_process_that_has_ended_has_nodescendants(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        pass
+    assert list(descendants(str(ended.pid))) == []
