@@ -18,7 +18,6 @@ from tests.tiers.costs import (
     Meter,
     Table,
     cpu_s,
-    descendants,
     measure_again,
     reason_of,
 )
@@ -130,9 +129,3 @@ def test_a_marker_without_a_reason_is_rejected(arguments: tuple[object, ...]) ->
 def test_a_reason_is_read() -> None:
     assert reason_of(item(pytest.mark.costs("a film").mark), "costs") == "a film"
     assert reason_of(item(), "costs") is None
-
-
-def test_a_process_that_has_ended_has_nodescendants(tmp_path: Path) -> None:
-    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
-        pass
-    assert list(descendants(str(ended.pid))) == []
