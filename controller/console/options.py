@@ -223,6 +223,10 @@ Keypoints = Annotated[
 Plane = Annotated[
     str | None, typer.Option(help="plane of markers in space: xy (default), xz or yz")
 ]
+TimeUnit = Annotated[
+    str | None,
+    typer.Option(help="unit of times if a table states none: s, ms, us or ns"),
+]
 Set = Annotated[
     list[str] | None,
     typer.Option(

@@ -75,22 +75,33 @@ class JointReader(Protocol):
         ...
 
 
-def likely_unit(angles: Floats) -> tuple[str, float]:
-    """Return the probable unit of angles without one, and the largest angle."""
+def radians(where: str, angles: Floats, unit: str | None, hint: str) -> Floats:
+    """Return angles in radians.
+
+    Raises:
+        InputError: neither the file nor the user states their unit; proposes the likely one.
+
+    """
+    if unit is not None:
+        return angles * UNITS[unit]
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
-    return ("deg" if largest > 2.0 * np.pi else "rad"), largest
+    likely = "deg" if largest > 2.0 * np.pi else "rad"
+    raise InputError(
+        f"{where} states no unit of angles, which go to {largest:.3g}; say --unit {likely} ({hint})"
+    )
 
 
-def time_unit(path: Path, time: Floats, column: str, answer: str = "--time-unit {unit}") -> float:
-    """Return the size in seconds of the unit of times (T,) without a stated one.
+def second(path: Path, time: Floats, column: str, unit: str | None) -> float:
+    """Return the size in seconds of the unit of times (T,), which may not be stated.
 
-    Seconds are assumed if no other unit gives steps that a recording of motion has. ``answer`` is
-    the option for each reading, of ``unit`` and ``rate_hz``.
+    Seconds are assumed if no other unit gives steps that a recording of motion has.
 
     Raises:
         InputError: another unit is possible; proposes those that are.
 
     """
+    if unit is not None:
+        return TIME_UNITS[unit]
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if len(steps) else 0.01
     least_s, most_s = _STEPS_S
@@ -99,8 +110,7 @@ def time_unit(path: Path, time: Floats, column: str, answer: str = "--time-unit 
         return 1.0
     length = float(np.nanmax(time) - np.nanmin(time))
     readings = " or ".join(
-        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz "
-        f"({answer.format(unit=unit, rate_hz=1.0 / (step * size))})"
+        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz (--time-unit {unit})"
         for unit, size in TIME_UNITS.items()
         if unit in {"s", *possible}
     )
@@ -160,28 +170,50 @@ def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion
     return JointMotion(time_s - time_s[0], motion.names, joint_rad[is_complete], tuple(lines))
 
 
-def _in_order(names: Sequence[str], where: str) -> tuple[list[str], str]:
-    """Return names from head to tail, and what decides it.
+def _by_stem(names: Sequence[str]) -> dict[str, list[str]]:
+    """Return names by their letters before the number, in the order of the numbers.
+
+    Names of which one has no number have no stems: the result is empty.
+    """
+    parts = [(_NUMBERED.match(name), name) for name in names]
+    if any(part is None for part, _ in parts):
+        return {}
+    numbered = sorted((int(part[2]), part[1], name) for part, name in parts if part is not None)
+    stems = dict.fromkeys(stem for _, stem, _ in numbered)
+    return {s: [name for _, stem, name in numbered if stem == s] for s in stems}
+
+
+def _by_number(names: Sequence[str], joint_names: Sequence[str], where: str) -> dict[str, str]:
+    """Return the name in the file of each joint of a robot, both numbered from the head.
 
     Raises:
-        InputError: names of several stems are sorted as text: 10 stands before 2.
+        InputError: the names have several stems, which are not those of the robot's joints; shows
+            a mapping.
 
     """
-    parts = [_NUMBERED.match(name) for name in names]
-    numbered = [(part[1], int(part[2])) for part in parts if part is not None]
-    stems = [stem for stem, _ in numbered]
-    if len(numbered) == len(names) and len(set(stems)) == 1:
-        by_number = sorted(zip([number for _, number in numbered], names, strict=True))
-        return [name for _, name in by_number], "number"
-    for stem in stems:
-        numbers = [number for name, number in numbered if name == stem]
-        if numbers != sorted(numbers):
-            raise InputError(
-                f"{where}: its joints {', '.join(names)} are in the order of the alphabet, which "
-                f"is not that of a body ({stem}{numbers[0]} to {stem}{numbers[-1]}); say --joint "
-                "ROBOT=FILE for each"
-            )
-    return list(names), "their order"
+    theirs, ours = _by_stem(names), _by_stem(joint_names)
+    if len(theirs) == 1:
+        return dict(zip(joint_names, *theirs.values(), strict=True))
+    pairs = {
+        joint: name
+        for stem, joints in ours.items()
+        for other, file_names in theirs.items()
+        if len(joints) == len(file_names) and _words(stem) & _words(other)
+        for joint, name in zip(joints, file_names, strict=True)
+    }
+    if len(theirs) == len(ours) and sorted(pairs.values()) == sorted(names):
+        return pairs
+    options = " ".join(
+        f"--joint {ours}={theirs}" for ours, theirs in zip(joint_names, names, strict=True)
+    )
+    raise InputError(
+        f"{where}: the names of its joints do not state their order on the body; in the order of "
+        f"the file: {options}; add these options, after you have corrected them"
+    )
+
+
+def _words(stem: str) -> set[str]:
+    return set(re.findall("[a-z]+", stem.lower()))
 
 
 def onto_robot(
@@ -190,7 +222,7 @@ def onto_robot(
     """Return times (T,), angles (T, J) in the order of a robot's joints, and lines about both.
 
     ``asked`` has priority, then equal names. If no name is equal and the numbers of joints agree,
-    joints are mapped by the numbers in their names if all have one stem, else in their order.
+    joints are mapped by the numbers in their names, within stems such as ``yaw`` and ``pitch``.
 
     Args:
         motion: from a file.
@@ -199,8 +231,8 @@ def onto_robot(
         where: name of the file in messages.
 
     Raises:
-        InputError: a joint of the robot has no counterpart, the order contradicts the numbers in
-            the names, or fewer than two rows have all values.
+        InputError: a joint of the robot has no counterpart, the names do not state their order on
+            the body, or fewer than two rows have all values.
 
     """
     joint_names = robot.joint_names
@@ -214,8 +246,8 @@ def onto_robot(
     lost = [name for name, theirs in pairs.items() if theirs not in (*names, REST)]
     source = "name"
     if lost and not asked and len(lost) == len(joint_names) == len(names):
-        ordered, source = _in_order(names, where)
-        pairs = dict(zip(joint_names, ordered, strict=True))
+        pairs = _by_number(names, joint_names, where)
+        source = "number"
         lost = []
     if lost:
         raise InputError(

@@ -11,12 +11,15 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.motion.parted_recording import gaps
+from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.slowing import CUT_CYCLES
 from snakewalk.controller.track.wave import measure_wave
 
 
-def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
+def recorded_joints(
+    track: str, robot: RobotConfig, time_unit: str | None = None
+) -> tuple[Floats, Floats]:
     """Read times (T,) and joint angles (T, J) from the file itself, or from its midlines.
 
     Joints of midlines are smoothed, with a cut well above the wave's frequency. Long gaps, in which
@@ -26,10 +29,10 @@ def recorded_joints(track: str, robot: RobotConfig) -> tuple[Floats, Floats]:
         InputError: no such recording, or it was made for another robot.
 
     """
-    stored = _stored_joints(track, robot)
+    stored = None if time_unit else _stored_joints(track, robot)
     if stored is not None:
         return stored
-    recording = load_track(track)
+    recording = load_track(track, choice=Choice(time_unit=time_unit))
     if recording.frames < 2:
         raise InputError(f"{track}: has one frame; a motion needs two")
     joints = Retarget(robot).joints_rad(recording.angles_rad)

@@ -68,7 +68,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
     "config": (20_250, "0270-one-reader-of-text-tables.md"),
     "controller.mapping": (19_200, "0270-one-reader-of-text-tables.md"),
-    "controller.motion": (10_150, "0225-a-recording-rests-at-its-gaps.md"),
+    "controller.motion": (10_200, "0246-names-of-joints-state-their-order.md"),
     "controller.pose": (8300, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (9550, "0275-a-recorded-run-first.md"),

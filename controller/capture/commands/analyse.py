@@ -18,6 +18,7 @@ from snakewalk.controller.console.options import (
     MinScore,
     Plane,
     Rate,
+    TimeUnit,
     console,
 )
 from snakewalk.controller.console.progress import show_progress
@@ -46,6 +47,7 @@ def analyse(
     individual: Individual = None,
     keypoints: Keypoints = None,
     plane: Plane = None,
+    time_unit: TimeUnit = None,
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -57,7 +59,7 @@ def analyse(
 ) -> None:
     """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
     check_rate(rate, recordings)
-    choice = choice_of(individual, keypoints, plane)
+    choice = choice_of(individual, keypoints, plane, time_unit)
     files = _pictures(recordings, picture, force)
     analyses = []
     pairs = list(zip(recordings, files, strict=True))

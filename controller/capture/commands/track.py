@@ -21,6 +21,7 @@ from snakewalk.controller.console.options import (
     MinScore,
     Plane,
     Rate,
+    TimeUnit,
     console,
 )
 
@@ -60,6 +61,7 @@ def track(
     individual: Individual = None,
     keypoints: Keypoints = None,
     plane: Plane = None,
+    time_unit: TimeUnit = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -81,7 +83,7 @@ def track(
     if output is not None and len(names) > 1:
         raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
     check_rate(rate, names)
-    choice = choice_of(individual, keypoints, plane)
+    choice = choice_of(individual, keypoints, plane, time_unit)
     tracked = [
         examine(
             name,

@@ -9,13 +9,11 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
-    TIME_UNITS,
-    UNITS,
     JointMotion,
     JointRequest,
     joint_motion,
-    likely_unit,
-    time_unit,
+    radians,
+    second,
 )
 
 _TIME: Final = {
@@ -62,9 +60,11 @@ class JointTable:
                     f"{path}: line {line}: {len(row)} cells, the first line names {len(cells)}"
                 )
         values = numbers_of(path, rows, cells, range(2, len(rows) + 2))
-        unit = _unit_of(path, units, request, values[:, 1:])
+        unit = _unit_of(path, units, request)
+        hint = "or end the names of columns in _rad or _deg"
+        angles = radians(f"{path}:", values[:, 1:], unit, hint)
         time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
-        return joint_motion(path, time_s, names, values[:, 1:] * UNITS[unit])
+        return joint_motion(path, time_s, names, angles)
 
 
 def _second(path: Path, column: str, request: JointRequest, time: Floats) -> float:
@@ -74,8 +74,7 @@ def _second(path: Path, column: str, request: JointRequest, time: Floats) -> flo
         raise InputError(
             f"--time-unit {request.time_unit}: {path} states {unit}; leave the option out"
         )
-    unit = unit or request.time_unit
-    return time_unit(path, time, column) if unit is None else TIME_UNITS[unit]
+    return second(path, time, column, unit or request.time_unit)
 
 
 def _plain(name: str) -> str:
@@ -83,22 +82,16 @@ def _plain(name: str) -> str:
     return re.sub(r"[\s_]*[\[(](\w+)[\])]", r"_\1", name.strip().lower())
 
 
-def _unit_of(path: Path, stated: set[str], request: JointRequest, angles: Floats) -> str:
+def _unit_of(path: Path, stated: set[str], request: JointRequest) -> str | None:
     """Return the unit that all columns state, or that the user gives.
 
     Raises:
-        InputError: neither does; proposes the likely one.
+        InputError: both state one.
 
     """
-    if len(stated) == 1 and "?" not in stated:
-        (unit,) = stated
-        if request.unit not in (None, unit):
-            raise InputError(f"--unit {request.unit}: {path} states {unit}; leave the option out")
-        return unit
-    if request.unit is not None:
+    if len(stated) != 1 or "?" in stated:
         return request.unit
-    likely, largest = likely_unit(angles)
-    raise InputError(
-        f"{path}: does not state the unit of its angles, which go to {largest:.3g}; "
-        f"say --unit {likely} (or name columns as joint_{likely})"
-    )
+    (unit,) = stated
+    if request.unit not in (None, unit):
+        raise InputError(f"--unit {request.unit}: {path} states {unit}; leave the option out")
+    return unit

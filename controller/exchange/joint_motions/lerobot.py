@@ -17,11 +17,10 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     MOST_CELLS,
-    UNITS,
     JointMotion,
     JointRequest,
     joint_motion,
-    likely_unit,
+    radians,
 )
 
 _FEATURES: Final = ("observation.state", "action")
@@ -58,16 +57,12 @@ class LeRobotEpisode:
             names = [f"{feature}.{k}" for k in range(values.shape[1])]
         if len(names) != values.shape[1]:
             raise InputError(f"{path}: {feature}: {len(names)} names of {values.shape[1]} values")
-        if request.unit is None:
-            likely, largest = likely_unit(values)
-            raise InputError(
-                f"{path}: {feature} does not state its unit; its values go to {largest:.3g}; say "
-                f"--unit {likely} (motors normalized to -100..100 are not angles)"
-            )
+        hint = "motors normalized to -100..100 are not angles"
+        angles = radians(f"{path}: {feature}", values, request.unit, hint)
         if not np.isfinite(time_s).all():
             time_s = np.arange(len(values)) / rate_hz
         notes = [f"episode {episode} of {episodes}, {feature}, LeRobot {version}"]
-        return joint_motion(path, time_s, names, values * UNITS[request.unit], notes)
+        return joint_motion(path, time_s, names, angles, notes)
 
 
 def _episode(path: Path, request: JointRequest, episodes: int) -> int:

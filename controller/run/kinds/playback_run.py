@@ -37,11 +37,11 @@ def foreign_joints(
     """
     path = Path(track)
     reader = _reader(path)
-    names = ("joints", "unit", "time_unit", "topic", "episode")
+    names = ("joints", "unit", "topic", "episode")
     given = [name for name in names if getattr(asked, name) not in (None, {})]
     if reader is None:
         if given:
-            option = "--joint" if given[0] == "joints" else f"--{given[0].replace('_', '-')}"
+            option = "--joint" if given[0] == "joints" else f"--{given[0]}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None
     motion = reader.read(
@@ -103,7 +103,7 @@ class PlaybackRun(PathlessRun):
         if self._foreign is not None:
             time_s, joints, _ = self._foreign
         else:
-            time_s, joints = recorded_joints(self.run.track, self.robot)
+            time_s, joints = recorded_joints(self.run.track, self.robot, self._asked.time_unit)
         return time_s, self._asked.scale * joints
 
     @cached_property

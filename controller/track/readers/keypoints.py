@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.motion.joint_motion import TIME_UNITS
 from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import Track, track_from_points
@@ -29,13 +30,15 @@ _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Selected part of a file: the options ``--individual``, ``--keypoints`` and ``--plane``."""
+    """Choices that a file may need: options of the same names."""
 
     individual: str | None = None
     keypoints: tuple[str, ...] | None = None
     """Names along the midline, head first; None: all, in the order of the file."""
     plane: str | None = None
     """Plane of markers in space, one of ``PLANES``; None is xy."""
+    time_unit: str | None = None
+    """Unit of times that a table does not state."""
 
     def only(self, file: Path, kind: str, *allowed: str) -> None:
         """Reject options that do not apply to a kind of file.
@@ -45,10 +48,11 @@ class Choice:
 
         """
         refusals = {"individual": "names no animals", "keypoints": "names no keypoints"}
-        refusals["plane"] = "is flat already"
+        refusals |= {"plane": "is flat already", "time_unit": "needs no unit of time"}
         for name, reason in refusals.items():
             if getattr(self, name) is not None and name not in allowed:
-                raise InputError(f"{file}: --{name}: {kind} {reason}; leave it out")
+                option = name.replace("_", "-")
+                raise InputError(f"{file}: --{option}: {kind} {reason}; leave it out")
 
     def animal(self, file: Path, names: Sequence[str], present: Sequence[str]) -> str:
         """Name of the selected animal; ``present`` are those of ``names`` with any point.
@@ -99,17 +103,20 @@ ALL = Choice()
 """Choice of nothing: one animal, all of its keypoints."""
 
 
-def choice_of(individual: str | None, keypoints: str | None, plane: str | None) -> Choice:
+def choice_of(
+    individual: str | None, keypoints: str | None, plane: str | None, time_unit: str | None = None
+) -> Choice:
     """Make a choice from command line values; ``keypoints`` is A,B,C.
 
     Raises:
-        InputError: the plane is unknown.
+        InputError: the plane or the unit is unknown.
 
     """
-    if plane is not None and plane not in PLANES:
-        raise InputError(f"--plane {plane}: expected one of {', '.join(PLANES)}")
+    for option, value, allowed in (("plane", plane, PLANES), ("time-unit", time_unit, TIME_UNITS)):
+        if value is not None and value not in allowed:
+            raise InputError(f"--{option} {value}: expected one of {', '.join(allowed)}")
     names = None if keypoints is None else tuple(part.strip() for part in keypoints.split(","))
-    return Choice(individual, names, plane)
+    return Choice(individual, names, plane, time_unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +184,7 @@ class Keypoints:
             InputError: as ``sure``, an unknown keypoint, or an order that cannot be a body's.
 
         """
+        choice.only(self.file, "a file of keypoints", "individual", "keypoints", "plane")
         places = self.sure(choice.order(self.file, self.nodes))
         if choice.keypoints is None and zigzag(places) > _ZIGZAG:
             raise InputError(

@@ -8,7 +8,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import numbers_of, read_rows
-from snakewalk.controller.motion.joint_motion import time_unit
+from snakewalk.controller.motion.joint_motion import second
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
@@ -45,13 +45,13 @@ def load_csv(
             rows = _of_animal(file, rows, column, choice)
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
             table = _numbers(file, rows, columns)
-            track = _midline(file, table, scale_m, rate_hz, _status_of(rows, column))
+            track = _midline(file, table, scale_m, rate_hz, choice, _status_of(rows, column))
             return _about(file, track, rows, column)
     for name, scale_m in _WIDE.items():
         if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
             table = _long(file, rows, column, name.removeprefix("x_"))
-            track = _midline(file, table, scale_m, rate_hz, _status_of(rows, column))
+            track = _midline(file, table, scale_m, rate_hz, choice, _status_of(rows, column))
             return _about(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
@@ -68,9 +68,9 @@ def _of_animal(
 ) -> list[list[str]]:
     animals = column.get("animal")
     if animals is None:
-        choice.only(file, "a CSV of midlines")
+        choice.only(file, "a CSV of midlines", "time_unit")
         return rows
-    choice.only(file, "a CSV of midlines", "individual")
+    choice.only(file, "a CSV of midlines", "individual", "time_unit")
     names = [row[animals].strip() if animals < len(row) else "" for row in rows[1:]]
     listed = list(dict.fromkeys(names))
     mine = choice.animal(file, listed, listed)
@@ -121,9 +121,10 @@ def _midline(
     table: Floats,
     scale_m: float | None,
     rate_hz: float | None,
+    choice: Choice,
     status: dict[float, FrameStatus],
 ) -> Track:
-    """Track from rows of t (s), frame, point (1 is the head), x, y."""
+    """Track from rows of t, frame, point (1 is the head), x, y."""
     if not np.isfinite(table[:, :3]).all():
         lost = int((~np.isfinite(table[:, :3])).any(axis=1).sum())
         raise InputError(
@@ -140,7 +141,7 @@ def _midline(
             f"{file}: every frame must list the same points; frame {odd} differs from the first"
         )
     points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
-    time_s = table[first, 0] if rate_hz is None else None
+    time_s = None
     if rate_hz is None:
         if len(frames) < 2:
             raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
@@ -151,8 +152,9 @@ def _midline(
                 f"{file}: t must increase from frame to frame, in seconds; it does not in "
                 f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
             )
-        time_unit(file, np.cumsum(step), "t", "--rate {rate_hz:.4g}")
-        rate_hz = float(1.0 / np.median(step))
+        unit_s = second(file, np.cumsum(step), "t", choice.time_unit)
+        rate_hz = float(1.0 / np.median(unit_s * step))
+        time_s = unit_s * table[first, 0]
     return track_from_points(
         file.stem,
         points,

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.resample import body_points
 from snakewalk.controller.track.track import track_from_points
@@ -108,6 +110,13 @@ def test_milliseconds_in_a_table_are_asked_about(tmp_path: Path) -> None:
         ]
     path = tmp_path / "ms.csv"
     path.write_text("\n".join(table))
-    with pytest.raises(InputError, match=r"0\.05 Hz \(--rate 0\.05\) or .* 50 Hz \(--rate 50\)"):
+    with pytest.raises(
+        InputError, match=r"0\.05 Hz \(--time-unit s\) or .* 50 Hz \(--time-unit ms\)"
+    ):
         load_track(str(path))
     assert load_track(str(path), 50.0).time_s[-1] == pytest.approx(1.18)
+    assert load_track(str(path), choice=Choice(time_unit="ms")).time_s[-1] == pytest.approx(1.18)
+    with pytest.raises(InputError, match="--time-unit s"):
+        _ = prepare_playback(str(path)).joint_track
+    played = prepare_playback(str(path), time_unit="ms")
+    assert played.joint_track[0][-1] == pytest.approx(1.18)

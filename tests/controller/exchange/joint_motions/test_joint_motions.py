@@ -145,7 +145,7 @@ def test_a_table_of_joint_angles(
 
 def test_a_table_that_states_no_unit_is_asked_about_with_the_likely_one(tmp_path: Path) -> None:
     table(tmp_path / "a.csv", ["time", *NAMES])
-    with pytest.raises(InputError, match=r"does not state the unit.*say --unit rad"):
+    with pytest.raises(InputError, match=r"states no unit of angles.*say --unit rad"):
         plays(tmp_path / "a.csv")
     table(tmp_path / "a.csv", ["time", *NAMES], 180.0 / np.pi * ANGLES)
     with pytest.raises(InputError, match=r"go to 17\.2; say --unit deg"):
@@ -177,7 +177,7 @@ def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
     dataset(tmp_path / "set", version, 180.0 / np.pi)
     with pytest.raises(InputError, match="has 2 episodes; say --episode 0 to 1"):
         plays(tmp_path / "set")
-    with pytest.raises(InputError, match=r"does not state its unit.*--unit deg"):
+    with pytest.raises(InputError, match=r"states no unit of angles.*--unit deg"):
         plays(tmp_path / "set", episode=1)
     joints = {name: f"{name}.pos" for name in NAMES}
     notes = plays(tmp_path / "set", 0.5 * ANGLES, episode=1, unit="deg", joints=joints)
@@ -243,6 +243,8 @@ def test_faults_of_a_table(make: Callable[[Path], None], said: str, tmp_path: Pa
 def test_options_of_joint_files_are_rejected_for_midlines() -> None:
     with pytest.raises(InputError, match="--unit: worm-like has no joint angles with names"):
         prepare_playback("worm-like", unit="rad")
+    with pytest.raises(InputError, match="--time-unit: a shipped recording needs no unit of time"):
+        _ = prepare_playback("worm-like", time_unit="ms").joint_track
     assert (
         snakewalk("play", "worm-like", "--unit", "grad").stderr.count("is not one of 'rad', 'deg'")
         == 1
@@ -267,13 +269,35 @@ def test_names_of_one_stem_are_mapped_by_their_numbers(tmp_path: Path) -> None:
     )
 
 
-def test_names_of_several_stems_are_mapped_in_their_order_unless_their_numbers_are_not(
-    tmp_path: Path,
-) -> None:
-    mixed = [f"{'ab'[k % 2]}{k}" for k in range(16)]
-    assert in_order(tmp_path / "a.csv", mixed).startswith("joints by their order: yaw_01 = a0")
-    with pytest.raises(InputError, match=r"in the order of the alphabet.*--joint ROBOT=FILE"):
-        in_order(tmp_path / "b.csv", sorted(mixed))
+def mapping(names: list[str], robot: str) -> str:
+    """Return how joints of a file, one of which moves, are mapped onto a robot."""
+    motion = joint_motion(Path("a.csv"), TIME_S, names, ANGLES)
+    return onto_robot(motion, load_robot(robot), {}, "a.csv")[2][0]
+
+
+def test_names_of_several_stems_are_mapped_by_their_numbers_within_the_robots_stems() -> None:
+    kinds = [f"{kind}_joint_{k}" for kind in ("Pitch", "Yaw") for k in range(1, 9)]
+    line = mapping(sorted(kinds), "alternating16")
+    assert line.startswith("joints by number: ")
+    pairs = dict(pair.split(" = ") for pair in line.removeprefix("joints by number: ").split(", "))
+    assert {ours[:3].title() for ours, theirs in pairs.items() if theirs.startswith("Yaw")} == {
+        "Yaw"
+    }
+    yaws = [pairs[name] for name in sorted(pairs) if name.startswith("yaw")]
+    assert yaws == [f"Yaw_joint_{k}" for k in range(1, 9)]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"{'ab'[k % 2]}{k}" for k in range(16)],
+        [f"{'ab'[k // 8]}{k % 8}" for k in range(16)],
+        ["neck", *(f"joint_{k}" for k in range(15))],
+    ],
+)
+def test_names_without_an_order_on_the_body_are_asked_about(names: list[str]) -> None:
+    with pytest.raises(InputError, match=f"--joint yaw_01={names[0]} --joint yaw_02={names[1]} "):
+        mapping(names, "yaw16")
 
 
 @pytest.mark.parametrize(
