@@ -65,6 +65,11 @@ class FreshConnection(ServerConnection):
         self.beginnings_s: deque[float] = deque()
         """Earliest beginning of each message that was not received yet, if late ones pass."""
 
+    @property
+    def heard_s(self) -> float:
+        """When the newest ping was sent that the browser has answered."""
+        return self._since_s
+
     def process_event(self, event: Any) -> None:
         """Check a frame's age in the order of arrival."""
         if isinstance(event, Frame):

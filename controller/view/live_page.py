@@ -39,6 +39,7 @@ from snakewalk.controller.view.dashboard import SPAN_S, Dashboard
 from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gait_panel import GaitPanel
 from snakewalk.controller.view.gamepad_panel import GamepadPanel
+from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.view.stop_element import StopElement
@@ -51,10 +52,10 @@ _PERIOD_S: Final = 0.05
 """Time between two drawings of the body."""
 _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
-_SILENT_S: Final = 2.0
-"""A run that sends nothing for this time is reported."""
-_LAST_S: Final = 0.2
-"""Time for the verdict to reach the browsers."""
+_SILENT_S: Final = 0.5
+"""A run that sends nothing for this time may have ended."""
+_LAST_S: Final = 1.5
+"""Longest time for the verdict to reach the browsers."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
 
@@ -82,7 +83,7 @@ def serve(line: socket.socket, host: str, port: int) -> None:
             except Exception as fault:  # the E-STOP stays
                 page.report(fault)
     server.flush()
-    WallClock().sleep_until_s(WallClock().now_s() + _LAST_S)
+    page.end()
     server.stop()
 
 
@@ -117,6 +118,7 @@ class _LivePage:
         self._waypoint_panel: WaypointPanel | None = None
         self._takes_waypoints = False
         self._over = False
+        self._are_lost = False
         self._faults: set[str] = set()
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
 
@@ -132,14 +134,19 @@ class _LivePage:
             self._take(topic, row)
             if topic == PoseTable.topic.name:
                 self._told_s = self._clock.now_s()
+                self._stop.newest_s = self._freshness.now_s()
                 self._draw()
         if self._button is not None and now_s - max(self._told_s, 0.0) > _SILENT_S:
             ended = self._button.end
             if ended is not None and not self._over:
                 self._over = True
                 self._stop.ended(ended)
-            elif self._told_s > 0.0 and not self._over:
-                self._stop.show(f"no news of the run for {now_s - self._told_s:.0f} s")
+
+    def end(self) -> None:
+        """Wait until the browsers were sent what they show from now on."""
+        until_s = self._clock.now_s() + _LAST_S
+        while not self._stop.is_shown and self._clock.now_s() < until_s:
+            self._clock.sleep_until_s(self._clock.now_s() + _PERIOD_S)
 
     def report(self, fault: Exception) -> None:
         text = " ".join(
@@ -154,7 +161,12 @@ class _LivePage:
         since_s = min(self._collected_s, self._freshness.take())
         self._collected_s = self._freshness.now_s()
         for command in self._commands():
+            self._stop.operators.note_command()
             self._end.command(timed(command, since_s))
+        are_lost = self._stop.operators.are_lost()
+        if are_lost != self._are_lost:
+            self._are_lost = are_lost
+            self._end.command(OPERATOR_LOST if are_lost else OPERATOR_BACK)
         for late_s in self._stop.late_s():
             self._end.command(timed("an input", late_s))
 
@@ -202,7 +214,9 @@ class _LivePage:
         if topic == PICTURE:
             self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
         else:
-            self._dashboard.show_verdict(RunVerdict(**row))
+            verdict = RunVerdict(**row)
+            self._dashboard.show_verdict(verdict)
+            self._stop.judged(f"{verdict.text} ({verdict.evidence})")
 
     def _open(self, header: Header) -> None:
         """Draw the body of a run that begins, and its panels."""

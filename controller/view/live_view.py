@@ -20,6 +20,7 @@ from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dead_man import DeadMan
+from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST, SILENT_S
 
 _PICTURE_S: Final = 0.5
 """Pictures of a camera are shown no more often (ours)."""
@@ -44,6 +45,7 @@ class LiveView(ObserverProcess):
         self._picture: bytes | None = None
         self._picture_s = -math.inf
         self._dead_man = DeadMan()
+        self._is_operator_lost = False
 
     @property
     def is_enabled(self) -> bool:
@@ -52,7 +54,23 @@ class LiveView(ObserverProcess):
 
     def pressed(self) -> list[str | Refused]:
         """Inputs set in the page since the last call, for an ``Operator`` or a ``LiveCourse``."""
-        return fresh_commands(self._end.commands(), self._dead_man, time.monotonic)
+        lines = []
+        for line in self._end.commands():
+            if line in (OPERATOR_LOST, OPERATOR_BACK):
+                self._is_operator_lost = line == OPERATOR_LOST
+            else:
+                lines.append(line)
+        return fresh_commands(lines, self._dead_man, time.monotonic)
+
+    def lost(self, now_s: float) -> str | None:
+        """Return why its E-STOP has failed, or None."""
+        why = super().lost(now_s)
+        if why is None and self._is_operator_lost:
+            return (
+                f"page: the browser that steers has not answered for {SILENT_S:g} s, "
+                "so its E-STOP may not work"
+            )
+        return why
 
     def on_gait(self, name: str, parameters: dict[str, float]) -> None:
         """Show in the page the sliders of the gait that an operator runs."""

@@ -1,8 +1,11 @@
-// Our own element in the page: the E-STOP, at every width, over everything else.
-// It also drops inputs that waited in the browser, before viser sends them as new ones.
+// Our own element in the page: the E-STOP, the age of what is shown, and the run's end, at every
+// width, over everything else. It also drops inputs that waited in the browser, before viser sends
+// them as new ones.
 (() => {
-  const LATE_MS = 1000, AGAIN_MS = 500;
-  const NO_LINE = "no connection to the run: switch the supply off";
+  const LATE_MS = 1000, AGAIN_MS = 500, SILENT_MS = 1000, LOOK_MS = 200;
+  const FAULT = "#d55e00";
+  const UNCONFIRMED = "E-STOP is pressed, but the run has not confirmed it: use Ctrl-C or the switch";
+  const tab = sessionStorage.snakewalkTab ||= Math.random().toString(36).slice(2, 10);
   const host = document.createElement("div");
   host.id = "snakewalk-stop";
   host.style.cssText = "position:fixed;z-index:2147483647;top:max(8px,env(safe-area-inset-top));"
@@ -20,10 +23,21 @@
       output { display: block; width: fit-content; max-width: 300px; margin-top: 4px;
         padding: 2px 8px; border-radius: 6px; background: #fff; color: #22303c; box-shadow: 0 1px 4px #0003;
         font: 13px system-ui, sans-serif; pointer-events: none; }
+      output:empty { display: none; }
+      #age { background: #d55e00; color: #fff; font-weight: 700; }
     </style><button type="button" disabled>E-STOP <small>(Esc)</small></button>
-    <output role="status">waiting for the run</output>`;
-  const button = root.querySelector("button"), text = root.querySelector("output");
-  let socket = null, isArmed = false, isPressed = false;
+    <output id="age" role="alert"></output><output id="state" role="status">waiting for the run</output><output id="verdict"></output>`;
+  const button = root.querySelector("button");
+  const text = root.querySelector("#state"), age = root.querySelector("#age");
+  const look_of_page = document.createElement("style");
+  look_of_page.textContent = `
+    html.snakewalk-old body > :not(#snakewalk-stop) { filter: grayscale(1) opacity(.6) }
+    @media (max-width: 600px) {  /* viser's panel of a phone: at its full width, below the body */
+      .mantine-Paper-root[style*="position: fixed"] { width: 100% !important; max-height: 45% !important }
+      .mantine-Paper-root[style*="position: fixed"] .mantine-ScrollArea-content > * { width: 100% !important }
+    }`;
+  document.documentElement.append(look_of_page);
+  let socket = null, isArmed = false, isPressed = false, isOver = false, newestMs = null;
 
   const show = (line, color) => {
     text.textContent = line;
@@ -35,20 +49,39 @@
     socket.send(message);
     return true;
   };
+  const take = (state) => {
+    newestMs = state.age_ms === null ? null : performance.now() - state.age_ms;
+    isArmed = state.armed;
+    isOver = state.over;
+    if (state.pressed || isOver) isPressed = false;
+    if (!isPressed) show(state.text, state.color);
+    root.querySelector("#verdict").textContent = state.verdict;
+    if (isOver) document.title = "snakewalk: the run has ended";
+    look();
+  };
+  const look = () => {  // also while nothing comes
+    const ageMs = performance.now() - newestMs;
+    const isOld = !isOver && newestMs !== null && ageMs > SILENT_MS;
+    const line = isOld ? `no data for ${(ageMs / 1000).toFixed(1)} s: E-STOP may not arrive; `
+      + "use Ctrl-C or the switch" : "";
+    if (age.textContent !== line) age.textContent = line;
+    document.documentElement.classList.toggle("snakewalk-old", isOld);
+  };
   const open = () => {
     socket = new WebSocket(location.origin.replace(/^http/, "ws") + "/stop");
-    socket.onopen = () => { if (isPressed) isPressed = !send("stop"); };
-    socket.onmessage = (message) => {
-      const state = JSON.parse(message.data);
-      isArmed = state.armed;
-      show(state.text, state.color);
+    socket.onopen = () => { send(`tab ${tab}`); if (isPressed) send("stop"); };
+    socket.onmessage = (message) => take(JSON.parse(message.data));
+    socket.onclose = () => {
+      if (isOver) return;
+      if (!isPressed) show("no connection to the run: switch the supply off", FAULT);
+      setTimeout(open, AGAIN_MS);
     };
-    socket.onclose = () => { show(NO_LINE, "#d55e00"); setTimeout(open, AGAIN_MS); };
   };
   const press = () => {
-    if (!isArmed) return;
-    isPressed = !send("stop");  // sent as soon as there is a connection
-    if (isPressed) show(NO_LINE, "#d55e00");
+    if (!isArmed || isOver) return;
+    isPressed = true;  // until the run confirms it; sent again with each new connection
+    send("stop");
+    show(UNCONFIRMED, FAULT);
   };
   button.addEventListener("pointerdown", press);
   button.addEventListener("click", press);  // Enter and space
@@ -58,11 +91,15 @@
     "touchstart", "touchmove", "touchend", "click", "dblclick", "keydown", "wheel"];
   for (const name of inputs) {
     window.addEventListener(name, (event) => {
-      const age = performance.now() - event.timeStamp;
-      if (!event.isTrusted || age <= LATE_MS || event.composedPath().includes(host)) return;
+      const age_ms = performance.now() - event.timeStamp;
+      if (!event.isTrusted || event.composedPath().includes(host)) return;
+      if (age_ms <= LATE_MS) {
+        if (name.endsWith("down")) send("input");
+        return;
+      }
       event.stopImmediatePropagation();
       if (event.cancelable) event.preventDefault();
-      if (!name.endsWith("move") && name !== "wheel") send(`late ${Math.round(age)}`);
+      if (!name.endsWith("move") && name !== "wheel") send(`late ${Math.round(age_ms)}`);
     }, {capture: true, passive: false});
   }
 
@@ -73,4 +110,5 @@
   };
   if (document.body) place(); else document.addEventListener("DOMContentLoaded", place);
   open();
+  setInterval(look, LOOK_MS);
 })();

@@ -1,14 +1,17 @@
 """The E-STOP of the page: an element of our own, at a fixed place over everything else.
 
-viser folds and moves its panels, and on a narrow screen leaves them out of sight.
+viser folds and moves its panels, and on a narrow screen leaves them out of sight. The element also
+shows how old the newest values are, and the end of the run, after which nothing is served any more.
 """
 
 import asyncio
+import itertools
 import json
 import threading
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,12 +19,24 @@ from websockets.exceptions import ConnectionClosed
 
 from snakewalk.config import colours
 from snakewalk.controller.view.fresh_line import Freshness
+from snakewalk.controller.view.operators import Operators
 
-_STOP: Final = "stop"
-_LATE: Final = "late"
 _LOOK_S: Final = 0.05
 """Time between two looks at the state to be shown (ours)."""
+_BEAT_LOOKS: Final = 5
+"""Looks after which a state is sent again: a browser reports 1 s without one."""
 _LATE_MAX: Final = 100
+_NAME_MAX: Final = 9
+"""Length of a tab's name, or of an age in ms."""
+
+
+@dataclass(eq=False, slots=True)
+class _Browser:
+    connection: Any
+    tab: str = ""
+    """Name that stays when the page is loaded again."""
+    shown: dict[str, Any] | None = None
+    """State that it was sent last."""
 
 
 class StopElement:
@@ -35,36 +50,50 @@ class StopElement:
         freshness.on_late = self._note_late
         self.press: Callable[[str], str] = lambda who: "no run has begun yet"
         """Presses the run's button for a person or device; returns the line to show."""
-        self._is_armed = False
-        self._is_over = False
+        self.operators = Operators(freshness.now_s)
+        self.newest_s: float | None = None
+        """When the newest values came from the run; None before the first."""
         self._lock = threading.Lock()
-        self._state = ""
+        self._state: dict[str, Any] = {
+            "text": "waiting for the run",
+            "color": "",
+            "armed": False,
+            "pressed": False,
+            "over": False,
+            "verdict": "",
+        }
         self._late_s: deque[float] = deque(maxlen=_LATE_MAX)
-        self.show("waiting for the run")
+        self._browsers: set[_Browser] = set()
 
     def arm(self) -> None:
         """The run has begun: from now on it can be stopped."""
-        self._is_armed = True
-        self.show("torque off at once, latched")
+        self._set(text="torque off at once, latched", armed=True)
 
-    def show(self, text: str, color: str = "") -> None:
+    def show(self, text: str) -> None:
         """Show a line below the button; any thread may call it, and nothing hides the run's end."""
-        row = {"text": text, "color": color, "armed": self._is_armed}
-        with self._lock:
-            if not self._is_over:
-                self._state = json.dumps(row)
+        self._set(text=text)
 
     def ended(self, text: str) -> None:
-        """The run is over."""
-        self._is_armed = False
-        row = {"text": f"the run has ended: {text}", "color": colours.FAULT, "armed": False}
-        with self._lock:
-            self._is_over = True
-            self._state = json.dumps(row)
+        """The run is over; browsers keep the text when the server stops."""
+        self._set(text=f"the run has ended: {text}", color=colours.FAULT, armed=False, over=True)
+
+    def judged(self, verdict: str) -> None:
+        """Show the verdict on the run below its end."""
+        self._set(verdict=verdict, over=True)
 
     def pressed(self) -> None:
         """Press the run's button, and show the result."""
-        self.show(self.press("E-STOP of the page"))
+        self._set(text=self.press("E-STOP of the page"), pressed=True)
+
+    def _set(self, **changed: Any) -> None:
+        with self._lock:
+            if changed.get("over") or not self._state["over"]:
+                self._state = self._state | changed
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the newest state was sent to every browser that is connected."""
+        return all(browser.shown is self._state for browser in list(self._browsers))
 
     def late_s(self) -> list[float]:
         """Return when the inputs began that were dropped since the last call."""
@@ -72,36 +101,51 @@ class StopElement:
 
     async def serve(self, connection: Any) -> None:
         """Show the state in one browser, and accept its E-STOP at any age."""
-        shower = asyncio.create_task(self._show_in(connection))
+        browser = _Browser(connection)
+        self._browsers.add(browser)
+        shower = asyncio.create_task(self._show_in(browser))
         try:
             async for message in connection:
                 connection.beginnings_s.clear()
-                if message == _STOP:
-                    self.pressed()
-                elif not self._is_late(message):
+                if not self._take(browser, *str(message).partition(" ")[::2]):
                     break
         except ConnectionClosed:
             pass
         finally:
+            self._browsers.remove(browser)
             shower.cancel()
 
-    def _is_late(self, message: Any) -> bool:
-        """Note an input that the browser has dropped; return whether the message says that."""
-        word, _, age_ms = str(message).partition(" ")
-        if word != _LATE or not age_ms.isdigit() or len(age_ms) > 9:
+    def _take(self, browser: _Browser, word: str, rest: str) -> bool:
+        """Process a message of the script; return whether it is one."""
+        if word == "stop":
+            self.pressed()
+        elif word == "input":
+            self.operators.note_input(browser.tab)
+        elif len(rest) > _NAME_MAX:
             return False
-        self._note_late(self._freshness.now_s() - 1e-3 * int(age_ms))
+        elif word == "tab":
+            browser.tab = rest
+        elif word == "late" and rest.isdigit():
+            self._note_late(self._freshness.now_s() - 1e-3 * int(rest))
+        else:
+            return False
         return True
 
     def _note_late(self, since_s: float) -> None:
         self._late_s.append(since_s)
 
-    async def _show_in(self, connection: Any) -> None:
-        shown = ""
+    async def _show_in(self, browser: _Browser) -> None:
         with suppress(ConnectionClosed):
-            while True:
+            for look in itertools.count():
                 state = self._state
-                if state != shown:
-                    shown = state
-                    await connection.send(state)
+                if state is not browser.shown or look % _BEAT_LOOKS == 0:
+                    await browser.connection.send(json.dumps(state | {"age_ms": self._age_ms}))
+                    browser.shown = state
+                if browser.tab:
+                    self.operators.hear(browser.tab, browser.connection.heard_s)
                 await asyncio.sleep(_LOOK_S)
+
+    @property
+    def _age_ms(self) -> int | None:
+        newest_s = self.newest_s
+        return None if newest_s is None else round(1e3 * (self._freshness.now_s() - newest_s))

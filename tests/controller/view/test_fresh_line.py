@@ -21,33 +21,7 @@ from snakewalk.controller.view.dead_man import DeadMan, hold_command
 from snakewalk.controller.view.fresh_line import FreshConnection, Freshness
 from tests.controller.view.test_browser_gamepad import state
 from tests.helpers.browser import PATIENCE_S
-
-
-class Proxy:
-    """A TCP connection whose bytes to the server can be held back."""
-
-    def __init__(self, port: int) -> None:
-        self.port = port
-        self.flows = asyncio.Event()
-        self.flows.set()
-        self.waiting = asyncio.Event()
-        """Set when bytes are held back."""
-
-    async def pass_on(self, reader: Any, writer: Any) -> None:
-        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.port)
-        await asyncio.gather(
-            self._copy(reader, far_writer, held=True),
-            self._copy(far_reader, writer, held=False),
-            return_exceptions=True,
-        )
-
-    async def _copy(self, reader: Any, writer: Any, *, held: bool) -> None:
-        while data := await reader.read(1 << 16):
-            if held and not self.flows.is_set():
-                self.waiting.set()
-                await self.flows.wait()
-            writer.write(data)
-        writer.close()
+from tests.helpers.proxy import Proxy
 
 
 class Served:

@@ -1,6 +1,5 @@
 """The page of a run that moves servos on a pseudo-terminal, in a browser: what it shows, E-STOP."""
 
-import asyncio
 import contextlib
 import dataclasses
 import json
@@ -9,7 +8,6 @@ import re
 import socket
 import subprocess
 import sys
-import threading
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -51,10 +49,9 @@ from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.view.stop_element import StopElement
 from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.sim.serve.servo_bus import ServoBus
-from tests.controller.view.test_fresh_line import Proxy
-from tests.controller.view.test_stop_element import ended, run_in
 from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
 from tests.helpers.bus import PATIENT
+from tests.helpers.proxy import Proxied
 
 ROOT = Path(__file__).parents[3]
 COMMAND = "from snakewalk.controller.cli.main import main; main()"
@@ -97,6 +94,13 @@ def browsed(
         page.goto(url[0].replace(f":{port}/", f":{through(port)}/"))
         page.get_by_text("torque off at once, latched").wait_for()
         yield page
+
+
+def end_of_run(page: Any) -> str:
+    """Wait for the end of the run, and return why the page says that it has ended."""
+    state = page.locator("#state", has_text="the run has ended: ")
+    state.wait_for()
+    return str(state.inner_text()).removeprefix("the run has ended: ")
 
 
 class View:
@@ -493,10 +497,13 @@ def test_a_browser_shows_the_run_and_its_e_stop_switches_torque_off(
         page.get_by_text("joint yaw_04 (ID 4)").wait_for()
         assert bus["Torque Enable"].tolist() == [1] * 4
         page.keyboard.press("Escape")
-        page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        assert end_of_run(page) == "stop requested by E-STOP of the page"
         assert button.is_disabled()
         assert bus["Torque Enable"].tolist() == [0] * 4
         assert child.wait(PATIENCE_S) == 1
+        assert end_of_run(page) == "stop requested by E-STOP of the page"  # nothing is served now
+        verdict = page.locator("#verdict").inner_text()
+        assert "stop requested by E-STOP of the page; more: snakewalk" in verdict
     record = read_log(tmp_path / "run" / "log.mcap")
     assert [event.kind for event in record.events][-2:] == ["trip", "stop"]
 
@@ -531,20 +538,12 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
     words += ["--robot", "quartet.toml", "--port", bus.path]
     words += ["--set", "run.safety.lost_observer=warn"]  # a busy machine silences the page
     words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
-    proxies: list[Proxy] = []
+    proxies: list[Proxied] = []
 
     def through(port: int) -> int:
-        proxies.append(Proxy(port))
-        started = asyncio.start_server(proxies[0].pass_on, "127.0.0.1", 0)
-        return int(run_in(loop, started).result().sockets[0].getsockname()[1])
+        proxies.append(Proxied(port))
+        return proxies[0].port
 
-    def stall() -> None:
-        proxies[0].flows.clear()
-        loop.call_later(STALL_S, proxies[0].flows.set)
-
-    loop = asyncio.new_event_loop()
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
-    thread.start()
     with run(tmp_path, *words) as child, browsed(child, through=through) as page:
         page.get_by_text("joint yaw_04 (ID 4)").wait_for()
         page.get_by_role("tab", name="gait").click()
@@ -552,16 +551,14 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
         set_by_hand(page, slider)
         page.get_by_role("tab", name="gait").click()
         slider.focus()
-        loop.call_soon_threadsafe(stall)
+        proxies[0].stall(for_s=STALL_S)
         page.keyboard.press("ArrowRight")
         page.get_by_role("tab", name="events").click()
         page.get_by_text("late and is dropped").first.wait_for()
         page.keyboard.press("Escape")
-        page.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        assert end_of_run(page) == "stop requested by E-STOP of the page"
         assert child.wait(PATIENCE_S) == 1
-    run_in(loop, ended(asyncio.all_tasks(loop))).result()
-    loop.call_soon_threadsafe(loop.stop)
-    thread.join()
+    proxies[0].close()
     record = read_log(tmp_path / "run" / "log.mcap")
     texts = [event.text for event in record.events]
     obeyed = [k for k, text in enumerate(texts) if text.startswith("frequency_hz = ")]

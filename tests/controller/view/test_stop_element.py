@@ -1,10 +1,9 @@
 """Our own element in the page: E-STOP in sight at every width, and no late input."""
 
-import asyncio
 import json
+import re
 import threading
 from collections.abc import Iterator
-from concurrent.futures import Future
 from typing import Any
 
 import pytest
@@ -14,10 +13,11 @@ pytest.importorskip("viser")
 from websockets.sync.client import connect
 
 from snakewalk.controller.view.fresh_line import Freshness
+from snakewalk.controller.view.operators import Operators
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.stop_element import StopElement
-from tests.controller.view.test_fresh_line import Proxy
 from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
+from tests.helpers.proxy import Proxied
 
 
 class Page:
@@ -88,6 +88,34 @@ def test_a_run_that_ends_while_its_button_is_pressed_is_shown_as_ended(page: Pag
     assert not shown["armed"]
 
 
+def test_a_browser_that_steered_and_answers_no_more_is_lost() -> None:
+    now_s = [10.0]
+    operators = Operators(lambda: now_s[0])
+
+    def lost_after(seconds: float, *heard: str) -> bool:
+        lost = False
+        for _ in range(round(20 * seconds)):
+            now_s[0] += 0.05
+            for tab in heard:
+                operators.hear(tab, now_s[0])
+            lost = operators.are_lost()
+        return lost
+
+    assert not lost_after(1.0, "a", "b")
+    operators.note_input("a")
+    assert not lost_after(5.0, "b")  # nothing was sent to the run
+    operators.hear("a", now_s[0])
+    operators.note_input("a")
+    operators.note_command()
+    assert not lost_after(5.0, "a")  # a spectator may leave
+    assert not lost_after(2.5, "b")  # the page is loaded again
+    assert not lost_after(0.1, "a", "b")
+    assert lost_after(3.5, "b")
+    assert not lost_after(0.1, "a", "b")
+    now_s[0] += 60.0  # the machine stood still
+    assert not operators.are_lost()
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with chromium() as started:
@@ -117,6 +145,9 @@ def test_e_stop_is_in_sight_at_every_width_and_needs_one_tap(page: Page, browser
     for width, height in ((390, 844), (768, 1024), (1400, 900)):
         tab.set_viewport_size({"width": width, "height": height})
         assert tab.evaluate(ON_TOP), width
+        if width == 390:  # viser's panel is below the scene, at its full width
+            panel = tab.locator(".mantine-Paper-root[style*='position: fixed']").bounding_box()
+            assert (panel["x"], panel["width"]) == (0.0, 390.0)
         page.is_pressed.clear()
         box = button.bounding_box()
         assert min(box["width"], box["height"]) >= 48.0  # a finger
@@ -131,49 +162,71 @@ def test_e_stop_is_in_sight_at_every_width_and_needs_one_tap(page: Page, browser
     context.close()
 
 
+@pytest.fixture
+def proxy(page: Page) -> Iterator[Proxied]:
+    started = Proxied(page.server.get_port())
+    yield started
+    started.close()
+
+
 @pytest.mark.nightly("a browser in real time, which a busy computer delays")
 @IN_A_BROWSER
 def test_a_slider_that_was_set_while_the_connection_stalled_moves_nothing(
-    page: Page, browser: Any
+    page: Page, browser: Any, proxy: Proxied
 ) -> None:
-    loop = asyncio.new_event_loop()
-    proxy = Proxy(page.server.get_port())
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
-    thread.start()
-    listener = run_in(loop, asyncio.start_server(proxy.pass_on, "127.0.0.1", 0)).result()
-    port = listener.sockets[0].getsockname()[1]
     tab = new_tab(browser)
-    tab.goto(page.url.replace(str(page.server.get_port()), str(port)))
+    tab.goto(page.url.replace(str(page.server.get_port()), str(proxy.port)))
     slider = tab.get_by_role("slider").first
     slider.focus()
     tab.keyboard.press("ArrowRight")
     assert page.moved.wait(PATIENCE_S)
     assert page.slider.value == 6
     page.moved.clear()
-    loop.call_soon_threadsafe(proxy.flows.clear)
+    proxy.stall()
     tab.keyboard.press("ArrowRight")
     tab.wait_for_function("document.querySelector('[role=slider]')?.ariaValueNow === '7'")
-    run_in(loop, asyncio.wait_for(proxy.waiting.wait(), PATIENCE_S)).result()
+    proxy.wait_for_a_message()
     page.now_s += 15.0
-    loop.call_soon_threadsafe(proxy.flows.set)
+    proxy.go_on()
     tab.wait_for_function("document.querySelector('[role=slider]')?.ariaValueNow === '6'")
     assert page.slider.value == 6
     assert not page.moved.is_set()
     assert page.stop.late_s()[0] <= 100.0
     tab.close()
-    run_in(loop, ended(asyncio.all_tasks(loop))).result()
-    loop.call_soon_threadsafe(loop.stop)
-    thread.join()
 
 
-async def ended(tasks: set[asyncio.Task[Any]]) -> None:
-    for task in tasks:
-        task.cancel()
-    await asyncio.gather(*tasks, return_exceptions=True)
-
-
-def run_in(loop: asyncio.AbstractEventLoop, work: Any) -> "Future[Any]":
-    return asyncio.run_coroutine_threadsafe(work, loop)
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_page_says_how_old_it_is_and_that_a_press_is_not_confirmed(
+    page: Page, browser: Any, proxy: Proxied
+) -> None:
+    page.stop.newest_s = page.now_s
+    page.stop.arm()
+    tab = new_tab(browser)
+    tab.goto(page.url.replace(str(page.server.get_port()), str(proxy.port)))
+    tab.get_by_text("torque off at once, latched").wait_for()
+    tab.wait_for_function("!document.documentElement.classList.contains('snakewalk-old')")
+    proxy.stall(both=True)
+    tab.get_by_text("E-STOP may not arrive; use Ctrl-C or the switch").wait_for()
+    assert tab.evaluate("document.documentElement.classList.contains('snakewalk-old')")
+    tab.keyboard.press("Escape")
+    tab.get_by_text("the run has not confirmed it").wait_for()
+    assert page.presses == []
+    proxy.go_on()
+    tab.get_by_text("stop requested").wait_for()
+    assert set(page.presses) == {"E-STOP of the page"}
+    tab.wait_for_function("!document.documentElement.classList.contains('snakewalk-old')")
+    page.now_s += 5.0  # the run sends nothing, but the page answers
+    tab.get_by_text(re.compile(r"no data for [5-9]\.\d s")).wait_for()
+    page.stop.ended("done")
+    page.stop.judged("0 of 4 waypoints")
+    tab.get_by_text("the run has ended: done").wait_for()
+    page.server.stop()
+    tab.wait_for_function("document.title === 'snakewalk: the run has ended'")
+    proxy.cut()
+    tab.get_by_text("the run has ended: done").wait_for()
+    tab.get_by_text("0 of 4 waypoints").wait_for()
+    tab.close()
 
 
 LATE_INPUT = """() => {
