@@ -1,6 +1,6 @@
 """A running gait that changes and stops within the robot's limits; and a sequence of gaits."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from snakewalk.config.arrays import Floats
@@ -23,8 +23,11 @@ class GaitMotion(MotionWrapper):
         *,
         phase_rad: float = 0.0,
         duration_s: float | None = None,
+        on_limit: Callable[[str], None] = lambda text: None,
     ) -> None:
         """Prepare at ``phase_rad``; after ``duration_s`` the motion comes to rest.
+
+        ``on_limit`` gets a sentence for each gait that the joints cannot follow as fast as asked.
 
         Raises:
             InputError: joints are missing, or their limits are too small.
@@ -35,6 +38,8 @@ class GaitMotion(MotionWrapper):
         self._switch = SourceSwitch(robot, self._cycle)
         super().__init__(self._switch)
         self._remaining_s = duration_s
+        self._on_limit = on_limit
+        self._report_limit()
         self._stop_profile = StopProfile()
         self.cycles = 0.0
         """Number of cycles of the gait so far."""
@@ -84,7 +89,20 @@ class GaitMotion(MotionWrapper):
         cycle = GaitCycle(gait, self._robot, self.phase_rad)
         duration_s = self._switch.join(cycle)
         self._cycle = cycle
+        self._report_limit()
         return duration_s
+
+    def _report_limit(self) -> None:
+        if self.limit is not None:
+            self._on_limit(self.limit)
+
+    @property
+    def limit(self) -> str | None:
+        """Sentence on a frequency that the joints cannot follow; None if they can."""
+        asked_hz = self.gait.params.frequency_hz
+        if self._cycle.frequency_hz >= asked_hz - 1e-9:
+            return None
+        return f"{asked_hz:g} Hz is too fast for the joints: {self._cycle.frequency_hz:.2f} Hz"
 
     def stop(self) -> None:
         """Come to rest along a ``StopProfile``."""

@@ -144,6 +144,9 @@ class Operator(MotionWrapper):
         except ValueError:
             value = math.nan
         if name in self._ranges() and math.isfinite(value):
+            span = self._ranges()[name]
+            if not span.low <= value <= span.high:
+                self._report(f"{name} = {text} is outside {span.low:g} to {span.high:g}")
             self._set(name, value)
         else:
             self._refuse(f"{name}={text}: no number for a parameter of this gait")

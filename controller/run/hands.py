@@ -277,7 +277,9 @@ class Hands:
 
         def tell_page() -> None:
             if self._page is not None:
-                self._page.on_gait(motion.gait.name, motion.gait.params.model_dump())
+                self._page.on_gait(
+                    motion.gait.name, motion.gait.params.model_dump(), motion.limit or ""
+                )
 
         self._motion = motion
         tell_page()

@@ -72,7 +72,7 @@ class PageControls(RunObserver, OffersStop, Protocol):
         """Return the settings changed since the last call, and reasons for dropped ones."""
         ...
 
-    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+    def on_gait(self, name: str, parameters: dict[str, float], limit: str = "") -> None:
         """Show the gait that an operator runs."""
         ...
 

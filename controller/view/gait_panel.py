@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
+from html import escape
 from queue import SimpleQueue
 from typing import Any, Final
 
 import viser
 
+from snakewalk.config import colours
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.units import label_and_unit
@@ -18,7 +20,7 @@ _EVERY_S: Final = 0.2
 """A slider that is drawn along commands no more often (ours)."""
 _SETTLED_S: Final = 1.0
 """An input shows the run's value this time after its last change: also a refusal (ours)."""
-_BUTTONS: Final = {"halt, go on": "space", "defaults": "d", "stop": "q"}
+_BUTTONS: Final = {"halt, go on": "space", "defaults": "d"}
 """Keys of an ``Operator``."""
 
 
@@ -41,15 +43,21 @@ class GaitPanel:
         with self._tab:
             names = tuple(name for name in GAITS if _suits(name, robot))
             self._gait = self._gui.add_dropdown("gait", names)
+            self._limit = self._gui.add_html("")
             buttons = self._gui.add_button_group("", tuple(_BUTTONS))
+            end = self._gui.add_button("end the run", color="gray")
+        end.on_click(lambda event: self._moved.put(("q", "")))
         self._gait.on_update(self._command_of("gait"))
         buttons.on_click(lambda event: self._moved.put((_BUTTONS[event.target.value], "")))
 
-    def show(self, name: str, values: dict[str, Any]) -> None:
-        """Show what runs: the gait's name and its parameters."""
+    def show(self, name: str, parameters: dict[str, Any], limit: str = "") -> None:
+        """Show what runs: the gait's name, its parameters, and a limit of the joints."""
         changed = name != self._name
         self._name = name
-        self._values = values
+        self._values = parameters
+        self._limit.content = (
+            f"<div style='padding:0 .8em;color:{colours.FAULT}'>{escape(limit)}</div>"
+        )
         if changed:
             self._collect()
             self._waiting.clear()  # they were of another gait

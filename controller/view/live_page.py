@@ -245,7 +245,7 @@ class _LivePage:
             return
         if self._gait_panel is None:
             self._gait_panel = GaitPanel(self._server, self._dashboard.tabs, self._header.robot)
-        self._gait_panel.show(self._gait["name"], self._gait["parameters"])
+        self._gait_panel.show(**self._gait)
 
     def _take_waypoints(self) -> None:
         """Accept clicks on the ground, once it is drawn; only if the run's waypoints may be set."""

@@ -72,9 +72,9 @@ class LiveView(ObserverProcess):
             )
         return why
 
-    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
+    def on_gait(self, name: str, parameters: dict[str, float], limit: str = "") -> None:
         """Show in the page the sliders of the gait that an operator runs."""
-        row = {"name": name, "parameters": parameters}
+        row = {"name": name, "parameters": parameters, "limit": limit}
         self._end.add(GAIT, json.dumps(row).encode())
 
     def on_course(self) -> None:

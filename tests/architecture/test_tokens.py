@@ -68,10 +68,10 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
     "config": (20_250, "0270-one-reader-of-text-tables.md"),
     "controller.mapping": (19_200, "0270-one-reader-of-text-tables.md"),
-    "controller.motion": (10_200, "0246-names-of-joints-state-their-order.md"),
+    "controller.motion": (10_280, "0266-the-page-says-how-old-it-is.md"),
     "controller.pose": (8300, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
-    "controller.view": (9_930, "0266-the-page-says-how-old-it-is.md"),
+    "controller.view": (9_960, "0266-the-page-says-how-old-it-is.md"),
     "controller.run": (22_150, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
     "controller.metrics": (6_100, "0262-a-slide-is-judged-by-the-slope-under-it.md"),
 }

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.gait import GaitConfig
@@ -76,11 +76,12 @@ class GaitRun(PathlessRun):
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
         """Return a fresh motion: gait, operator and head steering."""
-        gait = GaitMotion(self.gait, self.robot, duration_s=self.config.duration_s)
-        asked_hz = self.gait.params.frequency_hz
-        if gait.frequency_hz < asked_hz - 1e-9:
-            text = f"{asked_hz:g} Hz is too fast for the joints: {gait.frequency_hz:.2f} Hz"
-            on_event("limit", text)
+        gait = GaitMotion(
+            self.gait,
+            self.robot,
+            duration_s=self.config.duration_s,
+            on_limit=partial(on_event, "limit"),
+        )
         source: MotionSource = gait
         if self.make_operator is not None:
             source = self.make_operator(gait, self.robot, on_event)

@@ -49,6 +49,7 @@ def test_a_value_is_put_within_its_range_and_what_is_none_is_refused() -> None:
     hands.press("winding_rad=0.5", "waves=99", "mirror=1")
     params = hands.operator.motion.gait.params
     assert (params.winding_rad, params.waves, params.mirror) == (0.5, 3.0, True)
+    assert hands.said[1:3] == ["waves = 99 is outside 0.75 to 3", "waves = 3.0"]
     for wrong in ("winding_rad=nan", "winding_rad=", "nothing=1", "gait=nothing", "=", "="):
         hands.press(wrong, seconds=0.02)
         assert hands.said[-1].startswith("refused"), wrong
@@ -57,6 +58,26 @@ def test_a_value_is_put_within_its_range_and_what_is_none_is_refused() -> None:
     assert hands.operator.motion.gait.name == "rolling"
     speeds = np.abs(np.diff(hands.seen, axis=0)).max() / 0.02
     assert speeds <= hands.robot.joint_speed_limit_rad_s + 1e-6
+
+
+def test_what_the_joints_leave_of_a_frequency_is_told_for_every_gait_and_change() -> None:
+    told: list[str] = []
+    robot = load_robot("yaw16")
+    motion = GaitMotion(make_gait("lateral-undulation"), robot, on_limit=told.append)
+    assert (told, motion.limit) == ([], None)
+    motion.change(frequency_hz=2.0)
+    assert motion.frequency_hz < 1.9
+    assert (
+        told == [motion.limit] == [f"2 Hz is too fast for the joints: {motion.frequency_hz:.2f} Hz"]
+    )
+    motion.change(frequency_hz=0.3)
+    assert (len(told), motion.limit) == (1, None)
+    GaitMotion(
+        motion.gait.of(motion.gait.params.model_dump() | {"frequency_hz": 2.0}),
+        robot,
+        on_limit=told.append,
+    )
+    assert told[1] == told[0]
 
 
 def test_arrows_choose_a_parameter_and_change_it_within_its_range() -> None:

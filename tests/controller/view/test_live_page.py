@@ -125,8 +125,8 @@ class View:
     def on_button(self, path: Path) -> None:
         LiveView.on_button(self, path)  # type: ignore[arg-type]
 
-    def on_gait(self, name: str, parameters: dict[str, float]) -> None:
-        LiveView.on_gait(self, name, parameters)  # type: ignore[arg-type]
+    def on_gait(self, name: str, parameters: dict[str, float], limit: str = "") -> None:
+        LiveView.on_gait(self, name, parameters, limit)  # type: ignore[arg-type]
 
     def on_picture(self, image: Image, time_s: float) -> None:
         LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
@@ -182,8 +182,9 @@ def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     assert finished.outcome.tripped == "stop requested by E-STOP of the page"
     assert len(seen) == 41  # the cycle in which it latched
     said = view.page._stop._state
-    assert "the run has ended: stop requested by E-STOP of the page" in said
-    assert not json.loads(said)["armed"]
+    assert said["text"] == "the run has ended: stop requested by E-STOP of the page"
+    assert not said["armed"]
+    assert finished.verdict.text in said["verdict"]
     assert "trip: stop requested" in view.shown("_events")
     assert finished.verdict.cause is not None
     assert finished.verdict.cause in view.shown("_verdict")
@@ -460,7 +461,8 @@ def test_a_slider_orders_its_newest_value_and_shows_what_the_run_made_of_it() ->
     assert panel.commands(1.25) == ["mirror=1"]
     panel.commands(2.3)
     assert frequency.value == 0.61  # as the run has it
-    panel.show("rolling", make_gait("rolling").params.model_dump())
+    panel.show("rolling", make_gait("rolling").params.model_dump(), "9 Hz is too fast")
+    assert "9 Hz is too fast" in panel._limit.content
     assert panel._gait.value == "rolling"
     assert "waves" not in panel._inputs
     server.stop()
