@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bus_fault_scenarios import AT_S, SCENARIOS, Scenario
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from benchmarks.rows import Row
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
@@ -34,7 +34,7 @@ from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 
 TITLE = "Bus faults: detected, silent, false alarms"
-PAGE = "bus-faults.md"
+PAGE = "bus-faults"
 
 WRONG_RAD = 0.1
 """A joint this much farther from its goal than before the fault is wrong (ours)."""
@@ -355,10 +355,10 @@ def main() -> None:
             f"| {scenario.name} | {result.detected_by} | {cycles} | {result.outcome} "
             f"| {result.ended_by} | {ended} | {silent} |"
         )
-    write_tables(PAGES / PAGE, "faults", "\n".join(lines))
+    write_tables(PAGE, "faults", "\n".join(lines))
     lines = ["| servos | baud | cycles until a second master is named |", "| ---: | ---: | ---: |"]
     lines += [f"| {joints} | {baud:,} | {cycles} |" for joints, baud, cycles in goal_reads()]
-    write_tables(PAGES / PAGE, "goal reads", "\n".join(lines))
+    write_tables(PAGE, "goal reads", "\n".join(lines))
     lines = [
         f"{len(buses)} buses, {sum(each.cycles for each in buses):,} cycles, "
         f"{sum(len(each.alarms) for each in buses)} false alarms.",
@@ -372,7 +372,7 @@ def main() -> None:
         f"| {len(each.alarms)} |"
         for each in buses
     ]
-    write_tables(PAGES / PAGE, "sound buses", "\n".join(lines))
+    write_tables(PAGE, "sound buses", "\n".join(lines))
     for _, result in results:
         print(result.detected_by, "|", *result.reports[:1])
 

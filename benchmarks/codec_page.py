@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.cycle_codec import run
-from benchmarks.provenance import PAGES, ROOT, provenance, write_tables
+from benchmarks.provenance import ROOT, provenance, write_tables
 from benchmarks.rows import Row
 
 COMMAND = "python -m benchmarks.codec_page"
@@ -126,7 +126,7 @@ def main() -> None:
         head = provenance(f"{COMMAND} --rows {given.rows.name}")
     text = f"{head}\n\n{table(lines)}"
     print(text)
-    write_tables(PAGES / "control-cycle.md", "cycle", text)
+    write_tables("control-cycle", "cycle", text)
     new = measured_rows(lines, is_quiet=load <= QUIET_LOAD)
     page = [
         next((row for begin, row in new.items() if line.startswith(begin)), line)

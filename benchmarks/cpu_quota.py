@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.host_cycle import COMMANDS, PATIENT, START_S, cpu_s, served, started
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.controller.metrics.timing import skipped_cycles
 from snakewalk.controller.runlog.reader import read_log
 
@@ -89,7 +89,7 @@ def main() -> None:
     text = f"{provenance(command)}\n\n{table(outcome)}"
     print(text)
     if given.write:
-        write_tables(PAGES / "cpu-quota.md", "quota", text)
+        write_tables("cpu-quota", "quota", text)
 
 
 def table(outcome: Outcome) -> str:

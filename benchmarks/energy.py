@@ -20,7 +20,7 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.command_facts import markdown
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.metrics.effort import energy_track, sampled_energy
@@ -68,7 +68,7 @@ def main() -> None:
         print(*cells, sep=" | ", flush=True)
     if write:
         source = provenance("python -m benchmarks.energy --write")
-        write_tables(PAGES / "gait-energy.md", "energy", f"{markdown(HEAD, rows)}\n\n{source}")
+        write_tables("gait-energy", "energy", f"{markdown(HEAD, rows)}\n\n{source}")
 
 
 def jobs() -> Iterator[tuple[str, PreparedRun]]:

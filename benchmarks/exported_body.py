@@ -1,6 +1,6 @@
 """Speed of exported bodies in plain MuJoCo, compared with the simulator.
 
-``python -m benchmarks.exported_body`` prints the table of ``docs/benchmarks/exported-body.md``.
+``python -m benchmarks.exported_body`` prints the table of ``docs/export.md``.
 """
 
 from collections.abc import Sequence

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import j0
 
 from benchmarks.command_facts import markdown, snakewalk
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name
 
@@ -179,7 +179,7 @@ def main() -> None:
         text = f"{table}\n\n{origin}"
         print(f"{page}\n\n{text}\n")
         if write:
-            write_tables(PAGES / f"{page}.md", name, text)
+            write_tables(page, name, text)
 
 
 if __name__ == "__main__":

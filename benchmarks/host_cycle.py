@@ -23,7 +23,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from benchmarks.provenance import PAGES, ROOT, provenance, write_tables
+from benchmarks.provenance import ROOT, provenance, write_tables
 from snakewalk.controller.runlog.reader import read_log
 
 ENTRY = re.compile(r'^snakewalk = "([\w.]+):main"', re.MULTILINE)
@@ -180,7 +180,7 @@ def main() -> None:
     text = f"{provenance(command)} {load}\n\n{table(found, given.old)}"
     print(text)
     if given.write:
-        write_tables(PAGES / "host-cycle.md", "cost", text)
+        write_tables("host-cycle", "cost", text)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = ROOT / "docs" / "benchmarks"
+DOCS = ROOT / "docs"
 
 
 def provenance(command: str) -> str:
@@ -17,13 +17,20 @@ def provenance(command: str) -> str:
     return f"`{command}`, commit `{_commit()}`, {machine}, {day}."
 
 
-def write_tables(page: Path, name: str, text: str) -> None:
+def page_of(name: str) -> Path:
+    """Return the page with a subject's figures: of its own, or the subject's page."""
+    own = DOCS / "benchmarks" / f"{name}.md"
+    return own if own.exists() else DOCS / f"{name}.md"
+
+
+def write_tables(page_name: str, name: str, text: str) -> None:
     """Replace what a page has between the marks of ``name``.
 
     Raises:
         ValueError: the page has no such marks.
 
     """
+    page = page_of(page_name)
     begin, end = f"<!-- {name} begins -->", f"<!-- {name} ends -->"
     old = page.read_text(encoding="utf-8")
     if begin not in old or end not in old:

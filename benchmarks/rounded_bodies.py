@@ -3,7 +3,7 @@
 ``python -m benchmarks.rounded_bodies`` runs gaits twice on the compiled simulator, once with a
 random relative error of ``ERROR`` in each coordinate and velocity after each step. This is a few
 roundings of a single-precision number (6e-8). With ``--write`` it replaces a table of
-``docs/benchmarks/warp.md``.
+``docs/how-to/simulate-many-robots.md``.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from tests.helpers.gait_links import links_of, prepared_gaits
@@ -70,7 +70,7 @@ def main() -> None:
     text = "\n".join([f"{provenance(command)} n = {given.seeds} seeds.", "", *lines])
     print(text)
     if given.write:
-        write_tables(PAGES / "warp.md", "rounded", text)
+        write_tables("simulate-many-robots", "rounded", text)
 
 
 def deviations(robot: str, gaits: tuple[str, ...], seeds: int) -> list[tuple[float, float, float]]:

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.command_facts import markdown, snakewalk
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.metrics.path_error import distance_m
@@ -101,7 +101,7 @@ def main() -> None:
         text = f"{source}\n\n{TABLES[name](Wanted(given.seeds, given.data))}"
         print(text, flush=True)
         if given.write:
-            write_tables(PAGES / f"{page}.md", mark, text)
+            write_tables(page, mark, text)
 
 
 def waypoints(wanted: Wanted) -> str:

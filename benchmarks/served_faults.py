@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from benchmarks.served_bus import LONGEST_S, PROGRAM, Served, wait_for
 from benchmarks.stopped_calibrations import STOPS, stopped_calibration
 
@@ -211,7 +211,7 @@ def main() -> None:
     ]
     print(*lines, sep="\n")
     if not given.only:
-        write_tables(PAGES / "run-faults.md", "served faults", "\n".join(lines))
+        write_tables("run-faults", "served faults", "\n".join(lines))
 
 
 if __name__ == "__main__":

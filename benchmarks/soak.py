@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.bus_faults import Bench
 from benchmarks.command_facts import PROGRAM
-from benchmarks.provenance import PAGES, provenance, write_tables
+from benchmarks.provenance import provenance, write_tables
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import SafetyConfig
@@ -253,7 +253,7 @@ def main() -> None:
         text = f"{provenance(command)}\n\n{text}"
         print(f"{name}\n{text}\n")
         if given.write:
-            write_tables(PAGES / "soak.md", name, text)
+            write_tables("soak", name, text)
 
 
 if __name__ == "__main__":

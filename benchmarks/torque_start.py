@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from benchmarks.host_cycle import COMMANDS, PATIENT, cpu_s, started
-from benchmarks.provenance import PAGES, ROOT, provenance, write_tables
+from benchmarks.provenance import ROOT, provenance, write_tables
 from snakewalk.sim.serve.servo_bus import ServoBus
 
 LONGEST_S: Final = 60.0
@@ -55,7 +55,7 @@ def main() -> None:
     text = "\n".join([about, "", *lines])
     print(text)
     if given.write:
-        write_tables(PAGES / "startup.md", "torque", text)
+        write_tables("startup", "torque", text)
 
 
 def torque_s(name: str) -> float:

@@ -21,7 +21,7 @@ extensions = [
     "sphinx.ext.napoleon",
 ]
 source_suffix = {".md": "markdown"}
-exclude_patterns = ["tables"]
+exclude_patterns = ["tables", "decisions"]  # choices of developers stay in the repository
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types of numpy and pydantic, which are no pages here
 
@@ -41,10 +41,19 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 
 PAGES = Path(__file__).parent
+DECISION = re.compile(r"\[(decision\s)?([^\]]*)\]\((?:\.\./|docs/)*decisions/(\d{4})-[^)]*\)")
+
+
+def name_decision(found: re.Match[str]) -> str:
+    """Return the number of a decision in place of a link to its file in the repository."""
+    if found[1] or found[2].isdigit():
+        return f"{found[1] or ''}{found[2]}"
+    return f"{found[2]} (decision {int(found[3])})"
 
 
 def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
     """Make a link of each page that stands in backticks, as one reads it in the repository."""
+    source[0] = DECISION.sub(name_decision, source[0])
     if not (PAGES / f"{name}.md").is_file():
         return  # a notebook
     folder = (PAGES / f"{name}.md").parent

@@ -98,7 +98,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         robot: shipped robot, or a TOML file.
         world: shipped world, or a TOML file.
         cycle_hz: control cycles, and steps, a second of the robot.
-        physics_step_s: 5 ms is good enough on a floor (``docs/benchmarks/physics.md``), and quick.
+        physics_step_s: 5 ms is good enough on a floor (``docs/physics.md``), and quick.
         energy_weight_m_j: metres that a joule is worth.
         trip_penalty_m: metres that a trip costs.
         start_joint_rad: joints start within this, drawn evenly.

@@ -106,7 +106,7 @@ def lifted_by_current(record: RunRecord) -> float:
     """Return the mean share of lifted links, from the pitch joints' currents.
 
     It uses the pose only for the directions of the joints, and does not use the ground. NaN without
-    pitch joints, torque constant or poses. ``docs/benchmarks/compliance.md`` states its accuracy.
+    pitch joints, torque constant or poses. ``docs/compliance.md`` states its accuracy.
     """
     header = record.header
     pose = record.pose

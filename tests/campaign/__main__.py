@@ -1,4 +1,4 @@
-"""``python -m tests.campaign``: all scenarios; writes the table of docs/benchmarks/campaign.md."""
+"""``python -m tests.campaign``: all scenarios; writes the table of docs/campaign.md."""
 
 import argparse
 import shlex
@@ -13,7 +13,7 @@ from tests.campaign.campaign import campaign
 from tests.campaign.report import BEGIN, END, table
 from tests.campaign.scenarios import SCENARIOS
 
-DOC = Path(__file__).resolve().parents[2] / "docs" / "benchmarks" / "campaign.md"
+DOC = Path(__file__).resolve().parents[2] / "docs" / "campaign.md"
 
 
 def main() -> None:

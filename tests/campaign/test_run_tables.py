@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import run_tables
-from benchmarks.provenance import PAGES
+from benchmarks import provenance, run_tables
+from benchmarks.provenance import page_of
 from benchmarks.run_tables import (
     TABLES,
     Synthesised,
@@ -74,7 +74,7 @@ def test_a_table_of_recordings_is_written_between_its_marks(
 
     page = tmp_path / "recordings.md"
     page.write_text("before\n<!-- slowing begins -->\nold\n<!-- slowing ends -->\nafter\n")
-    monkeypatch.setattr(run_tables, "PAGES", tmp_path)
+    monkeypatch.setattr(provenance, "DOCS", tmp_path)
     monkeypatch.setattr(run_tables, "snakewalk", command)
     monkeypatch.setattr(
         "sys.argv", ["run_tables", "recordings.slowing", "--data", "/films", "--write"]
@@ -126,7 +126,7 @@ def test_each_cell_has_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", TABLES)
 def test_each_table_has_its_place_on_a_page(name: str) -> None:
     page, mark = name.split(".")
-    text = (PAGES / f"{page}.md").read_text(encoding="utf-8")
+    text = page_of(page).read_text(encoding="utf-8")
     assert text.index(f"<!-- {mark} begins -->") < text.index(f"<!-- {mark} ends -->")
 
 

@@ -27,7 +27,8 @@ def held(page: Path) -> set[Path]:
 
 def test_the_tables_of_contents_hold_every_page_and_no_other() -> None:
     pages = {*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")} - {DOCS / "index.md"}
-    assert held(DOCS / "index.md") == pages
+    assert held(DOCS / "index.md") == {page for page in pages if page.parent.name != "decisions"}
+    assert len(pages) <= MOST_PAGES + len(list((DOCS / "decisions").glob("*.md")))
 
 
 def test_no_page_stands_in_two_places() -> None:
@@ -38,11 +39,18 @@ def test_no_page_stands_in_two_places() -> None:
 
 GENERATED = {"configuration.md", "reference.md"}
 LARGEST_PAGE = 250
+"""Lines of a page above its measured figures."""
+MOST_PAGES = 140
+
+
+def guide(page: Path) -> str:
+    """Return a page without its measured figures, which are its last section."""
+    return page.read_text(encoding="utf-8").partition("\n## Measured\n")[0]
 
 
 def test_no_page_written_by_hand_is_long() -> None:
     lines = {
-        page.relative_to(DOCS).as_posix(): len(page.read_text(encoding="utf-8").splitlines())
+        page.relative_to(DOCS).as_posix(): len(guide(page).splitlines())
         for page in DOCS.rglob("*.md")
         if page.name not in GENERATED
     }
