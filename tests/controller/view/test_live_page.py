@@ -44,6 +44,7 @@ from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gait_panel import GaitPanel
 from snakewalk.controller.view.live_page import _LivePage
 from snakewalk.controller.view.live_view import LiveView
+from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.view.stop_element import StopElement
@@ -567,6 +568,42 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
     dropped = [k for k, text in enumerate(texts) if "late and is dropped" in text]
     assert obeyed
     assert max(obeyed) < max(dropped)
+
+
+def test_the_run_loses_the_page_with_the_browser_that_steers() -> None:
+    ours, far = socket.socketpair()
+    view = LiveView.__new__(LiveView)
+    view._end, view._what = RunEnd(ours), "page"
+    view._dead_man, view._is_operator_lost = DeadMan(), False
+    far.sendall(f"{OPERATOR_LOST}\n".encode())
+    assert view.pressed() == []
+    assert "the browser that steers has not answered for 3 s" in str(view.lost(0.0))
+    far.sendall(f"{OPERATOR_BACK}\n".encode())
+    assert view.pressed() == []
+    assert view.lost(0.0) is None
+    far.close()
+
+
+@pytest.mark.nightly("a browser at a running gait: 20 s of CPU")
+@IN_A_BROWSER
+def test_an_operator_who_closes_the_page_stops_the_run(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus("1-4")
+    (tmp_path / "quartet.toml").write_text(ROBOT)
+    words = ["gait", "run", "lateral-undulation", "--seconds", "1000"]
+    words += ["--robot", "quartet.toml", "--port", bus.path]
+    words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
+    with run(tmp_path, *words) as child, browsed(child) as page:
+        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
+        page.get_by_role("tab", name="gait").click()
+        set_by_hand(page, page.get_by_role("slider").first)
+        page.close()
+        assert child.wait(PATIENCE_S) == 1
+        assert bus["Torque Enable"].tolist() == [0] * 4
+    record = read_log(tmp_path / "run" / "log.mcap")
+    trips = [event.text for event in record.events if event.kind == "trip"]
+    assert "the browser that steers has not answered for 3 s" in trips[0]
 
 
 FAKE_PAD = """
