@@ -12,10 +12,15 @@ from snakewalk.config.colours import CENTRE, GREY, HEAD, INK, MEASURED, PATH, RE
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.figures.style import GROUND, WIDTH_IN, legend_above
 from snakewalk.controller.metrics.path_error import waypoint_times_s
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 
 _BODY_SPACING = 1.3  # body lengths between the bodies drawn
 _MARGIN_M = 0.35
+_POINTS = 20_000
+"""Most points of a track (ours)."""
+_BODIES = 200
+"""Most bodies drawn (ours)."""
 
 
 def path_figure(record: RunRecord) -> Figure | None:
@@ -35,16 +40,17 @@ def path_figure(record: RunRecord) -> Figure | None:
         draw_ground(axes, record.header.ground)
     _plan(axes, record)
     _bodies(axes, record)
+    step = -(-len(pose.time_s) // _POINTS)
     is_measured = record.header.pose_evidence.is_measured
     evidence = "" if is_measured else ", dead-reckoned"
     axes.plot(
-        *pose.centre_m[:, :2].T,
+        *pose.centre_m[::step, :2].T,
         color=CENTRE,
         linewidth=2.0,
         label=f"centre of mass{evidence}",
         linestyle="-" if is_measured else (0, (3, 2)),
     )
-    axes.plot(*pose.head_m[:, :2].T, color=HEAD, linewidth=0.9, label="head")
+    axes.plot(*pose.head_m[::step, :2].T, color=HEAD, linewidth=0.9, label="head")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     legend_above(axes, 3)
@@ -54,9 +60,12 @@ def path_figure(record: RunRecord) -> Figure | None:
 def _extent(record: RunRecord) -> tuple[Floats, Floats]:
     plan = record.header.plan
     pose = record.pose
-    links = pose.links_m[..., :2].reshape(-1, 2)
+    links = [
+        by_rows(lambda rows, edge=edge: edge.reduce(rows[..., :2], axis=1), pose.links_m)
+        for edge in (np.fmin, np.fmax)
+    ]
     around = [plan.waypoints_m - plan.waypoint_radius_m, plan.waypoints_m + plan.waypoint_radius_m]
-    parts = [plan.path_m[:, :2], *around, pose.head_m[:, :2], links]
+    parts = [plan.path_m[:, :2], *around, pose.head_m[:, :2], *links]
     points = np.concatenate(parts)
     points = points[np.isfinite(points).all(axis=1)]
     return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
@@ -150,12 +159,15 @@ def _plan(axes: Axes, record: RunRecord) -> None:
 def _bodies(axes: Axes, record: RunRecord) -> None:
     pose = record.pose
     robot = record.header.robot
-    indices = np.flatnonzero(np.isfinite(pose.links_m).all(axis=(1, 2)))
+    indices = np.flatnonzero(
+        by_rows(lambda links_m: np.isfinite(links_m).all(axis=(1, 2)), pose.links_m)
+    )
     if len(indices) == 0:
         return
     along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[indices, :2], axis=0, prepend=[[0, 0]]).T))
     along_m -= along_m[0]
-    count = 1 + max(1, int(along_m[-1] / (_BODY_SPACING * robot.length_m)))
+    count = int(along_m[-1] / (_BODY_SPACING * robot.length_m))
+    count = 1 + min(max(1, count), _BODIES)
     half_m = 0.5 * robot.link_lengths_m[0], 0.5 * robot.link_lengths_m[-1]
     chosen = indices[np.searchsorted(along_m, np.linspace(0.0, along_m[-1], count))]
     for k, row in enumerate(chosen):

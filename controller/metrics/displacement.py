@@ -10,6 +10,7 @@ from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.virtual_chassis import virtual_chassis
 from snakewalk.controller.motion.gait_cycle import GaitCycle
 from snakewalk.controller.motion.stop_profile import STOP_S
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 
 SKIPPED_S = 1.5
@@ -66,12 +67,11 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     gait = make_gait(config.name, config.parameters)
     hz = GaitCycle(gait, robot).frequency_hz
     unknown = GaitDisplacement(0, hz, *(float("nan"),) * 4)
-    is_known = np.isfinite(pose.links_m).all(axis=(1, 2))
+    is_known = by_rows(lambda links_m: np.isfinite(links_m).all(axis=(1, 2)), pose.links_m)
     if not is_known.any() or hz <= 0.0:
         return unknown
-    time_s = pose.time_s[is_known]
-    links = pose.links_m[is_known]
-    up = pose.rotation[is_known][:, :, 2]
+    rows = np.flatnonzero(is_known)
+    time_s = pose.time_s[rows]
     first_s, last_s = full_rate_span_s(float(time_s[0]), float(time_s[-1]), config.duration_s)
     count = int((last_s - first_s) * hz + 1e-9)
     if count < 1:
@@ -81,7 +81,8 @@ def gait_displacement(record: RunRecord) -> GaitDisplacement:
     marked_s: list[float] = []
     due = last_s - np.arange(count, -1, -1) / hz
     for k in range(int(np.searchsorted(time_s, due[0])), len(time_s)):
-        frames = [virtual_chassis(links[k], up[k], frames[0] if frames else None)]
+        up = pose.rotation[rows[k]][:, 2]
+        frames = [virtual_chassis(pose.links_m[rows[k]], up, frames[0] if frames else None)]
         if len(marks) <= count and time_s[k] >= due[len(marks)] - 1e-9:
             marks.append(frames[0])
             marked_s.append(float(time_s[k]))

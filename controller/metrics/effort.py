@@ -18,6 +18,7 @@ from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.displacement import full_rate_span_s
 from snakewalk.controller.metrics.ground_contact import CLEAR_M
 from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
@@ -73,8 +74,6 @@ def sampled_energy(record: RunRecord) -> EnergyTrack:
     if winding is None or not np.isfinite(cycle.current_a).any():
         unknown = np.full(len(cycle.time_s), np.nan)
         return EnergyTrack(cycle.time_s, unknown, unknown, "unknown")
-    columns = cycle.measured_rad, cycle.velocity_rad_s, cycle.current_a, cycle.sent_rad
-    position, speed, current, goal = (np.nan_to_num(column) for column in columns)
     servos = header.robot.servo_records
     stall_a = np.array([facts.stall_current_a or 0.0 for facts in servos])
     full_rad = np.array([facts.full_output_rad for facts in servos])
@@ -86,24 +85,48 @@ def sampled_energy(record: RunRecord) -> EnergyTrack:
         emf_a = np.where(stall_a > 0.0, winding.back_emf_v_s / winding.resistance_ohm, 0.0)
         return np.asarray(np.clip(share * stall_a - emf_a * turning, -limit_a, limit_a))
 
-    step_s = np.diff(cycle.time_s)[:, None]
     wire_s = cycle.wire_busy_s[np.isfinite(cycle.wire_busy_s)]
     late = float(np.median(wire_s)) / record.period_s if len(wire_s) else WRITTEN_SHARE
-    before = np.concatenate([goal[:1], goal[:-1]])[:-1]
-    off_a = current[1:] - driven_a(goal[:-1], position[1:], speed[1:])
-    energy_j = np.zeros((2, len(goal)))
-    for part in (np.arange(PARTS) + 0.5) / PARTS:
-        for goal_rad, begin, end in ((before, 0.0, late), (goal[:-1], late, 1.0)):
-            at = begin + part * (end - begin)
-            turning = speed[:-1] + at * np.diff(speed, axis=0)
-            at_rad = position[:-1] + at * np.diff(position, axis=0)
-            amps = np.clip(driven_a(goal_rad, at_rad, turning) + off_a, -limit_a, limit_a)
-            # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
-            input_w = winding.resistance_ohm * amps**2 + winding.back_emf_v_s * turning * amps
-            shaft_w = header.torque_constant_n_m_a * turning * amps
-            for sums, watts in zip(energy_j, (np.clip(input_w, 0.0, None), shaft_w), strict=True):
-                sums[1:] += (watts * step_s).sum(axis=1) * (end - begin) / PARTS
-    electrical_j, mechanical_j = np.cumsum(energy_j, axis=1)
+
+    def between(step_s: Floats, *columns: Floats) -> Floats:
+        """Energy (n, 2) between readings and the next ones, with their goals."""
+        position, next_position, speed, next_speed, next_current, before, goal = (
+            np.nan_to_num(column) for column in columns
+        )
+        off_a = next_current - driven_a(goal, next_position, next_speed)
+        energy_j = np.zeros((len(step_s), 2))
+        for part in (np.arange(PARTS) + 0.5) / PARTS:
+            for goal_rad, begin, end in ((before, 0.0, late), (goal, late, 1.0)):
+                at = begin + part * (end - begin)
+                turning = speed + at * (next_speed - speed)
+                at_rad = position + at * (next_position - position)
+                amps = np.clip(driven_a(goal_rad, at_rad, turning) + off_a, -limit_a, limit_a)
+                # i^2 R is heat, k_e w i is work at the shaft with the losses of the gears
+                input_w = winding.resistance_ohm * amps**2 + winding.back_emf_v_s * turning * amps
+                shaft_w = header.torque_constant_n_m_a * turning * amps
+                for k, watts in enumerate((np.clip(input_w, 0.0, None), shaft_w)):
+                    energy_j[:, k] += (watts * step_s).sum(axis=1) * (end - begin) / PARTS
+        return energy_j
+
+    def steps_j(rows: slice, after: slice, before: slice) -> Floats:
+        columns = (
+            np.diff(cycle.time_s)[rows, None],
+            *(
+                column[chosen]
+                for column in (cycle.measured_rad, cycle.velocity_rad_s)
+                for chosen in (rows, after)
+            ),
+            cycle.current_a[after],
+            cycle.sent_rad[before],
+            cycle.sent_rad[rows],
+        )
+        return np.asarray(by_rows(between, *columns))
+
+    first_j = steps_j(slice(0, 1), slice(1, 2), slice(0, 1))
+    count = len(cycle.time_s)
+    other_j = steps_j(slice(1, count - 1), slice(2, count), slice(0, count - 2))
+    energy_j = np.concatenate([np.zeros((1, 2)), first_j, other_j])[:count]
+    electrical_j, mechanical_j = np.cumsum(energy_j, axis=0).T
     return EnergyTrack(cycle.time_s, electrical_j, mechanical_j, "sampled")
 
 

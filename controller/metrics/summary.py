@@ -19,8 +19,9 @@ from snakewalk.controller.metrics.path_error import (
     waypoint_times_s,
 )
 from snakewalk.controller.metrics.timing import skipped_cycles, wire_use
-from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
+from snakewalk.controller.metrics.tracking import lag_s, tracking_errors
 from snakewalk.controller.metrics.travel import Travel, travel
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Header, RunRecord
 
@@ -240,8 +241,9 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
     chosen = moving if moving.any() else np.ones(len(moving), dtype=bool)
     predicted = _mean(pose.predicted_speed_m_s[chosen])
     pulse = _mean(pose.pulse_m_s[moving])
-    tracking = tracking_error_rad(cycle)
-    current = _peak(np.abs(cycle.current_a))
+    tracking = tracking_errors(cycle)
+    squares, tracked, _ = tracking.sum(axis=0)
+    current = _peak(largest(cycle.current_a))
     use = wire_use(record)
     energy = energy_track(record)
     energy_totals = energy.between(-np.inf, np.inf)
@@ -282,14 +284,14 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         energy_source=energy.source,
         electrical_cost_of_transport=_digits(costs[0]),
         mechanical_cost_of_transport=_digits(costs[1]),
-        peak_joint_speed_rad_s=_digits(_peak(np.abs(cycle.velocity_rad_s))),
+        peak_joint_speed_rad_s=_digits(_peak(largest(cycle.velocity_rad_s))),
         peak_temperature_c=_digits(_peak(record.slow.temperature_c)),
         lowest_voltage_v=_digits(-_peak(-record.slow.voltage_v)),
-        tracking_rms_rad=_digits(float(np.sqrt(_mean(np.square(tracking))))),
-        tracking_max_rad=_digits(_peak(np.abs(tracking))),
+        tracking_rms_rad=_digits(float(np.sqrt(squares / tracked)) if tracked else np.nan),
+        tracking_max_rad=_digits(_peak(tracking[tracking[:, 1] > 0, 2])),
         lag_s=_digits(lag_s(cycle, record.period_s)),
         failed_reads=int(np.count_nonzero(~cycle.valid)),
-        yield_max_rad=_digits(_peak(np.abs(cycle.yield_rad))),
+        yield_max_rad=_digits(_peak(largest(cycle.yield_rad))),
         lifted_by_current=_digits(lifted_by_current(record)),
         clamps=cycle.verdict.count("clamp"),
         vetoes=cycle.verdict.count("veto"),
@@ -425,6 +427,11 @@ def _mean(values: Floats) -> float:
 def _median(values: Floats) -> float | None:
     finite_values = values[np.isfinite(values)]
     return _digits(float(np.median(finite_values))) if finite_values.size else None
+
+
+def largest(by_joint: Floats) -> Floats:
+    """Largest magnitude (T,) of the joints (T, J); NaN where none is known."""
+    return np.asarray(by_rows(lambda rows: np.fmax.reduce(np.abs(rows), axis=1), by_joint))
 
 
 def _peak(values: Floats) -> float:

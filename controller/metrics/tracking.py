@@ -4,15 +4,29 @@ from typing import Final
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.topics import CycleTable
 
 _LONGEST_S: Final = 0.6
+_CYCLES: Final = 50_000
+"""Cycles at the end of a run from which the lag is computed (ours): 17 minutes at 50 Hz."""
 
 
-def tracking_error_rad(cycle: CycleTable) -> Floats:
-    """Measured minus sent, (T, J); NaN where a read failed."""
-    return np.where(cycle.valid, cycle.measured_rad - cycle.sent_rad, np.nan)
+def tracking_errors(cycle: CycleTable) -> Floats:
+    """Measured minus sent in each cycle, without failed reads, (T, 3).
+
+    The columns are the sum of the squares, rad^2, the number of joints, and the largest, rad.
+    """
+
+    def errors(valid: Bools, measured_rad: Floats, sent_rad: Floats) -> Floats:
+        off_rad = measured_rad - sent_rad
+        is_known = valid & np.isfinite(off_rad)
+        off_rad = np.abs(np.where(is_known, off_rad, 0.0))
+        columns = np.square(off_rad).sum(axis=1), is_known.sum(axis=1), off_rad.max(axis=1)
+        return np.stack(columns, axis=1)
+
+    return np.asarray(by_rows(errors, cycle.valid, cycle.measured_rad, cycle.sent_rad))
 
 
 def lag_s(cycle: CycleTable, period_s: float) -> float:
@@ -20,15 +34,15 @@ def lag_s(cycle: CycleTable, period_s: float) -> float:
 
     NaN when nothing moves, or when the run is too short.
     """
-    is_complete = np.isfinite(cycle.sent_rad).all(axis=1) & np.isfinite(cycle.measured_rad).all(
-        axis=1
-    )
+    sent_rad = cycle.sent_rad[-_CYCLES:]
+    measured_rad = cycle.measured_rad[-_CYCLES:]
+    is_complete = np.isfinite(sent_rad).all(axis=1) & np.isfinite(measured_rad).all(axis=1)
     if np.count_nonzero(is_complete) < 2:
         return float("nan")
-    time = cycle.deadline_s[is_complete]
+    time = cycle.deadline_s[-_CYCLES:][is_complete]
     grid = np.arange(time[0], time[-1] + 0.5 * period_s, period_s)
-    sent = _on_grid(grid, time, cycle.sent_rad[is_complete])
-    measured = _on_grid(grid, time, cycle.measured_rad[is_complete])
+    sent = _on_grid(grid, time, sent_rad[is_complete])
+    measured = _on_grid(grid, time, measured_rad[is_complete])
     most = round(_LONGEST_S / period_s)
     if len(grid) < 3 * most or np.ptp(sent, axis=0).max() < 1e-3:
         return float("nan")

@@ -68,25 +68,6 @@ def make_artifacts(
     return Artifacts(report, path if path.exists() else None, tuple(notes))
 
 
-def build_report(
-    record: RunRecord,
-    out_dir: Path,
-    film: Path | None = None,
-    numbers: RunSummary | None = None,
-) -> Path:
-    """Make ``out_dir/report.html`` (returned) and ``out_dir/summary.json`` from a record alone.
-
-    ``numbers`` is the record's summary where it is known.
-
-    Raises:
-        InputError: the film cannot be used, or matplotlib is not installed.
-
-    """
-    record = record.from_torque_on()
-    numbers = write_summary(summary(record) if numbers is None else numbers, out_dir)
-    return _write_page(record, out_dir, film, numbers, _draw(record))
-
-
 def _draw(record: RunRecord, creation_text: str = "") -> Drawings:
     require_extra("the report needs", "matplotlib", "plotly")
     require_extra("the report needs", "jinja2")

@@ -98,7 +98,8 @@ def _figure(
     record: RunRecord, panels: Sequence[tuple[str, list[Curve]]], shown: int
 ) -> dict[str, Any]:
     """Traces, layout, and values of every joint's two panels for Plotly; joint ``shown`` first."""
-    joint = [(panel, panel_curves(record, panel)) for panel in Panel if panel.is_of_one_joint]
+    step = _step(len(record.cycle.time_s))
+    joint = [(panel, panel_curves(record, panel, step)) for panel in Panel if panel.is_of_one_joint]
     traces = [
         trace
         for row, (_, curves) in enumerate(panels, start=1)

@@ -25,6 +25,8 @@ SIZE = (800, 450)
 FINE_SIZE = (1280, 720)
 _LONGEST_S: Final = 27.0
 """Longest film: a longer run is shown faster."""
+_ROWS: Final = 20_000
+"""Least rows that are left of a longer run (ours): 30 for each frame of a film."""
 
 
 def film_run(
@@ -102,15 +104,16 @@ def body_qpos(record: RunRecord) -> tuple[Floats, Floats]:
     if len(record.qpos.time_s) > 1:
         return record.qpos.time_s, record.qpos.qpos
     pose = record.pose
-    rows = min(len(pose.time_s), len(record.cycle.time_s))
-    head = pose.head_m[:rows]
-    turn = pose.rotation[:rows].reshape(-1, 9)
-    joints = record.cycle.measured_rad[:rows]
+    count = min(len(pose.time_s), len(record.cycle.time_s))
+    rows = slice(0, count, max(1, count // _ROWS))
+    head = pose.head_m[rows]
+    turn = pose.rotation[rows].reshape(-1, 9)
+    joints = record.cycle.measured_rad[rows]
     is_known = np.isfinite(np.hstack([head, turn, joints])).all(axis=1)
     if not is_known.any():
         return np.zeros(0), np.zeros((0, 7 + joints.shape[1]))
     quaternion = Rotation.from_matrix(turn[is_known].reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    return pose.time_s[:rows][is_known], np.hstack([head[is_known], quaternion, joints[is_known]])
+    return pose.time_s[rows][is_known], np.hstack([head[is_known], quaternion, joints[is_known]])
 
 
 def film_times(record: RunRecord) -> tuple[float, float]:

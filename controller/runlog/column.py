@@ -8,16 +8,22 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
+from mmap import ACCESS_READ, MADV_DONTNEED, mmap
+from pathlib import Path
+from tempfile import TemporaryFile
 from typing import (
     Any,
     ClassVar,
     Final,
     Literal,
+    Self,
     TypeVar,
     dataclass_transform,
     get_args,
     get_type_hints,
 )
+
+import numpy as np
 
 from snakewalk.config.arrays import Floats
 
@@ -163,6 +169,34 @@ class Topic:
         ).encode()
 
 
+class StoredColumn:
+    """A column of a long log in an unnamed file; only the rows that are used are in memory."""
+
+    def __init__(self, folder: Path | None, rows: Any) -> None:
+        self._file = TemporaryFile(dir=folder)  # noqa: SIM115  open as long as the record
+        self._type = rows.dtype
+        self._shape = rows.shape[1:]
+        self.append(rows)
+
+    def append(self, rows: Any) -> None:
+        """Add rows (n, ...).
+
+        Raises:
+            ValueError: they have another shape than the first.
+            OSError: the disk is full.
+
+        """
+        if rows.shape[1:] != self._shape:
+            raise ValueError("rows of a topic have different shapes")
+        self._file.write(np.ascontiguousarray(rows).data)
+        self._file.flush()
+
+    def mapped(self) -> Any:
+        """Return all rows; they occupy memory until the returned array is released."""
+        pages = mmap(self._file.fileno(), 0, access=ACCESS_READ)
+        return np.frombuffer(pages, self._type).reshape(-1, *self._shape)
+
+
 class Table:
     """Base class of all tables: a field is an array with an entry for each row of the topic."""
 
@@ -170,6 +204,39 @@ class Table:
     topic: ClassVar[Topic]
     time_s: Floats
     """Times of all tables but ``ConfigTable``."""
+
+    def __getattribute__(self, name: str) -> Any:
+        """Return a field; one of a long log is mapped from its file."""
+        value = object.__getattribute__(self, name)
+        return value.mapped() if isinstance(value, StoredColumn) else value
+
+    def stored_columns(self) -> dict[str, Any]:
+        """Return the fields by name; those of a long log stay in their files."""
+        return {name: object.__getattribute__(self, name) for name in self.topic.columns}
+
+    def with_columns(self, **columns: Any) -> Self:
+        """Return the table with other values of some fields."""
+        return type(self)(**self.stored_columns() | columns)
+
+
+ROWS: Final = 4096
+"""Rows of a long log that are in memory at once (ours)."""
+
+
+def by_rows(function: Callable[..., Any], *columns: Any) -> Any:
+    """Return ``function`` of columns (n, ...) without a copy of a whole column in memory.
+
+    ``function`` accepts some rows of each column, and returns an entry for each row.
+    """
+    if len(columns[0]) <= ROWS:
+        return function(*columns)
+    results = []
+    for start in range(0, len(columns[0]), ROWS):
+        results.append(function(*(column[start : start + ROWS] for column in columns)))
+        for column in columns:
+            if isinstance(column.base, mmap):
+                column.base.madvise(MADV_DONTNEED)
+    return np.concatenate(results)
 
 
 T = TypeVar("T", bound=Table)

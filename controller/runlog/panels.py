@@ -1,13 +1,20 @@
 """Curves of a run over time, as the topics describe them."""
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
-from snakewalk.controller.runlog.column import Curve, Panel, Table
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.runlog.column import Curve, Panel, by_rows
 from snakewalk.controller.runlog.record import RunRecord
+
+_REDUCE: Final[Mapping[str, Callable[..., Floats]]] = {
+    "largest": np.nanmax,
+    "least": np.nanmin,
+    "mean": np.nanmean,
+}
 
 
 class CurveValues(NamedTuple):
@@ -37,35 +44,30 @@ class CurveValues(NamedTuple):
         return self.values[np.isfinite(self.values)]
 
 
-def panel_curves(record: RunRecord, panel: Panel) -> list[CurveValues]:
-    """Curves of a panel that have a value at any time."""
-    return [curve for curve in _curves(record, panel) if np.isfinite(curve.values).any()]
+def panel_curves(record: RunRecord, panel: Panel, step: int = 1) -> list[CurveValues]:
+    """Curves of a panel that have a value at any time, of every ``step``-th row."""
+    return [curve for curve in _curves(record, panel, step) if np.isfinite(curve.values).any()]
 
 
-def _curves(record: RunRecord, panel: Panel) -> Iterator[CurveValues]:
+def _curves(record: RunRecord, panel: Panel, step: int) -> Iterator[CurveValues]:
     for table in record.tables():
         for name, column in table.topic.columns.items():
             for curve in column.curves:
                 if curve.panel == panel:
-                    yield CurveValues(curve, table.time_s, _values(table, name, curve))
+                    columns = [getattr(table, key)[::step] for key in (name, curve.gaps) if key]
+                    values = by_rows(partial(_values, curve), *columns)
+                    yield CurveValues(curve, table.time_s[::step], values)
 
 
-def _values(table: Table, name: str, curve: Curve) -> Floats:
-    values = curve.scale * np.asarray(getattr(table, name), dtype=float)
-    if curve.gaps:
-        values = np.where(getattr(table, curve.gaps), values, np.nan)
+def _values(curve: Curve, column: Floats, is_known: Bools | None = None) -> Floats:
+    values = curve.scale * np.asarray(column, dtype=float)
+    if is_known is not None:
+        values = np.where(is_known, values, np.nan)
     if curve.magnitude:
         values = np.abs(values)
     if not curve.joints:
         return values
     reduced = np.full(len(values), np.nan)
-    is_known = np.isfinite(values).any(axis=1)
-    some = values[is_known]
-    match curve.joints:
-        case "largest":
-            reduced[is_known] = np.nanmax(some, axis=1)
-        case "least":
-            reduced[is_known] = np.nanmin(some, axis=1)
-        case "mean":
-            reduced[is_known] = np.nanmean(some, axis=1)
+    rows = np.isfinite(values).any(axis=1)
+    reduced[rows] = _REDUCE[curve.joints](values[rows], axis=1)
     return reduced

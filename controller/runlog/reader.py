@@ -1,13 +1,15 @@
 """Reads a log back, up to the break if a kill cut it, and without the parts that are damaged."""
 
 import json
+import os
 import struct
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from tempfile import gettempdir
+from typing import Any, BinaryIO, Final
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Header, McapRecord, Message
@@ -17,6 +19,7 @@ from zstandard import ZstdError, decompress, frame_content_size
 
 from snakewalk.config.archive import MOST_LOG_BYTES, check_expansion
 from snakewalk.config.errors import InputError
+from snakewalk.controller.runlog.column import ROWS
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.tables import RowPacker, record_of
 from snakewalk.controller.runlog.topics import FORMAT, ConfigTable
@@ -29,6 +32,8 @@ _CHUNK: Final = 6
 _CHUNK_HEAD: Final = struct.Struct("<16xQ4xI")  # two times, bytes unpacked, CRC, length of a name
 _CHUNK_LENGTH: Final = 8  # after the packing's name, before the packed bytes
 _ZSTD_HEAD: Final = 18  # at most
+_NAME_BYTES: Final = 1000
+"""Bytes of a chunk that hold its head and the name of its packing (ours)."""
 _PACKED: Final = ("zstd", "")
 _NAMED: Final = 8
 """Topics that a message names at most (ours)."""
@@ -40,12 +45,18 @@ class LogError(InputError):
     """A log is missing, is another kind of file, or breaks off before its header ends."""
 
 
-def read_log(path: Path, *, is_ours: bool = False) -> RunRecord:
+def read_log(
+    path: Path,
+    *,
+    is_ours: bool = False,
+    on_progress: Callable[[float, float], None] | None = None,
+) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Args:
         path: the log.
         is_ours: whether this process has written it, so that no limit of its expansion applies.
+        on_progress: called with (bytes read, of) while it is read.
 
     Raises:
         LogError: the file does not exist, is not a log of ours, or its start is missing.
@@ -56,21 +67,30 @@ def read_log(path: Path, *, is_ours: bool = False) -> RunRecord:
         raise LogError(f"{path}: is a folder; a run's log is {path / 'log.mcap'}")
     try:
         with path.open("rb") as file:
-            data = file.read(len(_MAGIC))
-            if data == _MAGIC:  # a device without an end is not a log
-                data += file.read()
+            start = file.read(len(_MAGIC))
+            if not start or not _MAGIC.startswith(start):  # a device without an end is not a log
+                raise LogError(f"{path}: is not an MCAP log")
+            stream = file if file.seekable() else BytesIO(start + file.read())
+            return _record(path, stream, is_ours, on_progress)
     except OSError as error:
         part = part_path(path)
         hint = f"; a run that was killed left {part}" if part.is_file() else ""
         raise LogError(f"{path}: {error.strerror or error}{hint}") from None
-    if not data.startswith(_MAGIC[: len(data)]) or not data:
-        raise LogError(f"{path}: is not an MCAP log")
-    packer = RowPacker()
-    rows, last_s, complete, lost = _rows(path, data, packer, is_ours=is_ours)
+
+
+def _record(
+    path: Path,
+    file: BinaryIO,
+    is_ours: bool,
+    on_progress: Callable[[float, float], None] | None,
+) -> RunRecord:
+    """Return the record of an open log; only a chunk of it is in memory at once."""
+    packer = RowPacker(_storage(path))
+    rows, last_s, complete, lost, fault = _rows(path, file, packer, is_ours, on_progress)
     configs = rows[ConfigTable.topic.name]
     if not configs:
-        if _whole_records(data)[1] and _crcs_agree(data) and not lost:
-            raise LogError(f"{path}: {_foreign(data)}")
+        if _whole_records(file)[1] and _crcs_agree(file) and not lost:
+            raise LogError(f"{path}: {_foreign(file)}")
         raise LogError(f"{path}: breaks off before it says what ran: nothing can be recovered")
     if configs[0].get("format") != FORMAT:
         raise LogError(
@@ -79,23 +99,27 @@ def read_log(path: Path, *, is_ours: bool = False) -> RunRecord:
     note = "" if complete else f"the log is cut or damaged; its last row is of {last_s:.2f} s"
     if lost:
         note += f"; {lost} damaged parts are left out"
+    if fault:
+        note = f"only its first {last_s:.0f} s were read: {fault}; free space in {packer.folder}"
     try:
         return record_of(rows, complete=complete, note=note, parts=packer.parts)
     except (LookupError, TypeError, ValueError, AttributeError, ValidationError) as error:
         raise LogError(f"{path}: is not a log of this version: {error}") from None
 
 
-def _foreign(data: bytes) -> str:
+def _storage(path: Path) -> Path:
+    """Return the folder for the columns of a long log: its own, because /tmp may be in memory."""
+    return path.parent if os.access(path.parent, os.W_OK) else Path(gettempdir())
+
+
+def _foreign(file: BinaryIO) -> str:
     """Return the sentence about a complete MCAP that another program wrote."""
     profile = ""
     topics = set[str]()
-    for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+    for record in _records(file, []):
         if isinstance(record, Header):
             profile = record.profile
         elif isinstance(record, Channel):
-            topics.add(record.topic)
-    for record in _records(data, []):
-        if isinstance(record, Channel):
             topics.add(record.topic)
     listed = ", ".join(sorted(topics)[:_NAMED]) + (", ..." if len(topics) > _NAMED else "")
     with_topics = f"with topics {listed}" if topics else "without topics"
@@ -106,19 +130,24 @@ def _foreign(data: bytes) -> str:
 
 
 def _rows(
-    path: Path, data: bytes, packer: RowPacker, *, is_ours: bool
-) -> tuple[Rows, float, bool, int]:
-    """Rows by topic, time of the last one, whether the file is whole, and its damaged parts."""
-    end, complete, unpacked = _whole_records(data)
+    path: Path,
+    file: BinaryIO,
+    packer: RowPacker,
+    is_ours: bool,
+    on_progress: Callable[[float, float], None] | None,
+) -> tuple[Rows, float, bool, int, str]:
+    """Rows by topic, time of the last one, whether the file is whole, damaged parts, disk fault."""
+    complete, unpacked, packed = _whole_records(file)
     if not is_ours:
-        check_expansion(path, len(data), unpacked, most_bytes=MOST_LOG_BYTES)
-    complete = complete and _crcs_agree(data)
+        check_expansion(path, packed, unpacked, most_bytes=MOST_LOG_BYTES)
+    complete = complete and _crcs_agree(file)
     rows: Rows = defaultdict(list)
     lost = list[str]()
-    topics = _topics(path, data[:end])
+    topics = _topics(path, file)
     last_ns = 0
+    fault = ""
     try:
-        for record in _records(data[:end], lost):
+        for number, record in enumerate(_records(file, lost)):
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
@@ -129,22 +158,35 @@ def _rows(
                 rows[topic].append(row)
                 packer.pack(topic, rows)
                 last_ns = max(last_ns, record.log_time)
+            if on_progress is not None and number % ROWS == 0:
+                on_progress(file.tell(), packed)
     except _BROKEN:
         complete = False  # the end of a cut file comes as an error too; damage fails a CRC
-    return rows, last_ns * 1e-9, complete and not lost, len(lost)
+    except OSError as error:  # a run that has ended well does not fail because of its log
+        complete = False
+        fault = error.strerror or str(error)
+    return rows, last_ns * 1e-9, complete and not lost, len(lost), fault
 
 
-def _crcs_agree(data: bytes) -> bool:
+def _from_start(file: BinaryIO, *, validate_crcs: bool = False) -> Iterator[McapRecord]:
+    size = file.seek(0, os.SEEK_END)  # no damaged length reserves more memory
+    file.seek(0)
+    yield from StreamReader(
+        file, emit_chunks=True, validate_crcs=validate_crcs, record_size_limit=size
+    ).records
+
+
+def _crcs_agree(file: BinaryIO) -> bool:
     """Whether a whole file has the checksums that it states, those in its chunks apart."""
     try:
-        for _ in StreamReader(BytesIO(data), emit_chunks=True, validate_crcs=True).records:
+        for _ in _from_start(file, validate_crcs=True):
             pass
     except _BROKEN:
         return False
     return True
 
 
-def _topics(path: Path, data: bytes) -> dict[int, str]:
+def _topics(path: Path, file: BinaryIO) -> dict[int, str]:
     """Topics by number, of the summary: a damaged chunk may have been the first to name one.
 
     Raises:
@@ -154,7 +196,7 @@ def _topics(path: Path, data: bytes) -> dict[int, str]:
     topics = dict[int, str]()
     chunks = 0
     try:
-        for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+        for record in _from_start(file):
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
             if isinstance(record, Chunk):
@@ -168,12 +210,12 @@ def _topics(path: Path, data: bytes) -> dict[int, str]:
     return topics
 
 
-def _records(data: bytes, lost: list[str]) -> Iterator[McapRecord]:
+def _records(file: BinaryIO, lost: list[str]) -> Iterator[McapRecord]:
     """Records of a log, also those in chunks; no chunk is unpacked to more than it says.
 
     The faults of damaged chunks go into ``lost``; a chunk's records come all or not at all.
     """
-    for record in StreamReader(BytesIO(data), emit_chunks=True).records:
+    for record in _from_start(file):
         if not isinstance(record, Chunk):
             yield record
             continue
@@ -207,18 +249,19 @@ def _said_bytes(chunk: bytes) -> int:
     return int(said if framed < 0 else min(said, framed))
 
 
-def _whole_records(data: bytes) -> tuple[int, bool, int]:
-    """Bytes of complete records, whether the footer ends them, and their stated unpacked bytes."""
+def _whole_records(file: BinaryIO) -> tuple[bool, int, int]:
+    """Whether the footer ends the file, the stated unpacked bytes of its records, and its size."""
+    size = file.seek(0, os.SEEK_END)
     position = len(_MAGIC)
     opcode = 0
     unpacked = 0
-    while position + _HEAD.size <= len(data) and opcode != _FOOTER:
-        opcode, length = _HEAD.unpack_from(data, position)
-        if position + _HEAD.size + length > len(data):
-            return position, False, unpacked
+    while position + _HEAD.size <= size and opcode != _FOOTER:
+        file.seek(position)
+        opcode, length = _HEAD.unpack(file.read(_HEAD.size))
+        if position + _HEAD.size + length > size:
+            return False, unpacked, size
         chunk = opcode == _CHUNK and length >= _CHUNK_HEAD.size
-        start = position + _HEAD.size
-        unpacked += _said_bytes(data[start : start + length]) if chunk else length
+        unpacked += _said_bytes(file.read(min(length, _NAME_BYTES))) if chunk else length
         position += _HEAD.size + length
-    complete = opcode == _FOOTER and data[position:] == _MAGIC
-    return position + (len(_MAGIC) if complete else 0), complete, unpacked
+    file.seek(position)
+    return opcode == _FOOTER and file.read(len(_MAGIC) + 1) == _MAGIC, unpacked, size

@@ -305,7 +305,5 @@ _TIMES: Final = ("time_s", "deadline_s", "arrival_s")
 
 
 def _earlier(table: Table, start_s: float) -> Table:
-    written: Any = table
     names = [name for name in _TIMES if hasattr(table, name)]
-    earlier: Table = replace(written, **{name: getattr(written, name) - start_s for name in names})
-    return earlier
+    return table.with_columns(**{name: getattr(table, name) - start_s for name in names})

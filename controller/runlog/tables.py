@@ -3,13 +3,24 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
-from itertools import pairwise
+from itertools import chain, pairwise
+from pathlib import Path
+from sys import intern
 from typing import Any, Final, TypeVar, cast, get_type_hints
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.runlog.column import ANY, JOINT, LINK, REQUIRED, Column, Table
+from snakewalk.controller.runlog.column import (
+    ANY,
+    JOINT,
+    LINK,
+    REQUIRED,
+    ROWS,
+    Column,
+    StoredColumn,
+    Table,
+)
 from snakewalk.controller.runlog.encode import array
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import Event, Header, RunRecord
@@ -30,14 +41,19 @@ _TABLES: Final[Mapping[str, type[Table]]] = {
 """Tables of a record, by attribute."""
 
 
-_ROWS: Final = 4096
-"""Rows that become arrays at a time (ours): a row needs ten times the memory of its arrays."""
+_PARTS: Final = 16
+"""Parts of a table that stay in memory (ours): 22 minutes at 50 Hz."""
 
 
 class RowPacker:
-    """Turns rows into arrays while a long log is read, after the row of its configuration."""
+    """Turns rows into arrays while a long log is read, after the row of its configuration.
 
-    def __init__(self) -> None:
+    A row needs ten times the memory of its arrays. The arrays of a long table go into unnamed
+    files in ``folder``.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.parts: dict[type[Table], list[Table]] = {}
         """Tables of the rows so far, in their order."""
         self._kinds = {kind.topic.name: kind for kind in _TABLES.values()}
@@ -47,15 +63,22 @@ class RowPacker:
         """Move the rows of a topic to ``parts`` if there are many.
 
         Rows that are not of this version stay; ``record_of`` reports them.
+
+        Raises:
+            OSError: the disk is full.
+
         """
         kind = self._kinds.get(topic)
-        if kind is None or len(rows[topic]) < _ROWS or not rows[ConfigTable.topic.name]:
+        if kind is None or len(rows[topic]) < ROWS or not rows[ConfigTable.topic.name]:
             return
         with suppress(LookupError, TypeError, ValueError, AttributeError):
             self._sizes = self._sizes or _sizes(Header.of(rows[ConfigTable.topic.name][0]))
             part = table_of(kind, rows[topic], self._sizes)
-            self.parts.setdefault(kind, []).append(part)
+            parts = self.parts.setdefault(kind, [])
+            parts.append(part)
             rows[topic] = []
+            if len(parts) >= _PARTS:
+                parts[:] = [_joined(parts, self.folder)]
 
 
 def _sizes(header: Header) -> dict[str, int]:
@@ -87,8 +110,11 @@ def record_of(
     earlier = parts or {}
 
     def table(kind: type[T]) -> T:
-        last = table_of(kind, rows.get(kind.topic.name, ()), sizes)
-        return _joined(kind, cast(Sequence[T], earlier.get(kind, ())), last)
+        last = rows.get(kind.topic.name, ())
+        parts = [*earlier.get(kind, ())]
+        if last or not parts:
+            parts.append(table_of(kind, last, sizes))
+        return cast(T, _joined(parts) if len(parts) > 1 else parts[0])
 
     paths = table(PathTable)
     changed = table(WaypointTable)
@@ -137,18 +163,22 @@ def table_of(kind: type[T], rows: Sequence[Row], sizes: Mapping[str, int]) -> T:
     )
 
 
-def _joined(kind: type[T], parts: Sequence[T], last: T) -> T:
-    """Return the table of all parts."""
-    if not parts:
-        return last
+def _joined(parts: Sequence[T], folder: Path | None = None) -> T:
+    """Return the table of all parts; arrays go into files in ``folder``, if it is given."""
+    columns = [part.stored_columns() for part in parts]
     cells: dict[str, Any] = {}
-    for name in (field.name for field in fields(kind)):  # type: ignore[arg-type]
-        values = [getattr(part, name) for part in parts]
-        if len(getattr(last, name)):
-            values.append(getattr(last, name))
-        is_array = isinstance(values[0], np.ndarray)
-        cells[name] = np.concatenate(values) if is_array else sum(values, type(values[0])())
-    return kind(**cells)
+    for name, first in columns[0].items():
+        others = [values[name] for values in columns[1:]]
+        if not isinstance(first, np.ndarray | StoredColumn):
+            cells[name] = type(first)(chain(first, *others))
+        elif folder is None and isinstance(first, np.ndarray):
+            cells[name] = np.concatenate([first, *others])
+        else:
+            stored = first if isinstance(first, StoredColumn) else StoredColumn(folder, first)
+            for values in others:
+                stored.append(values)
+            cells[name] = stored
+    return type(parts[0])(**cells)
 
 
 def _cells(name: str, column: Column, rows: Sequence[Row], sizes: Mapping[str, int]) -> Any:
@@ -159,7 +189,7 @@ def _cells(name: str, column: Column, rows: Sequence[Row], sizes: Mapping[str, i
     if column.kind == "points":
         return [_points(value, column) for value in values]
     if column.kind == "text":
-        return tuple(values)
+        return tuple(map(intern, values))
     if column.kind == "joints":
         return tuple(map(tuple, values))
     sizes = {**sizes, ANY: len(values[0]) if column.shape == (ANY,) and values else 0}

@@ -10,8 +10,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import path_error_m
-from snakewalk.controller.metrics.summary import RunSummary, summary
-from snakewalk.controller.metrics.tracking import tracking_error_rad
+from snakewalk.controller.metrics.summary import RunSummary, largest, summary
+from snakewalk.controller.metrics.tracking import tracking_errors
 from snakewalk.controller.metrics.verdict import RunVerdict, verdict
 from snakewalk.controller.runlog.record import RunRecord
 
@@ -55,14 +55,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
     settings: dict[str, Any] = {"bus": header.backend, "software": header.software}
     for table, config in (("run", header.run), ("robot", header.robot), ("world", header.world)):
         settings |= flat(config.model_dump(mode="json"), table)
-    off_rad = tracking_error_rad(cycle)
-    is_known = np.isfinite(off_rad)
-    count = np.maximum(is_known.sum(axis=1), 1)
-    squares = np.where(is_known, off_rad, 0.0) ** 2
-    rms_rad = np.sqrt(squares.sum(axis=1) / count)
-    rms_rad[~is_known.any(axis=1)] = np.nan
-    current_a = np.where(np.isfinite(cycle.current_a), np.abs(cycle.current_a), -1.0)
-    largest_a = current_a.max(axis=1, initial=-1.0)
+    squares, count, _ = tracking_errors(cycle).T
     numbers = summary(record)
     return ComparedRun(
         name=name,
@@ -77,8 +70,8 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
         path_error_m=path_error_m(record),
         speed_m_s=pose.speed_m_s,
         cycle_s=cycle.time_s,
-        current_a=np.where(largest_a < 0.0, np.nan, largest_a),
-        tracking_rms_rad=rms_rad,
+        current_a=largest(cycle.current_a),
+        tracking_rms_rad=np.sqrt(squares / np.where(count, count, np.nan)),
     )
 
 

@@ -11,7 +11,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Force, Json, RunLog, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.exchange.flat_table import (
@@ -22,7 +22,6 @@ from snakewalk.controller.exchange.flat_table import (
 )
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
-from snakewalk.controller.runlog.reader import read_log
 
 
 @command(
@@ -64,9 +63,7 @@ def export(
 ) -> None:
     """Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D."""
     _check_names(log, csv, parquet, ros2, foxglove)
-    record = read_log(log)
-    if record.note:
-        LOGGER.warning("%s: %s", log, record.note)
+    record = open_log(log)
     tables = flat_tables(record, joint_numbers=joint_numbers)
     named = with_joint_numbers(record) if joint_numbers else record
     writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}

@@ -6,10 +6,10 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Json, RunLog, show
 from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.rehearsal.judgement import judge as judged
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.truth import read_truth
 
 
@@ -20,7 +20,7 @@ def judge(
     as_json: Json = False,
 ) -> None:
     """Compare a run with the truth of the served robot; exit code 1 unless it truly arrived."""
-    record = read_log(log)
+    record = open_log(log)
     judgement = judged(read_truth(truth), record, summary(record))
     facts = judgement.facts()
     show(facts if as_json else {"judgement": judgement.text, **facts}, as_json)

@@ -7,11 +7,10 @@ import typer
 
 from snakewalk.config.constants import LOOK
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Force, Json, Look, RunLog, show
 from snakewalk.controller.console.result_files import refuse_mixture
 from snakewalk.controller.run.results import check_look, write_artifacts
-from snakewalk.controller.runlog.reader import read_log
 
 
 @command("log report", examples=("log report runs/flat-square-walk-seed0/log.mcap",))
@@ -34,9 +33,7 @@ def report(
 ) -> None:
     """Make report.html, summary.json and film.mp4 again from a log."""
     check_look(look)
-    record = read_log(log)
-    if record.note:
-        LOGGER.warning("%s: %s", log, record.note)
+    record = open_log(log)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
     artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look, folders=folders)

@@ -4,8 +4,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import GREY, HIGHEST, MEAN, RED, SUPPLY
 from snakewalk.controller.figures.style import canvas, legend_above, trace
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import FLAT_V
 
@@ -26,13 +28,19 @@ def effort_figure(record: RunRecord) -> Figure | None:
 
 def _current(axes: Axes, record: RunRecord) -> None:
     cycle = record.cycle
-    size = np.abs(cycle.current_a)
+
+    def sizes(current_a: Floats) -> Floats:
+        size = np.abs(current_a)
+        columns = size.max(axis=1), size.mean(axis=1), np.fmax.reduce(size, axis=1)
+        return np.stack(columns, axis=1)
+
+    highest, mean, known = by_rows(sizes, cycle.current_a).T
     for values, colour, label in (
-        (size.max(axis=1), HIGHEST, "highest joint"),
-        (size.mean(axis=1), MEAN, "mean of all joints"),
+        (highest, HIGHEST, "highest joint"),
+        (mean, MEAN, "mean of all joints"),
     ):
         trace(axes, cycle.time_s, values, colour, label)
-    peak = float(np.nanmax(np.append(size, 0.0)))
+    peak = float(np.nanmax(np.append(known, 0.0)))
     limit = record.header.run.safety.current_limit_of_a(record.header.robot)
     axes.set_ylim(0.0, max(1.15 * peak, 0.05))
     if peak > 0.5 * limit:

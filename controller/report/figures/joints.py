@@ -17,14 +17,14 @@ def joints_figure(record: RunRecord) -> Figure | None:
     if len(cycle.time_s) < 2:
         return None
     joints = cycle.asked_rad.shape[1]
-    asked = cycle.asked_rad
-    measured = cycle.measured_rad
-    gap = np.where(cycle.valid, measured - asked, np.nan)
+    grid = np.linspace(cycle.time_s[0], cycle.time_s[-1], min(_COLUMNS, len(cycle.time_s)))
+    rows = np.searchsorted(cycle.time_s, grid).clip(0, len(cycle.time_s) - 1)
+    asked = cycle.asked_rad[rows]
+    measured = cycle.measured_rad[rows]
+    gap = np.where(cycle.valid[rows], measured - asked, np.nan)
     span = _largest(np.concatenate([asked, measured]))
     height = float(np.clip(0.075 * joints, 1.2, 2.6)) * 3 + 0.9
     figure, panels = canvas(3, height)
-    grid = np.linspace(cycle.time_s[0], cycle.time_s[-1], min(_COLUMNS, len(cycle.time_s)))
-    rows = np.searchsorted(cycle.time_s, grid).clip(0, len(cycle.time_s) - 1)
     extent = (float(grid[0]), float(grid[-1]), joints - 0.5, -0.5)
     for axes, values, title, limit in zip(
         panels,
@@ -34,7 +34,7 @@ def joints_figure(record: RunRecord) -> Figure | None:
         strict=True,
     ):
         image = axes.imshow(
-            values[rows].T,
+            values.T,
             aspect="auto",
             cmap=ANGLES,
             vmin=-limit,

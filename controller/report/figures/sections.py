@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 from snakewalk.controller.figures.path import path_figure
 from snakewalk.controller.figures.style import data_uri, style
 from snakewalk.controller.report.curves import curves_html
-from snakewalk.controller.report.figures.advance import advance_figure
 from snakewalk.controller.report.figures.attitude import attitude_figure
 from snakewalk.controller.report.figures.effort import effort_figure
 from snakewalk.controller.report.figures.joints import joints_figure
@@ -19,7 +18,7 @@ from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
-_IN_CURVES: Final = frozenset({"Speed and path", "Effort", "Time on the bus"})
+_IN_CURVES: Final = frozenset({"Effort", "Time on the bus"})
 """Quantities that the curves of the page show as well, to be zoomed."""
 _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (
@@ -27,12 +26,6 @@ _ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] =
         "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "
         "inside it in its turn, orange when not. The body grows darker with time.",
         path_figure,
-    ),
-    (
-        "Speed and path",
-        "Forward speed of the links along themselves, against what the friction model predicts "
-        "for the pulse speed asked. Green lines: a waypoint reached.",
-        advance_figure,
     ),
     (
         "Joint angles",

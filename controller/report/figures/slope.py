@@ -7,6 +7,7 @@ from snakewalk.config.colours import AMBER, BLUE, GREY
 from snakewalk.controller.figures.style import canvas, legend_above, mark_waypoints, trace
 from snakewalk.controller.metrics.ground_slope import ground_slope
 from snakewalk.controller.metrics.path_error import waypoint_times_s
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -17,11 +18,13 @@ def slope_figure(record: RunRecord) -> Figure | None:
     walk = record.walk
     if header.ground is None or len(pose.time_s) < 2:
         return None
-    slope = ground_slope(header.ground, pose.links_m)
+    ground = header.ground
+    slopes = by_rows(lambda links_m: np.stack(ground_slope(ground, links_m), axis=1), pose.links_m)
+    ahead_rad, steepest_rad = slopes.T
     figure, panels = canvas(1, 2.8)
     axes = panels[0]
-    trace(axes, pose.time_s, np.rad2deg(slope.steepest_rad), AMBER, "steepest")
-    trace(axes, pose.time_s, np.rad2deg(slope.ahead_rad), BLUE, "ahead, uphill positive")
+    trace(axes, pose.time_s, np.rad2deg(steepest_rad), AMBER, "steepest")
+    trace(axes, pose.time_s, np.rad2deg(ahead_rad), BLUE, "ahead, uphill positive")
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     is_wide = walk.carrier_rad > 0.0
     if is_wide.any():

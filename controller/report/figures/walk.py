@@ -1,5 +1,7 @@
 """The walk over the library of shapes: which, how many, and how well they fitted the aim."""
 
+from typing import Final
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -8,6 +10,11 @@ from snakewalk.config.arrays import Bools, Ints
 from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, PALE, RED
 from snakewalk.controller.figures.style import canvas, legend_above
 from snakewalk.controller.runlog.record import RunRecord
+
+_MARKS: Final = 4000
+"""Decisions from which marks are drawn as one picture (ours): 4 MB of the page otherwise."""
+_ABOVE: Final = 10
+"""Drawing order above all marks."""
 
 
 def walk_figure(record: RunRecord) -> Figure | None:
@@ -19,6 +26,8 @@ def walk_figure(record: RunRecord) -> Figure | None:
     many = len(np.unique(walk.state)) > 1
     number = np.arange(1, steps + 1)
     figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
+    for axes in panels if steps > _MARKS else ():
+        axes.set_rasterization_zorder(_ABOVE)
     if many:
         states = panels[0]
         states.plot(number, walk.state, color=PALE, linewidth=0.8, zorder=1)

@@ -9,10 +9,9 @@ from rich.table import Column, Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Force, Json, console, labelled
 from snakewalk.controller.console.result_files import check_picture
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.commands.pictures import pictures
 from snakewalk.controller.studies.run_comparison import compared_run, differing, flat, log_names
 
@@ -48,9 +47,7 @@ def compare(
 
     runs = []
     for log, name in zip(logs, log_names(logs), strict=True):
-        record = read_log(log)
-        if record.note:
-            LOGGER.warning("%s: %s", log, record.note)
+        record = open_log(log)
         runs.append(compared_run(record, name))
     if picture is not None:
         pictures().draw_comparison(runs, picture)

@@ -18,6 +18,7 @@ from snakewalk.config.template import robot_toml, template
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import (
     Force,
     Json,
@@ -33,7 +34,6 @@ from snakewalk.controller.console.result_files import (
     refuse_to_overwrite,
     write_result,
 )
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.identification.friction_fit import (
     Found,
     FrictionFit,
@@ -202,9 +202,7 @@ def _read_runs(
 
     logs = {}
     for path in (*paths, *judge):
-        record = read_log(path)
-        if record.note:
-            LOGGER.warning("%s: %s", path, record.note)
+        record = open_log(path)
         try:
             logs[path] = FrictionLog.of(record, given)
             if lifting and path in paths:

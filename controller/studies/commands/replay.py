@@ -10,7 +10,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Force, Json, RunLog, console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
@@ -43,9 +43,7 @@ def replay(
     refuse_to_overwrite([out], force)
 
     require_extra("a replay needs", "mujoco")
-    record = read_log(log)
-    if record.note:
-        LOGGER.warning("%s: %s", log, record.note)
+    record = open_log(log)
     with TemporaryDirectory() as folder, ProgressBar("replay") as bar:
         file = Path(folder) / "replay.mcap" if out is None else out
         again = read_log(replaying.replay(record, file, on_progress=bar.update))

@@ -5,10 +5,9 @@ import json
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load_world
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Json, RunLog, Workers, World, check_files, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.shadow.diagnosis import diagnose, goals_of
 
 
@@ -28,9 +27,7 @@ def shadow(
     """Send a log's goals to a simulated robot; exit code 1 if it names a cause of differences."""
     require_extra("a shadow needs", "mujoco")
     check_files(None, None, world)
-    record = read_log(log)
-    if record.note:
-        LOGGER.warning("%s: %s", log, record.note)
+    record = open_log(log)
     robot = record.header.robot
     goals, measured = goals_of(record, None if world is None else load_world(world))
     with ProgressBar("shadow", transient=True) as bar:

@@ -7,9 +7,8 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
-from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.studies.run_comparison import log_names
 from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.log_page import LogPage, play
@@ -46,9 +45,7 @@ def view(
         )
     records = {}
     for log, name in zip(logs, log_names(logs), strict=True):
-        records[name] = read_log(log).from_torque_on()
-        if records[name].note:
-            LOGGER.warning("%s: %s", log, records[name].note)
+        records[name] = open_log(log).from_torque_on()
     page = LogPage(records, host, port)
     print(f"{page.url}  (^C ends)", flush=True)
     play(page, WallClock())

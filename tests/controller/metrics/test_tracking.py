@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from snakewalk.controller.metrics.tracking import lag_s, tracking_error_rad
+from snakewalk.controller.metrics.tracking import lag_s, tracking_errors
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import CycleTable
 
@@ -49,7 +49,9 @@ def test_error_leaves_out_failed_reads(record: RunRecord) -> None:
     cycle = with_signals(record.cycle, 0.06)
     valid = cycle.valid.copy()
     valid[7, 3] = False
-    error = tracking_error_rad(dataclasses.replace(cycle, valid=valid))
-    assert np.argwhere(np.isnan(error)).tolist() == [[7, 3]]
+    squares, count, error = tracking_errors(dataclasses.replace(cycle, valid=valid)).T
+    assert np.argwhere(count != 16).tolist() == [[7]]
+    assert count[7] == 15
+    assert (squares <= count * error**2 + 1e-12).all()
     largest = 2.0 * np.sin(0.5 * 3.0 * 0.06)  # of sin(a) - sin(a - d)
-    assert np.nanmax(np.abs(error)) == pytest.approx(largest, rel=1e-3)
+    assert error.max() == pytest.approx(largest, rel=1e-3)

@@ -17,10 +17,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.shared_text import without_folders
 from snakewalk.controller.figures.path import body_outline_m
 from snakewalk.controller.figures.style import thin
-from snakewalk.controller.metrics.summary import SummarizedFriction, summary
+from snakewalk.controller.metrics.summary import RunSummary, SummarizedFriction, summary
 from snakewalk.controller.report import artifacts
 from snakewalk.controller.report import page as page_module
-from snakewalk.controller.report.artifacts import build_report
+from snakewalk.controller.report.artifacts import make_artifacts
 from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.film import film_times
 from snakewalk.controller.report.page import Drawings, Section, film_on_page, page
@@ -57,6 +57,12 @@ def parsed(html: str) -> Sources:
     return reader
 
 
+def build_report(record: RunRecord, folder: Path, numbers: RunSummary | None = None) -> Path:
+    page_path = make_artifacts(record, folder, numbers, film=False).report
+    assert page_path is not None
+    return page_path
+
+
 @pytest.fixture(scope="module")
 def hills(make: Make, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Page of a run over hills, in a folder of its own."""
@@ -69,7 +75,7 @@ def test_the_page_stands_alone(hills: Path) -> None:
     html = hills.read_text(encoding="utf-8")
     *sources, link = parsed(html).sources
     assert link == "summary.json", "no log stands beside this page"
-    assert len(sources) == 8
+    assert len(sources) == 7
     for source in sources:
         assert source.startswith("data:image/svg+xml;base64,")
         svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))
@@ -97,7 +103,7 @@ def test_a_run_that_hardly_began_has_a_page_and_always_the_same(make: Make, tmp_
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages without pictures and curves, of which others tell."""
-    monkeypatch.setattr(artifacts, "_draw", lambda record: artifacts.Drawings([], "", ""))
+    monkeypatch.setattr(artifacts, "_draw", lambda *_: artifacts.Drawings([], "", ""))
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -245,7 +251,7 @@ def test_an_event_leads_into_the_film(record: RunRecord, tmp_path: Path) -> None
     assert faster >= 1.0
     (tmp_path / "film.mp4").write_bytes(bytes(10))
     (tmp_path / "log.mcap").write_bytes(b"")
-    html = build_report(record, tmp_path, tmp_path / "film.mp4").read_text(encoding="utf-8")
+    html = build_report(record, tmp_path).read_text(encoding="utf-8")
     assert f"data-start='{start_s:.3f}' data-speed='{faster:g}'" in html
     assert f"<button data-time='{record.events[0].time_s:.3f}'>" in html
     links = [source for source in parsed(html).sources if not source.startswith("data:")]

@@ -1,6 +1,10 @@
 """What goes into the log comes out of it."""
 
+import errno
 import json
+import os
+import resource
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
@@ -12,8 +16,8 @@ from mcap.reader import make_reader
 from snakewalk.config import archive
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import digest, load_robot, load_run, load_world
-from snakewalk.controller.runlog import reader, tables
-from snakewalk.controller.runlog.column import Table
+from snakewalk.controller.runlog import column, reader
+from snakewalk.controller.runlog.column import StoredColumn, Table
 from snakewalk.controller.runlog.evidence import SIMULATED
 from snakewalk.controller.runlog.reader import LogError, read_log
 from snakewalk.controller.runlog.record import Header, PlanSummary, Winding
@@ -21,6 +25,7 @@ from snakewalk.controller.runlog.tables import record_of
 from snakewalk.controller.runlog.topics import TABLES, WaypointTable
 from snakewalk.controller.runlog.writer import RunLog, part_path
 from snakewalk.drivers.types import JointState
+from tests.helpers.long_log import pack_early, repeat_log
 
 Write = Callable[[Path, int], Path]
 
@@ -64,12 +69,13 @@ def test_every_table_comes_back(
     assert record.end_s == pytest.approx(119 * 0.02 + 0.004)
 
 
+@pytest.mark.parametrize(("rows", "is_stored"), [(8, False), (7, True)])
 def test_rows_that_are_packed_in_parts_are_the_same_rows(
-    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    rows: int, is_stored: bool, write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write(tmp_path / "run.mcap", 120)
     whole = read_log(path)
-    monkeypatch.setattr(tables, "_ROWS", 7)
+    pack_early(monkeypatch, rows)
     packed = read_log(path)
     compared = 0
     for kind in fields(whole):
@@ -85,6 +91,66 @@ def test_rows_that_are_packed_in_parts_are_the_same_rows(
                 compared += 1
     assert compared > 60
     assert packed.events == whole.events
+    columns = packed.cycle.stored_columns().values()
+    assert any(isinstance(values, StoredColumn) for values in columns) == is_stored
+    assert packed.from_torque_on().cycle.time_s[-1] == whole.from_torque_on().cycle.time_s[-1]
+
+
+def test_a_full_disk_costs_the_rows_after_it_and_says_so(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that has ended well is read and reported even if its columns find no space."""
+    path = write(tmp_path / "run.mcap", 120)
+    pack_early(monkeypatch, 5)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8000, limits[1]))
+    try:
+        record = read_log(path, is_ours=True)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert 80 <= len(record.cycle.time_s) < 120
+    assert not record.complete
+    assert record.note == (
+        f"only its first 2 s were read: {os.strerror(errno.EFBIG)}; free space in {tmp_path}"
+    )
+
+
+def columns_bytes(log: Path) -> int:
+    record = read_log(log)
+    columns = [getattr(t, name) for t in (record.cycle, record.pose) for name in t.topic.columns]
+    return sum(column.nbytes for column in columns if isinstance(column, np.ndarray))
+
+
+def peak_bytes(log: Path) -> int:
+    tracemalloc.start()
+    try:
+        read_log(log)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_reading_a_longer_log_needs_hardly_more_memory(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pack_early(monkeypatch, 2)
+    source = write(tmp_path / "run.mcap", 100)
+    few = repeat_log(source, tmp_path / "few.mcap", 2, chunk_bytes=1 << 14)
+    many = repeat_log(source, tmp_path / "many.mcap", 5, chunk_bytes=1 << 14)
+    added_bytes = columns_bytes(many) - columns_bytes(few)
+    assert peak_bytes(many) - peak_bytes(few) < 0.5 * added_bytes
+
+
+def test_functions_by_rows_give_what_they_give_at_once() -> None:
+    values = np.arange(3.0 * column.ROWS).reshape(-1, 3)
+    stored = StoredColumn(None, values[:4])
+    for part in (values[4:], values):
+        stored.append(part)
+    rows = np.concatenate([values, values])
+    total = column.by_rows(lambda a, b: (a * b).sum(axis=1), stored.mapped()[1:], rows[:-1])
+    np.testing.assert_array_equal(total, (rows[1:] * rows[:-1]).sum(axis=1))
+    with pytest.raises(ValueError, match="different shapes"):
+        stored.append(np.zeros((2, 4)))
 
 
 def test_a_log_longer_than_other_files_may_be_is_read(
