@@ -54,6 +54,8 @@ _DETECTORS = {
     "another program write": "settings read-back",
     "exchanged": "identity read-back",
     "torque is off": "torque read-back",
+    "it has rebooted": "settings read-back",
+    "without a packet": "age of the state",
     "watchdog": "watchdog read-back",
     "does not push": "current at an error",
     "does not follow": "following error",

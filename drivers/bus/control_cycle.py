@@ -36,6 +36,8 @@ _CLEAN_READS = 50
 _MISSED_LIMIT = 3
 """Missed reads in a row after which a silent servo is ignored in the choice of the length."""
 _KEPT_REQUESTS = 64
+STALL_S = 0.02
+"""A wait that ends this long after its deadline is a stall of the computer (ours)."""
 SPIN_S = 40e-6
 """Typical delay, s, with which Linux wakes a program."""
 SPIN_FROM_BAUD = 3_000_000
@@ -59,6 +61,10 @@ class CycleCounters:
     fast_given_up: int = 0
     late_bytes: int = 0
     """Bytes that arrived after the time-out of their read."""
+    stalls: int = 0
+    """Reads that ended long after their deadline: this program or its computer paused."""
+    stalled_s: float = 0.0
+    """Total time between the deadlines and the ends of these reads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,9 +234,11 @@ class ControlCycle:
         else:
             outcome = by.finish()
             if isinstance(outcome, GroupReadReply):
+                self._note_stall(request)
                 self._succeeded()
                 return outcome
             raw, reply = self._receive_rest(request, outcome, by.remaining_s)
+        self._note_stall(request)
         responded = reply.answered
         if not self._pending.empty:
             reply = self._without_late(request, reply)
@@ -248,6 +256,13 @@ class ControlCycle:
             reply.answered[back],
             reply.clean,
         )
+
+    def _note_stall(self, request: GroupReadRequest) -> None:
+        allowed_s = request.reply_bytes * self._byte_s + self._latency_s
+        late_s = self._line.since_sent_s - allowed_s
+        if late_s > STALL_S:
+            self.counters.stalls += 1
+            self.counters.stalled_s += late_s
 
     def _without_late(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
         new = np.array(

@@ -183,7 +183,15 @@ class FeetechSingleReads(FeetechCycle):
     def finish_read(self) -> GroupReadReply:
         """Read each servo."""
         replies = [single.read() for single in self._singles]
-        for name in ("timeouts", "unclean", "copies", "drained_bytes", "late_bytes"):
+        for name in (
+            "timeouts",
+            "unclean",
+            "copies",
+            "drained_bytes",
+            "late_bytes",
+            "stalls",
+            "stalled_s",
+        ):
             total = sum(getattr(single.counters, name) for single in self._singles)
             setattr(self.counters, name, total)
         return GroupReadReply(

@@ -12,6 +12,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Int32s
 from snakewalk.drivers.bus.chain_bus import GroupCycle
+from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.errors import BusError
 
@@ -23,6 +24,9 @@ SEEN_READS, WATCHED_READS = 3, 256
 the reads among which they count (ours). A program that writes rarely is seen in some reads only."""
 _SECOND_MASTER = "another program writes goals (a second master)"
 _LOST_TO_ALL = "no servo has the newest goals: the line or the adapter loses what is written"
+MOST_LATE = 8
+"""Number of goals that a servo or an adapter holds back at most (ours). A goal that was replaced
+earlier does not come back by itself."""
 _REMEMBERED = 256
 """Goals that are known to be of this run (ours)."""
 
@@ -55,6 +59,8 @@ class GoalCheck:
         self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
+        self._right_at = np.zeros(len(labels), np.int64)
+        """(J,) number of writes at the last right goal."""
         self._is_incomplete = False
         self._seen = 0
         self._seen_at = 0
@@ -87,24 +93,12 @@ class GoalCheck:
         if not self._sent:
             return
         self._watched = max(self._watched - 1, 0)
-        reply = self.cycle.read()
-        sent = self._sent[-1]
-        is_usual = reply.flawless and not self._differences
-        if is_usual and reply.data.tobytes() == self._rows.encode(sent):
-            self._is_incomplete = False
-            return
-        values = self._rows.decode(reply.data)
-        self._is_incomplete = not reply.valid.all()
-        for joint in np.flatnonzero(reply.valid).tolist():
-            if values[joint] == sent[joint]:
-                self._differences.pop(joint, None)
-            else:
-                self._note(joint, int(values[joint]))
+        self._read()
         over = [
             joint for joint, difference in self._differences.items() if self._is_over(difference)
         ]
         if over:
-            raise BusError(self._fault(sorted(over), sent, explain))
+            raise BusError(self._fault(sorted(over), explain))
 
     def explain(self, joint: int) -> str | None:
         """Read the goals once; return the fault of a joint's goal, or None.
@@ -113,24 +107,33 @@ class GoalCheck:
             PortError: the port is gone.
 
         """
-        if not self._sent:
+        if not self._sent or not self._read().valid[joint] or joint not in self._differences:
             return None
+        return self._text([joint])
+
+    def _read(self) -> GroupReadReply:
+        """Read the goals, and note those that differ."""
         reply = self.cycle.read()
         sent = self._sent[-1]
+        if reply.flawless and reply.data.tobytes() == self._rows.encode(sent):  # the usual case
+            self._is_incomplete = False
+            self._differences.clear()
+            self._right_at[:] = self._writes
+            return reply
+        self._is_incomplete = not reply.valid.all()
         values = self._rows.decode(reply.data)
-        value = int(values[joint])
-        if not reply.valid[joint] or value == sent[joint]:
-            return None
-        is_foreign = not any(goals[joint] == value for goals in self._sent)
-        cause = _SECOND_MASTER if is_foreign else "its servo ignores the goals"
-        if not is_foreign and len(sent) > 1 and (values[reply.valid] != sent[reply.valid]).all():
-            cause = _LOST_TO_ALL
-        return f"Goal Position is {value}, not {sent[joint]}: {cause}"
+        for joint in np.flatnonzero(reply.valid).tolist():
+            if values[joint] == sent[joint]:
+                self._differences.pop(joint, None)
+                self._right_at[joint] = self._writes
+            else:
+                self._note(joint, int(values[joint]))
+        return reply
 
     def _note(self, joint: int, value: int) -> None:
         earlier = self._differences.get(joint)
         lag = next((k for k, goals in enumerate(reversed(self._sent)) if goals[joint] == value), -1)
-        is_foreign = lag < 0
+        is_foreign = lag < 0 or self._writes - lag < self._right_at[joint] - MOST_LATE
         if earlier is None:
             self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
         elif earlier.write < self._writes:
@@ -150,25 +153,25 @@ class GoalCheck:
             return difference.count >= FOREIGN_READS or self._seen >= SEEN_READS
         return difference.count >= OWN_READS
 
-    def _fault(
-        self,
-        joints: list[int],
-        sent: Int32s,
-        explain: Callable[[int], str | None],
-    ) -> str:
-        first = self._differences[joints[0]]
+    def _fault(self, joints: list[int], explain: Callable[[int], str | None]) -> str:
         reason = explain(joints[0])
         if reason is not None:
             return f"{self._labels[joints[0]]}: {reason}"
+        return f"{', '.join(self._labels[joint] for joint in joints)}: {self._text(joints)}"
+
+    def _text(self, joints: list[int]) -> str:
+        """Difference of the first of ``joints``, and its cause."""
+        first = self._differences[joints[0]]
         if first.is_foreign:
             cause = _SECOND_MASTER
-        elif first.is_constant and 1 < len(joints) == len(self._labels):
+        elif first.is_constant and 1 < len(self._differences) == len(self._labels):
             cause = _LOST_TO_ALL
-        elif first.is_constant:
-            cause = "it ignores sync writes, or another program writes goals"
+        elif first.is_constant and (first.count > 1 or first.lag > MOST_LATE):
+            cause = "it ignores sync writes"
+        elif first.count == 1:
+            cause = "it accepts goals late, or ignores sync writes"
         elif first.lag:
             cause = f"it accepts goals {first.lag} cycle{'s' * (first.lag > 1)} late"
         else:
             cause = "writes to it get lost"
-        names = ", ".join(self._labels[joint] for joint in joints)
-        return f"{names}: Goal Position is {first.value}, not {sent[joints[0]]}: {cause}"
+        return f"Goal Position is {first.value}, not {self._sent[-1][joints[0]]}: {cause}"

@@ -10,8 +10,10 @@ from functools import partial
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
+from snakewalk.drivers.chain.chain_settings import FEETECH_SETTINGS
 from snakewalk.drivers.chain.fingerprint import Fingerprint, register_change
 from snakewalk.drivers.chain.goal_check import GoalCheck
+from snakewalk.drivers.chain.register_cause import MODE, TORQUE, register_cause
 from snakewalk.drivers.chain.register_rows import RegisterRows
 from snakewalk.drivers.chain.start_up import (
     IDENTITY,
@@ -20,7 +22,7 @@ from snakewalk.drivers.chain.start_up import (
     identity_fault,
 )
 from snakewalk.drivers.errors import BusError
-from snakewalk.drivers.protocol.registers import WATCHDOG, WATCHDOG_TRIPPED
+from snakewalk.drivers.protocol.registers import WATCHDOG
 
 SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
@@ -61,7 +63,7 @@ class LivenessCheck:
         self._rad_per_position = rad_per_position
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
-        self._torque = read("Torque Enable", dict.fromkeys(joints, 1))
+        self._torque = read(TORQUE, dict.fromkeys(joints, 1))
 
         def checks(
             registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
@@ -74,15 +76,20 @@ class LivenessCheck:
 
         self._identity = next(iter(checks([IDENTITY], configured)), None)
         self._settings = checks(RAM_SETTINGS, configured)
-        self._shaping = checks(SHAPING_SETTINGS, configured)
+        self._shaping = checks((*SHAPING_SETTINGS, *FEETECH_SETTINGS[2:]), configured)
         compared = dict.fromkeys(name for values in fingerprints.values() for name in values)
         self._fingerprint = checks(compared, fingerprints)
         # without a watchdog its place reads the mode: a wheel turns at once at full speed
         self._watchdog = (
             read(WATCHDOG, watchdogs)
             if watchdogs
-            else next((c for c in self._fingerprint if c.name == "Operating Mode"), None)
+            else next((c for c in self._fingerprint if c.name == MODE), None)
         )
+        parts = self._torque, self._identity, self._watchdog
+        self._checks = [
+            *(check for check in parts if check is not None),
+            *(*self._settings, *self._shaping, *self._fingerprint),
+        ]
         self._missed: list[RegisterCheck] = []
         """Checks to which not all servos replied; the oldest first."""
 
@@ -101,7 +108,7 @@ class LivenessCheck:
             has_time and self._goals.is_due and cycle % SLOW_EVERY not in _CHECKED_AT
         ):
             return None
-        self._goals.check(self._explain)
+        self._goals.check(self.explain)
         return self._goals.cycle
 
     def check(self, cycle: int, *, has_time: bool) -> GroupCycle | None:
@@ -146,51 +153,32 @@ class LivenessCheck:
         if not differing:
             return
         joint, value = next(iter(differing.items()))
-        if check is self._identity:
-            other = identity_fault(self._robot, joint, value)
-            if other is not None:
-                raise BusError(other)
-        names = ", ".join(map(self._robot.joint_label, differing))
-        raise BusError(f"{names}: {self._difference(check, joint, value)}")
+        reason = self.explain(joint)
+        if reason is None:  # it is right again, or silent
+            unit_rad = self._rad_per_position(joint)
+            change = register_change(check.name, check.expected[joint], value, unit_rad)
+            reason = f"{change}: it has rebooted, or another program writes to it"
+        joints = [joint] if check is self._identity else differing
+        names = ", ".join(map(self._robot.joint_label, joints))
+        raise BusError(f"{names}: {reason}")
 
-    def _difference(self, check: "RegisterCheck", joint: int, value: int) -> str:
-        name = check.name
-        expected = check.expected[joint]
-        if check is self._torque:
-            return "torque is off: has it rebooted?"
-        if name == WATCHDOG and value == WATCHDOG_TRIPPED:
-            return "its bus watchdog has stopped it"
-        if check in self._fingerprint:
-            change = register_change(name, expected, value, self._rad_per_position(joint))
-            return f"{change}: does another program write to it?"
-        return (
-            f"{name} is {value}, not {expected}: has it rebooted, or does another program write "
-            "to it?"
-        )
-
-    def _explain(self, joint: int) -> str | None:
-        """Reason why a joint's servo may reject goals: an unexpected register, or None.
+    def explain(self, joint: int) -> str | None:
+        """Read all compared registers of a joint's servo; return the cause of a change, or None.
 
         Raises:
             PortError: the port is gone.
 
         """
-        checks = [
-            check
-            for check in (self._watchdog, self._torque, *self._settings, *self._fingerprint)
-            if check is not None and joint in check.expected
-        ]
+        expected = {c.name: c.expected[joint] for c in self._checks if joint in c.expected}
+        servo_id = self._robot.servo_ids[joint]
         try:
-            values = self._bus.read_each(
-                self._robot.servo_ids[joint], [check.name for check in checks]
-            )
+            values = self._bus.read_each(servo_id, expected)
         except BusError:
             return None
-        for check in checks:
-            value = values[check.name]
-            if value != check.expected[joint]:
-                return self._difference(check, joint, value)
-        return None
+        other = identity_fault(self._robot, joint, values.get(IDENTITY, 0))
+        facts = self._robot.servo_records[joint]
+        unit_rad = self._rad_per_position(joint)
+        return other or register_cause(facts, expected, values, unit_rad)
 
 
 def _in_turn(

@@ -111,7 +111,7 @@ def recheck(
         registers = {register: servo.registers[register] for register in values}
         other = identity_fault(robot, joint, registers[IDENTITY]) if IDENTITY in registers else None
         if other is not None:
-            faults.append(ChainFault(FaultCause.EXCHANGED, other))
+            faults.append(ChainFault(FaultCause.EXCHANGED, f"{robot.joint_label(joint)}: {other}"))
         if not servo.torque_on or registers != values:
             reset.append(joint)
     lost = {robot.servo_ids[joint] for joint in reset}

@@ -53,6 +53,9 @@ _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 _HOLD_READS = 2
 """Reads in which the servos may report their positions before they hold (ours)."""
+_SETTLE_READS, _SETTLE_S, _SETTLED_RAD = 50, 0.02, 0.01
+"""Reads for which a start waits for limp joints, the time between two, and the largest difference
+of two readings of a joint at rest (ours)."""
 STILL_RAD = 0.1
 """Largest distance of a joint from the position that it holds; farther is another joint (ours)."""
 
@@ -232,6 +235,7 @@ class ServoChain:
         """Read the first state, hold and arm the watchdogs; torque is off if that fails."""
         self._reads = 0
         self._due = None
+        self._armed = False
         self._alarms.clear()
         check_pose(self.robot, self._first_state().position_rad)
         try:
@@ -281,12 +285,18 @@ class ServoChain:
         watched = [ids[joint] for joint in self._watchdogs]
         if watched:
             bus.sync_write(watched, WATCHDOG, 0)  # goals follow at once, else an old goal counts
-        goals = self._send_goals(here_rad)
-        if watched:  # before torque, which is never on without it
-            bus.sync_write(watched, WATCHDOG, self._watchdog_ticks)
-            self._expect(WATCHDOG, self._watchdogs)
-        # read last: meanwhile another program may have written goals, or exchanged IDs
-        now_rad, reported_goals = self._identified.positions_and_goals(_FIRST_READS, ask_again=True)
+        for is_last in (False, True):
+            goals = self._send_goals(here_rad)
+            if watched:  # before torque, which is never on without it
+                bus.sync_write(watched, WATCHDOG, self._watchdog_ticks)
+                self._expect(WATCHDOG, self._watchdogs)
+            # read last: meanwhile another program may have written goals, or exchanged IDs
+            now_rad, reported_goals = self._identified.positions_and_goals(
+                _FIRST_READS, ask_again=True
+            )
+            if is_last or not np.abs(now_rad - here_rad).max() > STILL_RAD:
+                break
+            here_rad = self._settled(now_rad)
         check_stillness(self.robot, now_rad, here_rad, STILL_RAD)
         for joint in np.flatnonzero(reported_goals != goals).tolist():
             raise BusError(
@@ -297,9 +307,20 @@ class ServoChain:
         self._expect("Torque Enable", dict.fromkeys(range(len(ids)), 1))
         self._liveness = self._new_liveness()
         self._armed = True
+        self._sent_at_s = self._clock.now_s()
         state = self.read()
         check_stillness(self.robot, state.position_rad, here_rad, STILL_RAD)
         return state
+
+    def _settled(self, here_rad: Floats) -> Floats:
+        """Angles (J,) after limp joints have come to rest, or after a while."""
+        for _ in range(_SETTLE_READS):
+            before_rad = here_rad
+            self._clock.sleep_until_s(self._clock.now_s() + _SETTLE_S)
+            here_rad = self._identified.positions_rad(_FIRST_READS, ask_again=True)
+            if np.abs(here_rad - before_rad).max() <= _SETTLED_RAD:
+                break
+        return here_rad
 
     def _new_liveness(self) -> LivenessCheck:
         return LivenessCheck(
@@ -349,11 +370,17 @@ class ServoChain:
 
         Raises:
             BusError: a servo has another goal than the one sent to it; raised by ``check_servos``.
+                Or the pause since the last packet was long enough to stop the servos.
             PortError: the port is gone.
 
         """
+        self._check_pause()
         self._sent_at_s = self._clock.now_s()
+        stalls = self.counters.stalls
         reply = self._cycle.read()
+        if self.counters.stalls > stalls:  # its values are old, or nobody waited for them
+            self._check_pause()
+            reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
         read = reply.valid_count
@@ -446,19 +473,23 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        pause_s = self._clock.now_s() - self._sent_at_s
-        if self._armed and self._watchdogs and pause_s > self._watchdog_s:
-            raise BusError(
-                f"{pause_s:.2f} s without a packet: the bus watchdog ({self._watchdog_s:g} s) has "
-                "stopped the servos"
-            )
+        self._check_pause()
         self._send_goals(command.goal_rad)
         self._sent_at_s = self._clock.now_s()
 
+    def _check_pause(self) -> None:
+        pause_s = self._clock.now_s() - self._sent_at_s
+        if self._armed and pause_s > self._watchdog_s:
+            effect = "no bus watchdog has stopped the servos"
+            if self._watchdogs:
+                effect = f"the bus watchdog ({self._watchdog_s:g} s) has stopped the servos"
+            raise BusError(f"{pause_s:.2f} s without a packet: this program did not run; {effect}")
+
     def explain(self, joint: int) -> str | None:
-        """Return the fault of the goal in a joint's servo, or None."""
+        """Read a joint's servo again; return the cause in its registers or its goal, or None."""
         try:
-            return self._goal_check.explain(joint)
+            found = None if self._liveness is None else self._liveness.explain(joint)
+            return found or self._goal_check.explain(joint)
         except DriverError:
             return None
 

@@ -352,12 +352,12 @@ def identity(joint: int) -> int:
 
 
 def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
-    """Fault of a servo whose register names another joint, or None."""
+    """Fault of a joint's servo whose register names another joint, or None."""
     if value == identity(joint) or not 1 <= value <= robot.joint_count:
         return None
     return (
-        f"{robot.joint_label(joint)}: its servo was {robot.joint_label(value - 1)}: exchanged IDs; "
-        "put them right: snakewalk bus set"
+        f"its servo was {robot.joint_label(value - 1)}: exchanged IDs; put them right: snakewalk "
+        "bus set"
     )
 
 

@@ -14,6 +14,7 @@ constant current. A current at the joint's own limit, towards the goal, shows a 
 """
 
 import math
+from collections import deque
 
 import numpy as np
 
@@ -48,6 +49,10 @@ standing joint has to draw another current (ours): the limit varies with the sup
 AT_LIMIT = 0.15
 """A current this close to a joint's own limit, as a share of it, is at the limit (ours). Towards
 the goal it shows that the motor pushes: a soft joint is held off its goal by the ground."""
+PROMPT_S = 0.012
+"""Age of a state up to which the goals before it had reached their servos (ours)."""
+RESPONSE_S = 0.02
+"""Time in which a joint begins to follow a goal (ours)."""
 _FLOATS = readonly_array()
 
 
@@ -62,6 +67,7 @@ class FollowingError:
         self._memory = np.zeros((3, joints))
         self._since_s, self._idle_s, self._last_rad = self._memory
         self._steady = np.zeros((5, joints))
+        self._goals: deque[tuple[float, Floats]] = deque(maxlen=16)
         self.joint = -1
         """Joint of the newest reason to stop."""
         self.is_idle = False
@@ -74,11 +80,13 @@ class FollowingError:
         self._idle_s[:] = 0.0
         self._last_rad[:] = np.nan
         self._steady[:] = np.nan
+        self._goals.clear()
         self._time_s = math.inf
 
     def update(self, state: JointState, goal_rad: Floats) -> str | None:
         """Evaluate a state and the goals (J,) sent before it; return a reason to stop, or None."""
         last_s, self._time_s = self._time_s, state.time_s
+        goal_rad = self._nearest_goals(state, goal_rad)
         joint = _judge(
             goal_rad,
             state.position_rad,
@@ -117,8 +125,36 @@ class FollowingError:
         error_rad = goal_rad[joint] - state.position_rad[joint]
         return (
             f"{self._limits.joint_names[joint]}: {abs(error_rad):.2f} rad from its goal for "
-            f"{for_s:.2f} s with {state.current_a[joint]:.2f} A: it does not follow: is it "
-            "blocked, weakened by another program, or another joint's servo?"
+            f"{for_s:.2f} s with {state.current_a[joint]:.2f} A: it does not follow: it is "
+            "blocked, or its gears slip"
+        )
+
+    def _nearest_goals(self, state: JointState, goal_rad: Floats) -> Floats:
+        """Goals (J,) to compare with a state: the newest, unless replies are slow.
+
+        A slow adapter may hand on a goal together with the next request, and the servo has not
+        moved when it is read. So of all goals that may be this new, the nearest counts.
+        """
+        self._goals.append((state.time_s, goal_rad))
+        age_s = float(np.maximum.reduce(state.age_s))
+        if not age_s > PROMPT_S:
+            return goal_rad
+        from_s = state.time_s - 2.0 * age_s - RESPONSE_S
+        recent: list[Floats] = []
+        for time_s, goals in reversed(self._goals):
+            recent.append(goals)
+            if time_s < from_s:
+                break
+        return np.clip(state.position_rad, np.min(recent, axis=0), np.max(recent, axis=0))
+
+    def _limp_cause(self, state: JointState, joint: int) -> str:
+        dead = "current"
+        speed_rad_s = state.velocity_rad_s[joint]
+        if abs(speed_rad_s) >= SLOW_RAD_S:
+            dead = f"position sensor, as it reports {speed_rad_s:.1f} rad/s; or a dead current"
+        return (
+            "its motor does not push: dead output stage or loose motor wire, if the joint is limp; "
+            f"else a dead {dead} sensor"
         )
 
     def _idle_fault(self, state: JointState, goal_rad: Floats, joint: int) -> str:
@@ -127,18 +163,21 @@ class FollowingError:
         expected_a = min(min(error_rad * per_rad, 1.0) * stall_a, limit_a)
         return (
             f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal with "
-            f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: its motor does "
-            "not push: dead output stage, loose motor wire, weakened by another program, or a dead "
-            "current or position sensor"
+            f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: "
+            f"{self._limp_cause(state, joint)}"
         )
 
     def _steady_fault(self, state: JointState, goal_rad: Floats, joint: int) -> str:
         since_s, _, _, low_a, high_a = self._steady[:, joint]
         error_rad = abs(float(goal_rad[joint] - state.position_rad[joint]))
+        current_a = state.current_a[joint]
+        cause = self._limp_cause(state, joint)
+        if abs(current_a) > IDLE_SHARE * max(abs(low_a), abs(high_a)):
+            cause = "dead current sensor, and its motor does not push"
         return (
             f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal; its current "
-            f"stays at {state.current_a[joint]:.2f} A for {state.time_s - since_s:.2f} s, expected "
-            f"{low_a:.2f} to {high_a:.2f} A: dead current sensor, and its motor does not push"
+            f"stays at {current_a:.2f} A for {state.time_s - since_s:.2f} s, expected "
+            f"{low_a:.2f} to {high_a:.2f} A: {cause}"
         )
 
 

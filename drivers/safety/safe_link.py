@@ -9,6 +9,8 @@ from dataclasses import replace
 from types import FrameType
 from typing import Any
 
+import numpy as np
+
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, SafetyTrippedError
 from snakewalk.drivers.link import CheckingLink, ExplainingLink, JointLink, SoftLink
@@ -31,6 +33,8 @@ from snakewalk.drivers.safety.vet import (
 )
 from snakewalk.drivers.types import JointCommand, JointState
 
+SLOW_SHARE = 0.5
+"""Share of ``stale_limit_s`` from which the age of the first state is reported (ours)."""
 RESTART_S = 2.0
 """Time after a servo's reboot in which the goals' rate grows to the limit again (ours)."""
 TORQUE_IS_OFF = "torque is off"
@@ -177,6 +181,12 @@ class SafeLink:
         self._steps.reset()
         self._check(state, self._memory, self._limits_at_start)
         self._refuse_if_tripped()
+        age_s = float(np.max(state.age_s))
+        if age_s > SLOW_SHARE * self._limits.stale_limit_s:
+            self._on_event(
+                f"replies need up to {age_s:.3f} s: one that is lost or late may end the run, as "
+                f"safety.stale_limit_s is {self._limits.stale_limit_s:g}"
+            )
         return state
 
     def disable(self) -> None:

@@ -163,7 +163,23 @@ def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | 
         return None
     age_s = state.age_s + since_s
     joint = int(np.argmin(age_s <= limits.stale_limit_s))
-    return f"{limits.joint_names[joint]}: not read for {age_s[joint]:.3f} s"
+    fault = f"{limits.joint_names[joint]}: not read for {age_s[joint]:.3f} s"
+    return f"{fault}: {_stale_cause(state, joint, since_s, limits)}"
+
+
+def _stale_cause(state: JointState, joint: int, since_s: float, limits: SafetyLimits) -> str:
+    """Cause of a joint's age, ``since_s`` after its state."""
+    if since_s > 0.5 * limits.stale_limit_s:
+        return f"this program did not run for {since_s:.3f} s; close other programs"
+    if state.valid[joint]:
+        return "its reply was slow: the latency of adapter or network, or a busy computer"
+    silent = np.flatnonzero(~state.valid)
+    if len(silent) == len(state.valid) > 1:
+        return "no servo replies: their supply, the cable or the adapter"
+    if len(silent) > 1 and silent[-1] - silent[0] == len(silent) - 1 and silent[0] > 0:
+        before = limits.joint_names[silent[0] - 1]
+        return f"{len(silent)} neighbours do not reply: a cable or plug behind {before}"
+    return "no valid reply: its plug or supply, or two servos with its ID"
 
 
 def state_fault(
@@ -193,7 +209,11 @@ def state_fault(
             state.position_rad,
             "measured {:.3f} rad: forced beyond its limit",
         ),
-        (over_s >= limits.current_time_s, state.current_a, "{:.2f} A for too long"),
+        (
+            over_s >= limits.current_time_s,
+            state.current_a,
+            "{:.2f} A for too long: it is blocked or overloaded",
+        ),
         (
             ~np.isnan(state.temperature_c) & ~(state.slow_age_s <= limits.slow_stale_limit_s),
             state.slow_age_s,

@@ -22,9 +22,9 @@ _OPERATOR_TRIES = 12
 _RESETTING = {"reboot", "brown_out", "unplug", "supply", "remounted", "other robot"}
 CHANGING = {*CHANGES, *_RESETTING, "clash"}
 """Kinds after which registers, or who has which ID, may not be as they were set."""
-_ALARMS = ("does another program write to it", "exchanged")
+_ALARMS = ("program writes to it", "switched it off", "its mode", "it has rebooted", "exchanged")
 """In the reason of a trip that a changed register has caused."""
-_GOAL_ALARMS = ("second master", "ignores sync writes", "writes to it get lost")
+_GOAL_ALARMS = ("second master", "ignores sync writes", "writes to it get lost", "goals late")
 """In the reason of a trip that a goal has caused; noise may cause it, too."""
 _HARMLESS = {"constant velocity", "jumping velocity", "slow adapter"}
 """Kinds that end no run: they are reported, or need no report."""

@@ -77,7 +77,7 @@ def test_nothing_is_read_before_the_first_goal() -> None:
     ("value", "reads", "cause"),
     [
         (FOREIGN, FOREIGN_READS, "another program writes goals (a second master)"),
-        (1, OWN_READS, "it ignores sync writes, or another program writes goals"),
+        (1, OWN_READS, "it ignores sync writes"),
     ],
 )
 def test_differences_count_up_to_the_limit_and_not_before(
@@ -240,7 +240,7 @@ def test_a_known_reason_is_reported_instead() -> None:
 
 @pytest.mark.parametrize(
     ("value", "cause"),
-    [(FOREIGN, "another program writes goals"), (11, "its servo ignores the goals")],
+    [(FOREIGN, "another program writes goals"), (11, "it accepts goals late, or ignores")],
 )
 def test_an_explanation_names_one_joint_at_once(value: int, cause: str) -> None:
     rig = Rig()

@@ -388,7 +388,7 @@ def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
     if lost == 2:
         chain.read()  # the turns of two other registers
         chain.read()
-    with pytest.raises(BusError, match="Position I Gain is 77, not"):
+    with pytest.raises(BusError, match="Position I Gain is 77, was"):
         chain.read()
 
 

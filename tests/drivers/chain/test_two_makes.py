@@ -131,7 +131,7 @@ def player(kind: str, row: int, more: str = "") -> Callable[[Body, int], None]:
 FAULTS = {
     "silent": (player("mute", 1, "for_s = 0.5\n"), "not read for 0.1"),
     "exchanged": (player("exchange", 0), "exchanged IDs|Goal Position is|not read"),
-    "restarted": (player("reboot", 1), "has it rebooted"),
+    "restarted": (player("reboot", 1), "it has rebooted"),
     "alarm": (player("overheating", 1), "overheating"),
     "setting": (
         player("write", 1, 'register = "Position P Gain"\nvalue = 3\n'),

@@ -186,7 +186,8 @@ def test_a_servo_that_reboots_is_noticed_and_set_up_again(rig: Rig) -> None:
     rig.cycles(16)
     assert rig.link.recoveries == 1
     assert rig.events[0] == (
-        "interrupted: joint pitch_02 (ID 2): torque is off: has it rebooted?; the servos hold"
+        "interrupted: joint pitch_02 (ID 2): torque is off; Velocity I Gain is 1920, was 2; Bus "
+        "Watchdog is 0, was 10: it has rebooted: check its supply and plugs; the servos hold"
     )
     assert rig.events[1].endswith("to be set up again: joint pitch_02 (ID 2)")
     assert rig.torque() == [1] * 4
@@ -468,7 +469,7 @@ def test_after_a_while_the_goals_are_as_fast_as_ever(patient: Rig) -> None:
 
 
 def test_an_overload_between_the_reading_and_the_check_of_torque_is_one() -> None:
-    """Else every sixteenth overload was told as ``torque is off: has it rebooted?``."""
+    """Else every sixteenth overload was told as ``torque is off``."""
     rig = Rig("stop", overload_reboots=1)
     while rig.chain._reads % SLOW_EVERY != SLOW_EVERY // 3:
         rig.cycles(1)
