@@ -71,7 +71,6 @@ _DETECTORS = {
     "no servo was read": "lost replies",
     "after the time-out": "late replies",
     "not read for": "age of the state",
-    "without a packet": "age of the state",
     "port": "port",
     "replies got lost": "lost replies",
     "same robot": "identity after a pause",
