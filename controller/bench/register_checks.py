@@ -16,9 +16,9 @@ from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
 from snakewalk.drivers.chain.fingerprint import (
     COMPARED,
-    SET_REGISTER,
     fixed_faults,
     present,
+    set_register,
 )
 from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import (
@@ -168,13 +168,15 @@ class _Checks:
     def _fixed(self) -> Finding | None:
         """Registers that must have one value for the scale and the direction of positions."""
         faults = [
-            f"{self._robot.joint_label(servo.joint)}: {fault}"
+            (f"{self._robot.joint_label(servo.joint)}: {text}", remedy)
             for servo in self._servos
-            for fault in fixed_faults(servo.values, self._robot.servo_records[servo.joint])
+            for text, remedy in fixed_faults(
+                servo.servo_id, servo.values, self._robot.servo_records[servo.joint]
+            )
         ]
-        return (
-            Finding("position scale", "fail", "; ".join(faults), SET_REGISTER) if faults else None
-        )
+        if not faults:
+            return None
+        return Finding("position scale", "fail", *map("; ".join, zip(*faults, strict=True)))
 
     def _usual(self) -> list[Finding | None]:
         """Other registers that shape the motion or protect a servo, against a new servo's."""
@@ -183,10 +185,7 @@ class _Checks:
             for servo in self._servos
             for name in self._robot.servo_records[servo.joint].marked("usual")
         )
-        return [
-            self._not_factory(name.lower(), name, f"as meant? else {SET_REGISTER}")
-            for name in names
-        ]
+        return [self._not_factory(name) for name in names]
 
     def _at(self, name: str) -> str:
         row = self._facts.registers.get(name)
@@ -267,14 +266,20 @@ class _Checks:
             ),
         ]
 
-    def _not_factory(self, check: str, register: str, remedy: str) -> Finding | None:
+    def _not_factory(self, register: str) -> Finding | None:
         servos = [
-            f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}"
+            (
+                f"{self._robot.joint_label(servo.joint)}: {register} {value}, factory {usual}",
+                set_register(servo.servo_id, register, usual),
+            )
             for servo in self._servos
             if (value := servo.values.get(register)) is not None
             and (usual := self._factory(servo, register, value)) != value
         ]
-        return Finding(check, "warn", "; ".join(servos), remedy) if servos else None
+        if not servos:
+            return None
+        texts, commands = map("; ".join, zip(*servos, strict=True))
+        return Finding(register.lower(), "warn", texts, f"as meant? else {commands}")
 
     def _watchdog(self) -> list[Finding | None]:
         return [

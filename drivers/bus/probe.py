@@ -23,6 +23,8 @@ _SETTLE_S = 2e-3
 """Silence after a request, longer than the longest return delay (0.508 ms)."""
 _REST_S = 0.05
 """Longest delay of the rest of a reply (ours): a busy computer hands over a part of it first."""
+_LATEST_S = 0.05
+"""Time for which the first missing reply of a servo is awaited (ours)."""
 _OVERHEARD_BYTES = 1 << 16
 """Number of overheard bytes that are enough to know who talks."""
 _TURN_S = 3e-3
@@ -110,7 +112,7 @@ def probe_with(
     byte_s = BITS_PER_BYTE / port.getBaudRate()
     answered = total = damaged = 0
     late_s: list[float] = []
-    is_patient = True
+    is_patient = may_be_late = True
     for _ in range(requests):
         port.clearPort()
         sent_s = port.clock.now_s()
@@ -126,6 +128,12 @@ def probe_with(
                 rest = max(1, reply_bytes - reader.pending)
                 data = port.read_until(rest, port.clock.now_s() + _REST_S)
                 is_patient = bool(data)  # else replies are cut off, not late
+            if not data and not replies and may_be_late and not reader.pending:
+                may_be_late = False
+                data = port.read_until(reply_bytes, sent_s + _LATEST_S)
+                if data:  # the others may be as late
+                    wait_s = _LATEST_S
+                    deadline_s = sent_s + wait_s
             if not data:
                 break
             for reply in reader.feed(data):

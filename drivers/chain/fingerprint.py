@@ -42,22 +42,23 @@ def fingerprint_of(registers: Mapping[str, int], facts: ServoModel) -> dict[str,
     return {name: registers[name] for name in fingerprint_registers(facts) if name in registers}
 
 
-SET_REGISTER = "snakewalk bus set --id ID --register 'NAME=VALUE'"
-"""Remedy for an unexpected register that no run sets."""
+def set_register(servo_id: int, name: str, value: int) -> str:
+    """Command that sets a register which no run sets."""
+    return f"snakewalk bus set --id {servo_id} --register '{name}={value}'"
 
 
-def fixed_faults(registers: Mapping[str, int], facts: ServoModel) -> list[str]:
-    """Texts on registers without the value that the driver's units need."""
+def fixed_faults(
+    servo_id: int, registers: Mapping[str, int], facts: ServoModel
+) -> list[tuple[str, str]]:
+    """Texts and remedies of registers without the value that the driver's units need."""
     faults = []
     for name in facts.marked("fixed"):
         row = facts.registers[name]
         value = registers.get(name, row.initial)
         if (value ^ row.initial) & row.bits:
             right = value & ~row.bits | row.initial & row.bits
-            faults.append(
-                f"{name}({row.address}) is {value}, not {right}: scale or direction of its "
-                "positions differs"
-            )
+            text = f"{name}({row.address}) is {value}, not {right}: scale or direction of its "
+            faults.append((f"{text}positions differs", set_register(servo_id, name, right)))
     return faults
 
 

@@ -59,7 +59,7 @@ class GoalCheck:
         self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
-        self._right_at = np.zeros(len(labels), np.int64)
+        self._confirmed_write = np.zeros(len(labels), np.int64)
         """(J,) number of writes at the last right goal."""
         self._is_incomplete = False
         self._seen = 0
@@ -118,14 +118,14 @@ class GoalCheck:
         if reply.flawless and reply.data.tobytes() == self._rows.encode(sent):  # the usual case
             self._is_incomplete = False
             self._differences.clear()
-            self._right_at[:] = self._writes
+            self._confirmed_write[:] = self._writes
             return reply
         self._is_incomplete = not reply.valid.all()
         values = self._rows.decode(reply.data)
         for joint in np.flatnonzero(reply.valid).tolist():
             if values[joint] == sent[joint]:
                 self._differences.pop(joint, None)
-                self._right_at[joint] = self._writes
+                self._confirmed_write[joint] = self._writes
             else:
                 self._note(joint, int(values[joint]))
         return reply
@@ -133,7 +133,7 @@ class GoalCheck:
     def _note(self, joint: int, value: int) -> None:
         earlier = self._differences.get(joint)
         lag = next((k for k, goals in enumerate(reversed(self._sent)) if goals[joint] == value), -1)
-        is_foreign = lag < 0 or self._writes - lag < self._right_at[joint] - MOST_LATE
+        is_foreign = lag < 0 or self._writes - lag < self._confirmed_write[joint] - MOST_LATE
         if earlier is None:
             self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
         elif earlier.write < self._writes:

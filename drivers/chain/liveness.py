@@ -4,14 +4,14 @@ A servo may have rebooted, or another program may have written to it. So registe
 one at a time.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus, GroupCycle
 from snakewalk.drivers.chain.chain_settings import FEETECH_SETTINGS
-from snakewalk.drivers.chain.fingerprint import Fingerprint, register_change
+from snakewalk.drivers.chain.fingerprint import Fingerprint
 from snakewalk.drivers.chain.goal_check import GoalCheck
 from snakewalk.drivers.chain.register_cause import MODE, TORQUE, register_cause
 from snakewalk.drivers.chain.register_rows import RegisterRows
@@ -26,12 +26,10 @@ from snakewalk.drivers.protocol.registers import WATCHDOG
 
 SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
-_GOALS_AT, _TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT = 2, 5, 8, 10, 13
-_SHAPING_AT, _FINGERPRINT_AT = (3, 11), (6, 9, 12, 14)
-"""Cycles of a round in which registers are read, at most one in each."""
-_CHECKED_AT = frozenset(
-    {_TORQUE_AT, _IDENTITY_AT, _WATCHDOG_AT, _SETTINGS_AT, *_SHAPING_AT, *_FINGERPRINT_AT}
-)
+_GOALS_AT = 2
+_CHECKED_AT = (5,), (8,), (10,), (13,), (3, 11), (6, 9, 12, 14)
+"""Cycles of a round in which torque, identity, watchdog, a setting, one that shapes the motion, and
+the fingerprint are read, at most one in each."""
 
 
 class LivenessCheck:
@@ -63,7 +61,7 @@ class LivenessCheck:
         self._rad_per_position = rad_per_position
         joints = range(robot.joint_count)
         read = partial(RegisterCheck.of, bus, robot, fast=fast)
-        self._torque = read(TORQUE, dict.fromkeys(joints, 1))
+        torque = read(TORQUE, dict.fromkeys(joints, 1))
 
         def checks(
             registers: Iterable[str], values: Mapping[int, Mapping[str, int]]
@@ -74,22 +72,25 @@ class LivenessCheck:
             }
             return [read(name, expected) for name, expected in by_register.items() if expected]
 
-        self._identity = next(iter(checks([IDENTITY], configured)), None)
-        self._settings = checks(RAM_SETTINGS, configured)
-        self._shaping = checks((*SHAPING_SETTINGS, *FEETECH_SETTINGS[2:]), configured)
         compared = dict.fromkeys(name for values in fingerprints.values() for name in values)
-        self._fingerprint = checks(compared, fingerprints)
+        fingerprint = checks(compared, fingerprints)
         # without a watchdog its place reads the mode: a wheel turns at once at full speed
-        self._watchdog = (
-            read(WATCHDOG, watchdogs)
-            if watchdogs
-            else next((c for c in self._fingerprint if c.name == MODE), None)
+        mode = [check for check in fingerprint if check.name == MODE]
+        turns = (
+            [torque],
+            checks([IDENTITY], configured),
+            [read(WATCHDOG, watchdogs)] if watchdogs else mode,
+            checks(RAM_SETTINGS, configured),
+            checks((*SHAPING_SETTINGS, *FEETECH_SETTINGS[2:]), configured),
+            fingerprint,
         )
-        parts = self._torque, self._identity, self._watchdog
-        self._checks = [
-            *(check for check in parts if check is not None),
-            *(*self._settings, *self._shaping, *self._fingerprint),
-        ]
+        self._checks = [check for turn in turns for check in turn]
+        self._turns = {
+            place: (turn, places)
+            for turn, places in zip(turns, _CHECKED_AT, strict=True)
+            for place in places
+        }
+        """Checks that are made in turn, and their places in a round, by place."""
         self._missed: list[RegisterCheck] = []
         """Checks to which not all servos replied; the oldest first."""
 
@@ -105,7 +106,7 @@ class LivenessCheck:
         """
         its_turn = cycle % SLOW_EVERY == _GOALS_AT
         if not its_turn and not (
-            has_time and self._goals.is_due and cycle % SLOW_EVERY not in _CHECKED_AT
+            has_time and self._goals.is_due and cycle % SLOW_EVERY not in self._turns
         ):
             return None
         self._goals.check(self.explain)
@@ -125,18 +126,10 @@ class LivenessCheck:
         """
         rounds, place = divmod(cycle, SLOW_EVERY)
         check = None
-        if place == _TORQUE_AT:
-            check = self._torque
-        elif place == _WATCHDOG_AT:
-            check = self._watchdog
-        elif place == _IDENTITY_AT:
-            check = self._identity
-        elif place == _SETTINGS_AT:
-            check = _in_turn(self._settings, rounds, (_SETTINGS_AT,), place)
-        elif place in _SHAPING_AT:
-            check = _in_turn(self._shaping, rounds, _SHAPING_AT, place)
-        elif place in _FINGERPRINT_AT:
-            check = _in_turn(self._fingerprint, rounds, _FINGERPRINT_AT, place)
+        if place in self._turns:
+            turn, places = self._turns[place]
+            if turn:
+                check = turn[(len(places) * rounds + places.index(place)) % len(turn)]
         elif has_time and self._missed:
             check = self._missed[0]
         if check is None:
@@ -153,12 +146,12 @@ class LivenessCheck:
         if not differing:
             return
         joint, value = next(iter(differing.items()))
-        reason = self.explain(joint)
-        if reason is None:  # it is right again, or silent
-            unit_rad = self._rad_per_position(joint)
-            change = register_change(check.name, check.expected[joint], value, unit_rad)
-            reason = f"{change}: it has rebooted, or another program writes to it"
-        joints = [joint] if check is self._identity else differing
+        # right again, or silent
+        change = f"{check.name} is {value}, was {check.expected[joint]}"
+        reason = (
+            self.explain(joint) or f"{change}: it has rebooted, or another program writes to it"
+        )
+        joints = [joint] if check.name == IDENTITY else differing
         names = ", ".join(map(self._robot.joint_label, joints))
         raise BusError(f"{names}: {reason}")
 
@@ -179,15 +172,6 @@ class LivenessCheck:
         facts = self._robot.servo_records[joint]
         unit_rad = self._rad_per_position(joint)
         return other or register_cause(facts, expected, values, unit_rad)
-
-
-def _in_turn(
-    checks: Sequence["RegisterCheck"], rounds: int, places: tuple[int, ...], place: int
-) -> "RegisterCheck | None":
-    """The check of this cycle, if ``place`` is one of their places in a round."""
-    if not checks:
-        return None
-    return checks[(len(places) * rounds + places.index(place)) % len(checks)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,8 +24,8 @@ def register_cause(
 
     ``values`` were read at one time; ``expected`` has the same registers.
     """
-    changed = [name for name in (TORQUE, MODE, *values) if values.get(name) != expected.get(name)]
-    changed = list(dict.fromkeys(changed))
+    names = dict.fromkeys((TORQUE, MODE, *values))
+    changed = [name for name in names if values.get(name) != expected.get(name)]
     if not changed:
         return None
     if values.get(WATCHDOG) == WATCHDOG_TRIPPED:

@@ -488,8 +488,8 @@ class ServoChain:
     def explain(self, joint: int) -> str | None:
         """Read a joint's servo again; return the cause in its registers or its goal, or None."""
         try:
-            found = None if self._liveness is None else self._liveness.explain(joint)
-            return found or self._goal_check.explain(joint)
+            cause = None if self._liveness is None else self._liveness.explain(joint)
+            return cause or self._goal_check.explain(joint)
         except DriverError:
             return None
 

@@ -23,7 +23,6 @@ from snakewalk.drivers.chain.chain_settings import (
     chain_settings,
 )
 from snakewalk.drivers.chain.fingerprint import (
-    SET_REGISTER,
     Fingerprint,
     fingerprint_of,
     fingerprint_registers,
@@ -182,8 +181,8 @@ def inspect(
             )
             faults.append(ChainFault(FaultCause.ALARM, text))
         faults += [
-            ChainFault(FaultCause.OTHER_SETTINGS, f"{joint}: {text}; {SET_REGISTER}")
-            for text in fixed_faults(report.registers, table.facts)
+            ChainFault(FaultCause.OTHER_SETTINGS, f"{joint}: {text}; {remedy}")
+            for text, remedy in fixed_faults(servo_id, report.registers, table.facts)
         ]
     for (name, model), ids in others.items():
         if len(ids) <= _FEW:

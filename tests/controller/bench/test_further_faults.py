@@ -155,6 +155,12 @@ FURTHER = [
         "slower than the others: servo 3 by 3.0 ms",
     ),
     Kind(
+        "a servo whose replies come 30 ms late",
+        later([3], 0.03),
+        "response time",
+        "slower than the others: servo 3 by 30.0 ms",
+    ),
+    Kind(
         "an adapter slower than configured",
         later([], 0.012),
         "response time",

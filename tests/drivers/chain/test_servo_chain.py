@@ -371,7 +371,7 @@ def test_a_check_whose_reply_is_lost_is_made_again_in_the_next_cycle_with_time(
     while chain._reads % SLOW_EVERY != 3:  # the turn of the first register that shapes the motion
         chain.read()
     assert chain._liveness is not None
-    check = chain._liveness._shaping[0]
+    check = chain._liveness._turns[3][0][0]
     line.bank[check.name][1] = 77
     read, remaining = check.cycle.read, [None] * lost
 
