@@ -1,5 +1,6 @@
 """``snakewalk``: runs the command line and says in a line, with an exit code, how it ended."""
 
+import errno
 import io
 import os
 import signal
@@ -89,6 +90,7 @@ _BY_SIGNAL = 128
 _STOP = "snakewalk.controller.bench.emergency_stop"
 """Name of the only command that must not wait for imports."""
 _NO_MEMORY = "not enough memory; end other programs, or raise the limit (ulimit -v)"
+_TOO_MANY_FILES = "too many open files; raise the limit (ulimit -n 1024)"
 _INTERRUPTED = 130
 """Exit code after Ctrl-C, which has been reported."""
 
@@ -159,6 +161,11 @@ def _end_by(error: Exception) -> None:
             _end(1, _with_notes(str(error), error))
         case ModuleNotFoundError() if (needed := missing_extra(error)) is not None:
             _end(2, needed)
+        case OSError(errno=errno.EMFILE):
+            _end(1, _with_notes(_TOO_MANY_FILES, error))
+        case OSError(errno=errno.ENOSPC):
+            place = error.filename or "standard output"
+            _end(1, _with_notes(f"{place}: {error.strerror}; free space", error))
         case OSError():
             place = f"{Path(str(error.filename))}: " if error.filename else ""
             _end(begun, _with_notes(f"{place}{error.strerror or error}", error))

@@ -14,6 +14,7 @@ from snakewalk.controller.figures.style import GROUND, WIDTH_IN, legend_above
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.topics import PoseTable
 
 _BODY_SPACING = 1.3  # body lengths between the bodies drawn
 _MARGIN_M = 0.35
@@ -40,7 +41,7 @@ def path_figure(record: RunRecord) -> Figure | None:
         draw_ground(axes, record.header.ground)
     _plan(axes, record)
     _bodies(axes, record)
-    step = -(-len(pose.time_s) // _POINTS)
+    step = _step(pose)
     is_measured = record.header.pose_evidence.is_measured
     evidence = "" if is_measured else ", dead-reckoned"
     axes.plot(
@@ -57,18 +58,28 @@ def path_figure(record: RunRecord) -> Figure | None:
     return figure
 
 
+def _step(pose: PoseTable) -> int:
+    return -(-len(pose.time_s) // _POINTS)
+
+
 def _extent(record: RunRecord) -> tuple[Floats, Floats]:
     plan = record.header.plan
     pose = record.pose
-    links = [
-        by_rows(lambda rows, edge=edge: edge.reduce(rows[..., :2], axis=1), pose.links_m)
-        for edge in (np.fmin, np.fmax)
-    ]
     around = [plan.waypoints_m - plan.waypoint_radius_m, plan.waypoints_m + plan.waypoint_radius_m]
-    parts = [plan.path_m[:, :2], *around, pose.head_m[:, :2], *links]
+    parts = [plan.path_m[:, :2], *around, _corners_m(pose.head_m), _corners_m(pose.links_m)]
     points = np.concatenate(parts)
     points = points[np.isfinite(points).all(axis=1)]
     return points.min(axis=0) - _MARGIN_M, points.max(axis=0) + _MARGIN_M
+
+
+def _corners_m(column: Floats) -> Floats:
+    """Least and largest coordinates (2 n, 2) of points (T, ..., 3), of some rows at a time."""
+
+    def corners_m(rows: Floats) -> Floats:
+        points = rows.reshape(-1, 3)[:, :2]
+        return np.stack([np.fmin.reduce(points), np.fmax.reduce(points)])
+
+    return np.asarray(by_rows(corners_m, column))
 
 
 def draw_ground(axes: Axes, ground: HeightField) -> None:
@@ -161,7 +172,7 @@ def _bodies(axes: Axes, record: RunRecord) -> None:
     robot = record.header.robot
     indices = np.flatnonzero(
         by_rows(lambda links_m: np.isfinite(links_m).all(axis=(1, 2)), pose.links_m)
-    )
+    )[:: _step(pose)]
     if len(indices) == 0:
         return
     along_m = np.cumsum(np.hypot(*np.diff(pose.centre_m[indices, :2], axis=0, prepend=[[0, 0]]).T))

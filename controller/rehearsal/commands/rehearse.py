@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from snakewalk.config.loader import checked
+from snakewalk.config.loader import checked, load_run
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
@@ -79,6 +79,8 @@ def rehearse_runs(
     """Rehearse runs against served robots in simulated time; exit code 1 if one did not arrive."""
     given = {**_TRACKER, **dict(key_values("--tracker", tracker))}
     config = checked(TrackerConfig, given, "--tracker")
+    for run in runs or ():
+        load_run(run)
     planned = [
         RehearsalCase(run, seed, errors, config)
         for seed in range(first_seed, first_seed + seeds)

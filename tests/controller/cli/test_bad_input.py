@@ -240,6 +240,7 @@ ROWS = [
     ("gait policy learn -o new.txt", "new.txt: a policy's file ends in .toml"),
     ("gait policy learn -o /nosuch/a.toml", "/nosuch: no such folder"),
     ("trials policy nosuch --seeds 1", "nosuch: no such policy"),
+    ("trials rehearse flat-square nosuch", "nosuch: no such run; shipped are"),
     ("view .", "a folder; a run's log is log.mcap"),
     ("view empty", "is not an MCAP log"),
     ("view empty --view-at 127.0.0.1:99999", "expected HOST or HOST:PORT, e.g. 127.0.0.1:8080"),

@@ -60,7 +60,9 @@ def test_only_expected_hosts_pass_even_with_the_token(
     gate = Gate(served)
     for name in names:
         assert ask(gate, host=name, **kept(gate)) == 200, name
-    for name in [*others, "", "evil.example", "127.0.0.1.evil.example", "[", "a b", "@127.0.0.1"]:
+    raw = "\xff\xfe"
+    wrong = [raw, "", "evil.example", "127.0.0.1.evil.example", "[", "a b", "@127.0.0.1"]
+    for name in [*others, *wrong]:
         assert ask(gate, host=name, **kept(gate)) == 403, name
     assert ask(gate, **kept(gate)) == 403
     twice = Headers([("Host", names[0]), ("Host", "evil.example"), *kept(gate).items()])
