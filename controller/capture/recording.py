@@ -10,7 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import StatesConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.shape.states import energy_kept, to_angles, to_states
-from snakewalk.controller.track.readers.keypoints import ALL, Choice
+from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.slowing import joint_demand, slowing
 from snakewalk.controller.track.track import Track
@@ -96,8 +96,6 @@ def examine(
     name_or_path: str,
     robot_name: str = "yaw16",
     world_name: str = "flat",
-    rate_hz: float | None = None,
-    least_score: float | None = None,
     choice: Choice = ALL,
 ) -> ExaminedRecording:
     """Load a recording and measure it for a robot on a ground.
@@ -108,7 +106,7 @@ def examine(
     """
     robot = load_robot(robot_name)
     friction = load_world(world_name).friction
-    track = load_track(name_or_path, rate_hz, least_score, choice)
+    track = load_track(name_or_path, choice=choice)
     states = StatesConfig()
     wave = measure_wave(track)
     shapes = to_angles(to_states(track.angles_rad))

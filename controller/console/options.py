@@ -201,31 +201,9 @@ TrackFile = Annotated[
     ),
 ]
 
-Rate = Annotated[
-    float | None,
-    typer.Option(help="frame rate in frames per second; default: the rate that the files state"),
-]
-MinScore = Annotated[
-    float | None,
-    typer.Option(help="ignore keypoints with a lower score; default: 0, for DeepLabCut 0.6"),
-]
 FilmRate = Annotated[
     float | None,
     typer.Option(help="frame rate in frames per second; default: the rate that the film states"),
-]
-Individual = Annotated[
-    str | None, typer.Option(help="name of the animal to use from a file of several animals")
-]
-Keypoints = Annotated[
-    str | None,
-    typer.Option(help="A,B,C: names along the midline, head first; default: all, as listed"),
-]
-Plane = Annotated[
-    str | None, typer.Option(help="plane of markers in space: xy (default), xz or yz")
-]
-TimeUnit = Annotated[
-    str | None,
-    typer.Option(help="unit of times if a table states none: s, ms, us or ns"),
 ]
 Set = Annotated[
     list[str] | None,

@@ -5,7 +5,7 @@
 PLUGINS = (
     ("command", "log export", "Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D.", "snakewalk.controller.exchange.commands.export:export"),
     ("command", "robot export", "Write a robot as URDF or MuJoCo model with the same masses and kinematics.", "snakewalk.controller.exchange.commands.robot_export:export_robot"),
-    ("command", "robot import", "Make a robot's file from a URDF or MuJoCo model; report dropped and changed parts.", "snakewalk.controller.exchange.commands.robot_import:import_robot"),
+    ("command", "robot import", "Make a robot's file from a URDF, SDF or MuJoCo model; report dropped and changed parts.", "snakewalk.controller.exchange.commands.robot_import:import_robot"),
     ("command", "robot show", "Show a robot: its links, and servo, sign, zero and limit of each joint.", "snakewalk.controller.exchange.commands.robot_show:show_robot"),
     ("joints", "csv", "A CSV with the columns time and one for each joint.", "snakewalk.controller.exchange.joint_motions.joint_table:JointTable"),
     ("joints", "lerobot", "An episode of a LeRobot dataset.", "snakewalk.controller.exchange.joint_motions.lerobot:LeRobotEpisode"),

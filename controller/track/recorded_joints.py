@@ -11,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.motion.parted_recording import gaps
-from snakewalk.controller.track.readers.keypoints import Choice
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.slowing import CUT_CYCLES
 from snakewalk.controller.track.wave import measure_wave

@@ -11,11 +11,7 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Force,
-    Individual,
     Json,
-    MinScore,
-    Plane,
-    Rate,
     show,
 )
 from snakewalk.controller.console.result_files import (
@@ -23,7 +19,7 @@ from snakewalk.controller.console.result_files import (
     refuse_to_overwrite,
     write_result,
 )
-from snakewalk.controller.track.readers.keypoints import choice_of
+from snakewalk.controller.track.choice import AnimalChoice, Choice
 from snakewalk.controller.track.readers.load import load_keypoints
 
 
@@ -66,15 +62,13 @@ def stride(
             autocompletion=completion.words(*VIEWS),
         ),
     ] = "above",
-    rate: Rate = None,
-    min_score: MinScore = None,
-    individual: Individual = None,
-    plane: Plane = None,
     picture: Annotated[
         Path | None, typer.Option(help="draw the fit of each foot here (.png, .svg, .pdf)")
     ] = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: AnimalChoice,
 ) -> None:
     """Measure one cycle of a tracked animal with legs ([KP] 4.2.2): contacts, phases, bends."""
     names = Names.of(spine, girdles, feet)
@@ -82,9 +76,7 @@ def stride(
     refuse_to_overwrite(written, force)
     if picture is not None:
         check_picture(picture)
-    keypoints_of_film = load_keypoints(
-        keypoints, rate, min_score, choice_of(individual, None, plane)
-    )
+    keypoints_of_film = load_keypoints(keypoints, choice=Choice(**choice.model_dump()))
     measured = measure_animal(keypoints_of_film, names, animal, output.stem, length_m, view)
     write_result(output, measured.text())
     if picture is not None:

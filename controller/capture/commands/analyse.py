@@ -12,21 +12,14 @@ from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Force,
-    Individual,
     Json,
-    Keypoints,
-    MinScore,
-    Plane,
-    Rate,
-    TimeUnit,
     console,
 )
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.track.analysis import analyse as measure
-from snakewalk.controller.track.readers.generated import EMBEDDED
-from snakewalk.controller.track.readers.keypoints import ALL, choice_of
-from snakewalk.controller.track.readers.load import check_rate, load_track
+from snakewalk.controller.track.choice import Choice
+from snakewalk.controller.track.readers.load import load_track
 
 
 @command(
@@ -42,12 +35,6 @@ def analyse(
             autocompletion=completion.RECORDINGS,
         ),
     ],
-    rate: Rate = None,
-    min_score: MinScore = None,
-    individual: Individual = None,
-    keypoints: Keypoints = None,
-    plane: Plane = None,
-    time_unit: TimeUnit = None,
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -56,18 +43,15 @@ def analyse(
     ] = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: Choice,
 ) -> None:
     """Analyse the animal's motion: pulse speed, sliding, wave, frequency, amplitudes, energy."""
-    check_rate(rate, recordings)
-    choice = choice_of(individual, keypoints, plane, time_unit)
     files = _pictures(recordings, picture, force)
     analyses = []
     pairs = list(zip(recordings, files, strict=True))
     for name, file in show_progress(pairs, "recordings", len(pairs)):
-        shipped = name in EMBEDDED
-        analysis = measure(
-            load_track(name, *(None, None, ALL) if shipped else (rate, min_score, choice))
-        )
+        analysis = measure(load_track(name, choice=choice))
         if file is not None:
             from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415  --picture: an extra
 

@@ -15,13 +15,7 @@ from snakewalk.controller.console.options import (
     Force,
     GivenRobot,
     GivenWorld,
-    Individual,
     Json,
-    Keypoints,
-    MinScore,
-    Plane,
-    Rate,
-    TimeUnit,
     console,
 )
 
@@ -33,9 +27,8 @@ from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
 )
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.generated import EMBEDDED
-from snakewalk.controller.track.readers.keypoints import ALL, choice_of
-from snakewalk.controller.track.readers.load import check_rate
 from snakewalk.controller.track.readers.writers import SUFFIXES, write_track
 from snakewalk.controller.track.track import UNSURE_HEAD
 
@@ -56,12 +49,6 @@ def track(
     ] = None,
     robot: GivenRobot = DEFAULT_ROBOT,
     world: GivenWorld = DEFAULT_WORLD,
-    rate: Rate = None,
-    min_score: MinScore = None,
-    individual: Individual = None,
-    keypoints: Keypoints = None,
-    plane: Plane = None,
-    time_unit: TimeUnit = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -73,6 +60,8 @@ def track(
     ] = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: Choice,
 ) -> None:
     """Examine recordings: wave, bends, states this robot can use, slowing for its servos."""
     check_picture(picture)
@@ -82,14 +71,12 @@ def track(
         raise InputError(f"{output}: a track is written as one of {', '.join(SUFFIXES)}")
     if output is not None and len(names) > 1:
         raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
-    check_rate(rate, names)
-    choice = choice_of(individual, keypoints, plane, time_unit)
     tracked = [
         examine(
             name,
             robot,
             world,
-            *(None, None, ALL) if name in EMBEDDED else (rate, min_score, choice),
+            choice=choice,
         )
         for name in show_progress(names, "recordings", len(names))
     ]

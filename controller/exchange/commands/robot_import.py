@@ -22,7 +22,7 @@ from snakewalk.controller.exchange.robot_import import robot_import
     results=("out",),
 )
 def import_robot(
-    file: Annotated[Path, typer.Argument(help="URDF, xacro or MuJoCo model (.xml)")],
+    file: Annotated[Path, typer.Argument(help="URDF, xacro, SDF or MuJoCo model (.xml)")],
     out: Annotated[Path, typer.Option("--out", "-o", help="write the robot's file here (.toml)")],
     servo: Annotated[
         str, typer.Option(help="model of all servos; such files do not contain it")
@@ -35,7 +35,7 @@ def import_robot(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a robot's file from a URDF or MuJoCo model; report dropped and changed parts."""
+    """Make a robot's file from a URDF, SDF or MuJoCo model; report dropped and changed parts."""
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
     if not 1e-3 <= scale <= 1e3:

@@ -18,6 +18,7 @@ from snakewalk.controller.exchange.robot_import.model_source import (
     parse,
     with_places,
 )
+from snakewalk.controller.exchange.robot_import.sdf_source import urdf_of_sdf
 from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 
 _MOST_MEMORY_BYTES = 2_000_000_000
@@ -52,7 +53,7 @@ xacro.main()
 
 
 def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelSource]:
-    """Compile a URDF, a xacro or a MuJoCo model.
+    """Compile a URDF, a xacro, an SDF or a MuJoCo model.
 
     Raises:
         InputError: it cannot be read.
@@ -66,9 +67,12 @@ def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelS
         root, _ = parse(path, name="expanded xacro", text=_expanded(path))
         notes.append("xacro was run with its default arguments; lines are those of its output")
     check_parts(path, root)
+    if root.tag == "sdf":
+        root, lines = urdf_of_sdf(root, path)
+        notes += lines
     if root.tag not in ("robot", "mujoco"):
         raise InputError(
-            f"{path}: begins with <{root.tag}>, not with <mujoco> (MJCF) or <robot> (URDF)"
+            f"{path}: begins with <{root.tag}>, not with <mujoco> (MJCF), <robot> (URDF) or <sdf>"
         )
     if root.tag == "mujoco":
         source = prepare_mjcf(root, path, assumed)

@@ -81,7 +81,7 @@ def import_robot(
     """Read a robot; its joints get the IDs 1, 2, 3 ... from the head.
 
     Args:
-        path: ``.xml`` (MJCF), ``.urdf`` or ``.xacro``.
+        path: ``.xml`` (MJCF), ``.urdf``, ``.xacro`` or ``.sdf``.
         name: of the robot.
         servo_model: of all joints; a model knows no servos.
         scale: lengths are multiplied by it, masses by its third power.

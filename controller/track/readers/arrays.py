@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.resample import body_points
@@ -63,16 +64,16 @@ def save_track(path: Path, track: Track) -> None:
     )
 
 
-def load_npz(file: Path, rate_hz: float | None, least_score: float | None = None) -> Track:
+def load_npz(file: Path, choice: Choice) -> Track:
     """Load an .npz with ``track_from_arrays``; see ``load.load_file``."""
     try:
         arrays, others = read_arrays(file, ARRAYS)
     except (ValueError, OSError) as error:
         raise InputError(f"{file}: is not an .npz of plain arrays: {error}") from None
-    return track_from_arrays(file, arrays, rate_hz, least_score, others)
+    return track_from_arrays(file, arrays, choice, others)
 
 
-def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Track:
+def load_mat(file: Path, choice: Choice) -> Track:
     """Load a MATLAB file up to version 7 with ``track_from_arrays``; 7.3 is HDF5."""
     size = file.stat().st_size
     check_expansion(file, size, _unpacked_mat(read_bytes(file)))
@@ -89,7 +90,7 @@ def load_mat(file: Path, rate_hz: float | None, least_score: float | None) -> Tr
     arrays = {
         name: np.asarray(data) for name, data in mat_arrays.items() if not name.startswith("__")
     }
-    return track_from_arrays(file, arrays, rate_hz, least_score)
+    return track_from_arrays(file, arrays, choice)
 
 
 def _unpacked_mat(data: bytes) -> int:
@@ -125,8 +126,7 @@ def _unpacked(packed: memoryview) -> int:
 def track_from_arrays(
     file: Path,
     arrays: dict[str, NDArray[np.generic]],
-    rate_hz: float | None,
-    least_score: float | None = None,
+    choice: Choice,
     others: Sequence[str] = (),
 ) -> Track:
     """Make a track from named arrays of an .npz or .mat.
@@ -136,8 +136,8 @@ def track_from_arrays(
     body's length. ``rate_hz``, or ``time_s`` or ``t`` in seconds, state the times. ``score`` (T, P)
     is the tracker's confidence. ``skeletons`` are pixels, rows downwards.
     """
-    time_s = None if rate_hz is not None else _times(file, arrays)
-    given = rate_hz
+    time_s = None if choice.rate is not None else _times(file, arrays)
+    given = choice.rate
     if given is None and "rate_hz" in arrays:
         given = _scalar(file, "rate_hz", arrays["rate_hz"])
     if given is None and time_s is not None:
@@ -148,11 +148,11 @@ def track_from_arrays(
         points = _bodies(file, arrays, length_m if np.isfinite(length_m) else 1.0)
         track = track_from_points(
             _text(arrays, "name", file.stem),
-            _without_unsure(file, points, arrays, least_score),
+            _without_unsure(file, points, arrays, choice.min_score),
             given,
             scale_m=1.0 if np.isfinite(length_m) else None,
             time_s=time_s if time_s is not None and len(time_s) == len(points) else None,
-            rate_assumed=rate_hz is None and _flag(arrays, "rate_assumed", default=False),
+            rate_assumed=choice.rate is None and _flag(arrays, "rate_assumed", default=False),
             status=_status(arrays, len(points)),
         )
         sure = _scalar(file, "head_sure", arrays.get("head_sure", np.array(np.nan)))
@@ -168,7 +168,7 @@ def track_from_arrays(
         points = _floats(file, "skeletons", arrays["skeletons"])
         if points.ndim == 3:
             points = points * [1.0, -1.0]
-        points = _without_unsure(file, points, arrays, least_score)
+        points = _without_unsure(file, points, arrays, choice.min_score)
         rate = SKELETON_RATE_HZ if given is None else given
         return track_from_points(file.stem, points, rate, rate_assumed=given is None)
     names = ", ".join(sorted([*arrays, *others])[:12]) or "none"
@@ -234,7 +234,7 @@ def _without_unsure(
     return np.where((score < least_score)[..., None], np.nan, points)
 
 
-def load_npy(file: Path, rate_hz: float | None) -> Track:
+def load_npy(file: Path, choice: Choice) -> Track:
     """Load joint angles (T, J), rad, column 0 next to the head; see ``load.load_file``.
 
     Positive angles bend the head side to the left. The file has no places: in every frame the head
@@ -251,8 +251,8 @@ def load_npy(file: Path, rate_hz: float | None) -> Track:
         )
     link_rad = np.concatenate([np.zeros((len(joints), 1)), -np.cumsum(joints, axis=1)], axis=1)
     points = body_points(link_rad - link_rad.mean(axis=1, keepdims=True))
-    rate = JOINT_RATE_HZ if rate_hz is None else rate_hz
-    return track_from_points(file.stem, points, rate, rate_assumed=rate_hz is None)
+    rate = choice.rate or JOINT_RATE_HZ
+    return track_from_points(file.stem, points, rate, rate_assumed=choice.rate is None)
 
 
 def _floats(file: Path, what: str, values: NDArray[np.generic]) -> Floats:

@@ -6,16 +6,18 @@ time, and a row of channel values per frame. y is up. The unit of length is not 
 has no scale.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.archive import read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.choice import Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.markers import number_or_none, projected
 
 _MOST_JOINTS: Final = 1000
@@ -37,7 +39,7 @@ class _Joint:
     channels: list[str] = field(default_factory=list)
 
 
-def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+def load_bvh(file: Path, choice: Choice) -> Keypoints:
     """Load the joints as keypoints; see ``load.load_file``."""
     try:
         words = read_text(file).split()
@@ -60,17 +62,9 @@ def load_bvh(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
         )
     kept = longest if choice.keypoints is None else list(range(len(joints)))
     notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")
-    rate = rate_hz if rate_hz is not None else 1.0 / step_s
     names = [joints[k].name for k in kept]
-    keypoints = projected(file, names, places[:, kept] + 1e-12, 1.0, rate, choice)
-    return Keypoints(
-        file,
-        keypoints.nodes,
-        keypoints.places,
-        None,
-        rate_hz=rate,
-        notes=(*notes, *keypoints.notes),
-    )
+    keypoints = projected(file, names, places[:, kept] + 1e-12, 1.0, 1.0 / step_s, choice)
+    return replace(keypoints, scale_m=None, notes=(*notes, *keypoints.notes))
 
 
 def _skeleton(file: Path, words: list[str]) -> list[_Joint]:
@@ -157,11 +151,13 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
         shift = np.tile(joint.offset, (frames, 1))
         moved = np.zeros((frames, 3))
         for channel in joint.channels:
-            axis = _AXES.index(channel[0])
             if channel.endswith("POSITION"):
-                moved[:, axis] = values[:, column]
+                moved[:, _AXES.index(channel[0])] = values[:, column]
             else:
-                turn = turn @ _about(axis, np.radians(values[:, column]))
+                angles = values[:, column, None]
+                turn = (
+                    turn @ Rotation.from_euler(channel[0].lower(), angles, degrees=True).as_matrix()
+                )
             column += 1
         if joint.parent < 0:
             turns[k], places[:, k] = turn, shift + moved
@@ -171,16 +167,6 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
             offset = (above @ (shift + moved)[:, :, None])[:, :, 0]
             places[:, k] = places[:, joint.parent] + offset
     return places
-
-
-def _about(axis: int, angle: Floats) -> Floats:
-    turn = np.zeros((len(angle), 3, 3))
-    next_axis = (axis + 1) % 3
-    two = (axis + 2) % 3
-    turn[:, axis, axis] = 1.0
-    turn[:, next_axis, next_axis] = turn[:, two, two] = np.cos(angle)
-    turn[:, two, next_axis], turn[:, next_axis, two] = np.sin(angle), -np.sin(angle)
-    return turn
 
 
 def _longest(joints: list[_Joint]) -> list[int]:

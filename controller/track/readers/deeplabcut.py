@@ -17,7 +17,8 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import numbers_of
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.choice import Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.track import frame_numbers
 
 PCUTOFF = 0.6
@@ -37,8 +38,6 @@ def is_deeplabcut(rows: list[list[str]]) -> bool:
 def load_rows(
     file: Path,
     rows: list[list[str]],
-    rate_hz: float | None,
-    least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
     """Load the rows of a CSV; see ``load.load_file``."""
@@ -58,7 +57,7 @@ def load_rows(
     lines = range(depth + 1, len(rows) + 1)
     values = numbers_of(file, [row[first:] for row in rows[depth:]], names, lines)
     frame = _frames(file, [row[first - 1] for row in rows[depth:]])
-    return _track(file, columns, values, frame, rate_hz, least_score, choice)
+    return _track(file, columns, values, frame, choice)
 
 
 def _frames(file: Path, names: list[str]) -> Ints | None:
@@ -79,9 +78,7 @@ def _frames(file: Path, names: list[str]) -> Ints | None:
     return frame_numbers(str(file), np.array(numbers))
 
 
-def load_group(
-    file: Path, group: Any, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Keypoints:
+def load_group(file: Path, group: Any, choice: Choice) -> Keypoints:
     """Load the open HDF5 group that holds ``table``; see ``load.load_file``."""
     table = group["table"]
     blocks = [name for name in table.dtype.names or () if name.startswith("values_block_")]
@@ -92,7 +89,7 @@ def load_group(
     columns = _columns(file, group.attrs.get("non_index_axes"), values.shape[1])
     numbers = rows["index"] if "index" in (table.dtype.names or ()) else None
     frame = None if numbers is None or numbers.dtype.kind not in "iu" else numbers.astype(np.int64)
-    return _track(file, columns, values, frame, rate_hz, least_score, choice)
+    return _track(file, columns, values, frame, choice)
 
 
 class _OnlyPlain(pickle.Unpickler):
@@ -124,8 +121,6 @@ def _track(
     columns: list[Column],
     values: Floats,
     frame: Ints | None,
-    rate_hz: float | None,
-    least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
     index_by_column = {column: k for k, column in enumerate(columns)}
@@ -160,7 +155,6 @@ def _track(
         parts,
         pixels * [1.0, -1.0],
         scores,
-        rate_hz=rate_hz,
-        least_score=default if least_score is None else least_score,
+        least_score=default,
         frame=frame,
     )

@@ -8,17 +8,16 @@ from numpy.typing import NDArray
 
 from snakewalk.config.archive import check_expansion
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.arrays import track_from_arrays
 from snakewalk.controller.track.readers.deeplabcut import load_group
 from snakewalk.controller.track.readers.formats import KNOWN
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.sleap import load_analysis, load_project
 from snakewalk.controller.track.track import Track
 
 
-def load_hdf5(
-    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Track | Keypoints:
+def load_hdf5(file: Path, choice: Choice) -> Track | Keypoints:
     """Load any of these kinds; see ``load.load_file``."""
     try:
         with h5py.File(file, "r") as h5_file:
@@ -29,12 +28,12 @@ def load_hdf5(
             h5_file.visititems(lambda _, data: sizes.append(getattr(data, "nbytes", 0)))
             check_expansion(file, file.stat().st_size, sum(sizes))
             if "tracks" in h5_file and "track_occupancy" in h5_file:
-                return load_analysis(file, h5_file, rate_hz, least_score, choice)
+                return load_analysis(file, h5_file, choice)
             if "metadata" in h5_file and "instances" in h5_file:
-                return load_project(file, h5_file, rate_hz, least_score, choice)
+                return load_project(file, h5_file, choice)
             tables = [g for g in h5_file.values() if _holds_table(g)]
             if tables:
-                return load_group(file, tables[0], rate_hz, least_score, choice)
+                return load_group(file, tables[0], choice)
             if any(isinstance(g, h5py.Group) and "block0_values" in g for g in h5_file.values()):
                 raise InputError(f"{file}: contains hand labels; use DeepLabCut's CSV of them")
             arrays = {
@@ -48,7 +47,7 @@ def load_hdf5(
     if not arrays:
         raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
     choice.only(file, "a MATLAB file")
-    return track_from_arrays(file, arrays, rate_hz, least_score)
+    return track_from_arrays(file, arrays, choice)
 
 
 def _linked_file(name: str, link: object) -> str | None:

@@ -13,110 +13,16 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.motion.joint_motion import TIME_UNITS
+from snakewalk.controller.track.choice import FEWEST, Choice
 from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import Track, track_from_points
 
 KEYPOINT_RATE_HZ = 30.0
 """Default where a file of keypoints holds no frame rate."""
-PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-"""Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
 _MISSING = 0.25  # share of the keypoints, at least one, that may be missing in a frame
-FEWEST = 4  # points for a curve
 _ZIGZAG = 1.5  # above it the order cannot be a body's
 _TURN_ON = 0.5  # of the last turn (of 0, 0.5 and 1 the best on a recorded fish)
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Choices that a file may need: options of the same names."""
-
-    individual: str | None = None
-    keypoints: tuple[str, ...] | None = None
-    """Names along the midline, head first; None: all, in the order of the file."""
-    plane: str | None = None
-    """Plane of markers in space, one of ``PLANES``; None is xy."""
-    time_unit: str | None = None
-    """Unit of times that a table does not state."""
-
-    def only(self, file: Path, kind: str, *allowed: str) -> None:
-        """Reject options that do not apply to a kind of file.
-
-        Raises:
-            InputError: an option that is not ``allowed`` is given.
-
-        """
-        refusals = {"individual": "names no animals", "keypoints": "names no keypoints"}
-        refusals |= {"plane": "is flat already", "time_unit": "needs no unit of time"}
-        for name, reason in refusals.items():
-            if getattr(self, name) is not None and name not in allowed:
-                option = name.replace("_", "-")
-                raise InputError(f"{file}: --{option}: {kind} {reason}; leave it out")
-
-    def animal(self, file: Path, names: Sequence[str], present: Sequence[str]) -> str:
-        """Name of the selected animal; ``present`` are those of ``names`` with any point.
-
-        Raises:
-            InputError: the name is unknown, or there are several animals and no choice.
-
-        """
-        listed = ", ".join(names)
-        if self.individual is not None:
-            if self.individual in names:
-                return self.individual
-            raise InputError(
-                f"{file}: --individual {self.individual}: no such animal; in it are {listed}"
-            )
-        if len(present) > 1:
-            raise InputError(
-                f"{file}: {len(present)} animals in it ({', '.join(present)}): "
-                "say --individual NAME"
-            )
-        if not present:
-            raise InputError(f"{file}: 0 animals in it: no point of {listed or 'any'} was seen")
-        return present[0]
-
-    def order(self, file: Path, nodes: Sequence[str]) -> list[int]:
-        """Indices of the keypoints along the midline.
-
-        Raises:
-            InputError: a name is unknown or repeated, or there are too few.
-
-        """
-        if self.keypoints is None:
-            return list(range(len(nodes)))
-        unknown = [name for name in self.keypoints if name not in nodes]
-        if unknown:
-            raise InputError(
-                f"{file}: --keypoints: it has no {', '.join(unknown)}; it has {', '.join(nodes)}"
-            )
-        if len(set(self.keypoints)) < len(self.keypoints) or len(self.keypoints) < FEWEST:
-            raise InputError(
-                f"{file}: --keypoints: expected {FEWEST} or more names along the midline, head "
-                f"first, each once; it has {', '.join(nodes)}"
-            )
-        return [list(nodes).index(name) for name in self.keypoints]
-
-
-ALL = Choice()
-"""Choice of nothing: one animal, all of its keypoints."""
-
-
-def choice_of(
-    individual: str | None, keypoints: str | None, plane: str | None, time_unit: str | None = None
-) -> Choice:
-    """Make a choice from command line values; ``keypoints`` is A,B,C.
-
-    Raises:
-        InputError: the plane or the unit is unknown.
-
-    """
-    for option, value, allowed in (("plane", plane, PLANES), ("time-unit", time_unit, TIME_UNITS)):
-        if value is not None and value not in allowed:
-            raise InputError(f"--{option} {value}: expected one of {', '.join(allowed)}")
-    names = None if keypoints is None else tuple(part.strip() for part in keypoints.split(","))
-    return Choice(individual, names, plane, time_unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +37,7 @@ class Keypoints:
     """(T, K, 2) to the right and upwards; NaN where nothing was seen."""
     scores: Floats | None
     """(T, K) how sure the tracker was, 0..1; None where the file holds no scores."""
-    rate_hz: float | None
+    rate_hz: float | None = None
     """Frames a second; None where the file does not say."""
     least_score: float = 0.0
     """Score below which a keypoint counts as missing."""

@@ -1,20 +1,21 @@
 """The entry for recordings: a shipped name, a file of figures, or a file of bodies."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from snakewalk.config.archive import read_head, read_text
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.config.loader import load
+from snakewalk.config.loader import load, with_keys
 from snakewalk.config.recording import RecordingConfig
+from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
 from snakewalk.controller.track.readers.bvh import load_bvh
 from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, Format, format_of
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
-from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.marker_tables import load_trc
 from snakewalk.controller.track.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.track.readers.tables import load_csv
@@ -22,25 +23,9 @@ from snakewalk.controller.track.readers.wcon import load_wcon, zipped_text
 from snakewalk.controller.track.track import Track
 
 
-def check_rate(rate_hz: float | None, names: Sequence[str]) -> None:
-    """Check an option ``--rate`` for the files among ``names``.
-
-    Raises:
-        InputError: the rate is invalid, or no name is a file.
-
-    """
-    if rate_hz is None:
-        return
-    if not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        raise InputError(f"--rate {rate_hz:g}: must be a positive number of frames a second")
-    if all(name in EMBEDDED for name in names):
-        raise InputError(f"--rate {rate_hz:g}: {names[0]} says its own rate; give one for files")
-
-
 def load_track(
     name_or_path: str,
     rate_hz: float | None = None,
-    least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Track:
     """Load a shipped recording by name, or a file by path.
@@ -49,8 +34,7 @@ def load_track(
         name_or_path: a name of ``EMBEDDED``, figures in a ``.toml`` (``RecordingConfig``), or a
             file in a format of ``formats.KNOWN``.
         rate_hz: frames per second of a file; replaces its own or its format's rate.
-        least_score: keypoints with a lower score count as missing.
-        choice: animal, keypoints and plane of a file.
+        choice: other facts, and parts of the file.
 
     Raises:
         InputError: neither name nor file, an unknown format, or a fault inside it.
@@ -58,14 +42,14 @@ def load_track(
     """
     path = Path(name_or_path)
     is_track_file = name_or_path in EMBEDDED or path.suffix == ".toml"
-    if is_track_file and rate_hz is not None:
-        raise InputError(f"{name_or_path}: its figures hold the frame rate; give one for files")
-    if is_track_file and least_score:
-        raise InputError(
-            f"{name_or_path}: is made from figures and has no scores; give one for files"
-        )
+    choice = _with(path, rate_hz, choice)
     if is_track_file:
         choice.only(path, "a shipped recording")
+        if choice.rate or choice.min_score:
+            raise InputError(
+                f"{name_or_path}: its figures hold the frame rate, and no scores; give --rate and "
+                "--min-score for files"
+            )
     if name_or_path in EMBEDDED:
         return embedded(name_or_path)
     if not path.exists():
@@ -75,13 +59,12 @@ def load_track(
         )
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))
-    return load_file(path, rate_hz, least_score, choice)
+    return load_file(path, choice=choice)
 
 
 def load_file(
     path: str | Path,
     rate_hz: float | None = None,
-    least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Track:
     """Load a recording from a file, whose content decides its format.
@@ -89,21 +72,20 @@ def load_file(
     Args:
         path: of the file.
         rate_hz: frames per second; replaces the file's or its format's rate.
-        least_score: keypoints with a lower score count as missing; default 0, for DeepLabCut 0.6.
-        choice: animal, keypoints and plane.
+        choice: other facts, and parts of the file.
 
     Raises:
         InputError: no such file, an unknown format, or a fault inside it.
 
     """
-    loaded = _loaded(Path(path), rate_hz, least_score, choice)
+    choice = _with(path, rate_hz, choice)
+    loaded = _loaded(Path(path), choice)
     return loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
 
 
 def load_keypoints(
     path: str | Path,
     rate_hz: float | None = None,
-    least_score: float | None = None,
     choice: Choice = ALL,
 ) -> Keypoints:
     """Load all keypoints of one animal, including those off its midline; see ``load_file``.
@@ -112,7 +94,8 @@ def load_keypoints(
         InputError: as ``load_file``, or the file holds midlines.
 
     """
-    loaded = _loaded(Path(path), rate_hz, least_score, choice)
+    choice = _with(path, rate_hz, choice)
+    loaded = _loaded(Path(path), choice)
     if not isinstance(loaded, Keypoints):
         raise InputError(
             f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
@@ -121,40 +104,45 @@ def load_keypoints(
     return loaded
 
 
-def _loaded(
-    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Track | Keypoints:
-    _check_options(file, rate_hz, least_score)
+def _loaded(file: Path, choice: Choice) -> Track | Keypoints:
+    loaded = _read(file, choice)
+    if isinstance(loaded, Track):
+        return loaded
+    least_score = loaded.least_score if choice.min_score is None else choice.min_score
+    return replace(loaded, rate_hz=choice.rate or loaded.rate_hz, least_score=least_score)
+
+
+def _read(file: Path, choice: Choice) -> Track | Keypoints:
     kind = _format(file)
     if kind in _MARKERS:
-        return _MARKERS[kind](file, rate_hz, choice)
+        return _MARKERS[kind](file, choice)
     match kind:
         case "zip":
             text = zipped_text(file)
             if text is not None:
-                return load_wcon(file, text, rate_hz, choice)
+                return load_wcon(file, text, choice)
             choice.only(file, "an .npz")
-            return load_npz(file, rate_hz, least_score)
+            return load_npz(file, choice)
         case "npy":
             choice.only(file, "an .npy")
-            return load_npy(file, rate_hz)
+            return load_npy(file, choice)
         case "hdf5":
             require_extra(f"{file}: HDF5 needs", "h5py")
             from snakewalk.controller.track.readers.hdf5 import load_hdf5  # noqa: PLC0415  an extra
 
-            return load_hdf5(file, rate_hz, least_score, choice)
+            return load_hdf5(file, choice)
         case "mat":
             choice.only(file, "a MATLAB file")
-            return load_mat(file, rate_hz, least_score)
+            return load_mat(file, choice)
         case "json":
-            return load_wcon(file, _json(file), rate_hz, choice)
+            return load_wcon(file, _json(file), choice)
         case "csv":
-            return load_csv(file, rate_hz, least_score, choice)
+            return load_csv(file, choice)
     reason = "is empty" if kind == "empty" else "is no recording"
     raise InputError(f"{file}: {reason}; known: {KNOWN}")
 
 
-_MARKERS: Final[dict[str, Callable[[Path, float | None, Choice], Track | Keypoints]]] = {
+_MARKERS: Final[dict[str, Callable[[Path, Choice], Track | Keypoints]]] = {
     "qtm": load_qtm,
     "bvh": load_bvh,
     "trc": load_trc,
@@ -163,11 +151,8 @@ _MARKERS: Final[dict[str, Callable[[Path, float | None, Choice], Track | Keypoin
 """Readers of motion capture."""
 
 
-def _check_options(file: Path, rate_hz: float | None, least_score: float | None) -> None:
-    if rate_hz is not None and not 0.0 < rate_hz < float("inf"):
-        raise InputError(f"{file}: the frame rate must be above 0 Hz, not {rate_hz}")
-    if least_score is not None and not 0.0 <= least_score <= 1.0:
-        raise InputError(f"{file}: the least score must be from 0 to 1, not {least_score}")
+def _with(path: str | Path, rate_hz: float | None, choice: Choice) -> Choice:
+    return choice if rate_hz is None else with_keys(choice, {"rate": rate_hz}, str(path))
 
 
 def _format(file: Path) -> Format:

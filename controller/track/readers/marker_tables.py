@@ -14,7 +14,8 @@ import numpy as np
 from snakewalk.config.arrays import Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import read_rows
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.choice import Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.markers import (
     UNITS,
     marker_places,
@@ -37,9 +38,7 @@ def is_vicon(rows: list[list[str]]) -> bool:
     return any(row and row[0].strip() == VICON_HEAD for row in rows)
 
 
-def load_vicon(
-    file: Path, rows: list[list[str]], rate_hz: float | None, choice: Choice
-) -> Keypoints:
+def load_vicon(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
     """Load Vicon's CSV; see ``load.load_file``."""
     begin = next(k for k, row in enumerate(rows) if row and row[0].strip() == VICON_HEAD)
     block = [(k + 1, row) for k, row in enumerate(rows)][begin + 1 :]
@@ -68,10 +67,10 @@ def load_vicon(
     frame = _frames(file, data)
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=block[4][0])
     scale_m = UNITS[units.pop()]
-    return projected(file, names, places, scale_m, rate_hz or stated, choice, frame)
+    return projected(file, names, places, scale_m, stated, choice, frame)
 
 
-def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+def load_trc(file: Path, choice: Choice) -> Keypoints:
     """Load a TRC; see ``load.load_file``."""
     rows = read_rows(file, "TRC", "\t")
     if len(rows) < 6:
@@ -92,9 +91,9 @@ def load_trc(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
     frame = _frames(file, data)
     first = data[0][0]
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
-    if not stated and rate_hz is None:
+    if not stated and choice.rate is None:
         raise InputError(f"{file}: states no DataRate; say --rate with frames a second")
-    keypoints = projected(file, names, places, UNITS[unit], rate_hz or stated, choice, frame)
+    keypoints = projected(file, names, places, UNITS[unit], stated, choice, frame)
     _check_count(file, "NumFrames", about, len(data))
     return keypoints
 

@@ -16,7 +16,8 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.config.text_table import numbers_of, read_rows
-from snakewalk.controller.track.readers.keypoints import FEWEST, PLANES, Choice, Keypoints
+from snakewalk.controller.track.choice import FEWEST, PLANES, Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _UNLABELLED = re.compile(
@@ -37,7 +38,7 @@ def is_qtm(head: bytes) -> bool:
     return head.removeprefix(b"\xef\xbb\xbf").split(b"\t", 1)[0].decode("latin-1") in _FIRST_WORDS
 
 
-def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+def load_qtm(file: Path, choice: Choice) -> Keypoints:
     """Load QTM's TSV; see ``load.load_file``."""
     lines = [row for row in read_rows(file, "TSV", "\t") if any(row)]
     about: dict[str, list[str]] = {}
@@ -57,11 +58,10 @@ def load_qtm(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
         file, [row[before:] for row in lines], len(names), first_line=len(about) + 1 + bool(before)
     )
     stated = number_or_none((about.get("FREQUENCY") or [""])[0])
-    rate = stated if rate_hz is None else rate_hz
-    return projected(file, names, places, 1e-3, rate, choice)
+    return projected(file, names, places, 1e-3, stated, choice)
 
 
-def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
+def load_c3d(file: Path, choice: Choice) -> Keypoints:
     """Load a C3D; see ``load.load_file``."""
     require_extra(f"{file}: C3D needs", "ezc3d")
     import ezc3d  # noqa: PLC0415  an extra
@@ -77,9 +77,7 @@ def load_c3d(file: Path, rate_hz: float | None, choice: Choice) -> Keypoints:
         raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
     if unit not in UNITS:
         raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
-    return projected(
-        file, names[: places.shape[1]], places, UNITS[unit], rate_hz or stated or None, choice
-    )
+    return projected(file, names[: places.shape[1]], places, UNITS[unit], stated or None, choice)
 
 
 def marker_places(
@@ -111,9 +109,6 @@ def projected(
 
     Without chosen keypoints, unlabelled and static markers are left out, and named in the notes.
     """
-    plane = choice.plane or "xy"
-    if plane not in PLANES:
-        raise InputError(f"{file}: --plane {plane}: expected one of {', '.join(PLANES)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
     notes: list[str] = []
     if choice.keypoints is None:
@@ -128,7 +123,7 @@ def projected(
     return Keypoints(
         file,
         names,
-        places[..., list(PLANES[plane])],
+        places[..., list(PLANES[choice.plane or "xy"])],
         None,
         rate_hz=rate_hz,
         frame=frame,

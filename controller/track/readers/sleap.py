@@ -7,7 +7,7 @@ each other, and names as JSON. Pixel rows count downwards.
 """
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.choice import Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.track import MOST_FRAMES, frame_numbers
 
 _DOWNWARDS = np.array([1.0, -1.0])
@@ -24,25 +25,13 @@ _PREDICTED = 1
 _NO_TRACK = "no track"
 
 
-class SleapRows(NamedTuple):
-    """T rows of a table."""
-
-    whose: list[str]
-    """Track name of each."""
-    frame: Floats
-    """(T,) frame numbers."""
-    xy: Floats
-    """(T, K, 2) pixels."""
-    scores: Floats | None
-    """(T, K) scores of the keypoints."""
-
-
 def load_table(
     file: Path,
     nodes: list[str],
-    rows: SleapRows,
-    rate_hz: float | None,
-    least_score: float | None,
+    whose: list[str],
+    frame: Floats,
+    xy: Floats,
+    scores: Floats | None,
     choice: Choice,
 ) -> Keypoints:
     """Load the CSV's columns.
@@ -50,13 +39,13 @@ def load_table(
     Args:
         file: for faults and the name.
         nodes: names of the K keypoints.
-        rows: the rows.
-        rate_hz: frames per second.
-        least_score: keypoints below it are missing.
+        whose: track name of each of T rows.
+        frame: (T,) frame numbers.
+        xy: (T, K, 2) pixels.
+        scores: (T, K) scores of the keypoints.
         choice: animal and order of the midline.
 
     """
-    whose, frame, xy, scores = rows
     if not np.isfinite(frame).all():
         raise InputError(f"{file}: frame_idx must be given in every row")
     names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
@@ -70,8 +59,6 @@ def load_table(
         nodes,
         xy[order] * _DOWNWARDS,
         None if scores is None else scores[order],
-        rate_hz=rate_hz,
-        least_score=0.0 if least_score is None else least_score,
         frame=frame_numbers(str(file), frame[order]),
     )
 
@@ -91,8 +78,6 @@ def _one_a_frame(file: Path, frame: Floats, scores: Floats | None) -> Ints:
 def load_analysis(
     file: Path,
     h5_file: Any,
-    rate_hz: float | None,
-    least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
     """Load the open analysis HDF5 ``h5_file``; see ``load.load_file``."""
@@ -123,8 +108,7 @@ def load_analysis(
         nodes or [f"node_{k}" for k in range(tracks.shape[2])],
         tracks[animal_index].transpose(2, 1, 0) * _DOWNWARDS,
         scores,
-        rate_hz=_stated_rate(h5_file) if rate_hz is None else rate_hz,
-        least_score=0.0 if least_score is None else least_score,
+        rate_hz=_stated_rate(h5_file),
     )
 
 
@@ -153,8 +137,6 @@ def _stated(h5_file: Any, name: str) -> Any:
 def load_project(
     file: Path,
     h5_file: Any,
-    rate_hz: float | None,
-    least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
     """Load the open project ``h5_file`` (.slp); see ``load.load_file``."""
@@ -217,8 +199,7 @@ def load_project(
         nodes,
         places * _DOWNWARDS,
         scores,
-        rate_hz=stated if rate_hz is None else rate_hz,
-        least_score=0.0 if least_score is None else least_score,
+        rate_hz=stated,
     )
 
 

@@ -9,12 +9,13 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.motion.joint_motion import second
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
-from snakewalk.controller.track.readers.keypoints import Choice, Keypoints
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.marker_tables import is_vicon, load_vicon
-from snakewalk.controller.track.readers.sleap import SleapRows, load_table
+from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
 _MIDLINE: dict[tuple[str, str], float | None] = {
@@ -27,35 +28,33 @@ _WIDE = {"x_m": 1.0, "x_px": None, "x_lengths": None}
 unit."""
 
 
-def load_csv(
-    file: Path, rate_hz: float | None, least_score: float | None, choice: Choice
-) -> Track | Keypoints:
+def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
     """Load any of these kinds of CSV; see ``load.load_file``."""
     every = read_rows(file, f"recording (known: {KNOWN})")
     if is_vicon(every):
-        return load_vicon(file, every, rate_hz, choice)
+        return load_vicon(file, every, choice)
     rows = [row for row in every if row]
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
     if is_deeplabcut(rows):
-        return load_rows(file, rows, rate_hz, least_score, choice)
+        return load_rows(file, rows, choice)
     column = {name.strip(): index for index, name in enumerate(rows[0])}
     for pair, scale_m in _MIDLINE.items():
         if {"t", "frame", "point", *pair} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
             table = _numbers(file, rows, columns)
-            track = _midline(file, table, scale_m, rate_hz, choice, _status_of(rows, column))
+            track = _midline(file, table, scale_m, choice, _status_of(rows, column))
             return _about(file, track, rows, column)
     for name, scale_m in _WIDE.items():
         if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
             table = _long(file, rows, column, name.removeprefix("x_"))
-            track = _midline(file, table, scale_m, rate_hz, choice, _status_of(rows, column))
+            track = _midline(file, table, scale_m, choice, _status_of(rows, column))
             return _about(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
-        return _sleap(file, rows, column, keypoints, rate_hz, least_score, choice)
+        return _sleap(file, rows, column, keypoints, choice)
     raise InputError(
         f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), "
         "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
@@ -120,7 +119,6 @@ def _midline(
     file: Path,
     table: Floats,
     scale_m: float | None,
-    rate_hz: float | None,
     choice: Choice,
     status: dict[float, FrameStatus],
 ) -> Track:
@@ -142,6 +140,7 @@ def _midline(
         )
     points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
     time_s = None
+    rate_hz = choice.rate
     if rate_hz is None:
         if len(frames) < 2:
             raise InputError(f"{file}: holds 1 frame; a motion needs at least 2")
@@ -171,8 +170,6 @@ def _sleap(
     rows: list[list[str]],
     column: dict[str, int],
     keypoints: list[str],
-    rate_hz: float | None,
-    least_score: float | None,
     choice: Choice,
 ) -> Keypoints:
     """Keypoints in pixels, from one row per animal and frame, in the table's order."""
@@ -185,11 +182,4 @@ def _sleap(
     if "track" in column:
         tracks_column = column["track"]
         whose = [row[tracks_column].strip() if tracks_column < len(row) else "" for row in rows[1:]]
-    return load_table(
-        file,
-        keypoints,
-        SleapRows(whose, table[:, 0], xy, scores),
-        rate_hz,
-        least_score,
-        choice,
-    )
+    return load_table(file, keypoints, whose, table[:, 0], xy, scores, choice)

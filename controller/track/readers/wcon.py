@@ -17,8 +17,8 @@ import numpy as np
 from snakewalk.config.archive import DAMAGE, check_members, parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import statuses_named
-from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.resample import equal_arc_length
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
@@ -26,7 +26,7 @@ _OWN = "@snakewalk"
 """Key of a record with facts for which WCON has no name."""
 
 
-def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> Track:
+def load_wcon(file: Path, text: str, choice: Choice) -> Track:
     """Load the text of a WCON file; see ``load.load_file``."""
     try:
         document = parse_json(text)
@@ -56,10 +56,10 @@ def load_wcon(file: Path, text: str, rate_hz: float | None, choice: Choice) -> T
     track = track_from_points(
         file.stem,
         _alike([points for _, points in bodies]),
-        1.0 / step if rate_hz is None else rate_hz,
+        choice.rate or 1.0 / step,
         scale_m=None if metres["x"] is None else 1.0,
         frame=frame,
-        time_s=time if rate_hz is None else None,
+        time_s=time if choice.rate is None else None,
         status=statuses_named([word for _, word in sorted(words)])
         if len(words) == len(time)
         else (),

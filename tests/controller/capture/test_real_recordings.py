@@ -6,6 +6,7 @@ import pytest
 
 from snakewalk.controller.capture.recording import ExaminedRecording, examine
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.track.choice import Choice
 
 LAMPREY = "lamprey/lampreydata.csv"
 FISH = "prickleback/XMUC02_Trial1_sleap-1.csv"
@@ -18,7 +19,7 @@ WORM = "worm-images/skeletons.npz"
 def seen(shared_data: Path) -> dict[str, ExaminedRecording]:
     rates = {LAMPREY: None, FISH: 60.0, OMEGA: None, DELTA: None, WORM: None}
     return {
-        name: examine(str(shared_data / name), rate_hz=rate)
+        name: examine(str(shared_data / name), choice=Choice(rate=rate))
         for name, rate in rates.items()
         if (shared_data / name).is_file()
     }

@@ -26,8 +26,8 @@ from snakewalk.controller.capture.several.recording import AnimalsFacts, capture
 from snakewalk.controller.capture.several.tracklets import Tracklet, TrackletBuilder
 from snakewalk.controller.images.body_detector import BodyDetector, Detection, make_detector
 from snakewalk.controller.images.silhouette import Polarity
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
-from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_file
 from tests.oracles.rendered_crossings import CrossingScene, crossing_film, crossing_midlines
 from tests.oracles.skeleton_accuracy import point_error

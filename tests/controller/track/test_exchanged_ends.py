@@ -7,8 +7,9 @@ import pytest
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.choice import ALL
 from snakewalk.controller.track.exchanged_ends import with_ends_in_place
-from snakewalk.controller.track.readers.keypoints import ALL, Keypoints
+from snakewalk.controller.track.readers.keypoints import Keypoints
 
 FRAMES = 400
 RATE_HZ = 50.0

@@ -9,8 +9,8 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
-from snakewalk.controller.track.readers.keypoints import Choice
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.resample import body_points
 from snakewalk.controller.track.track import track_from_points

@@ -20,7 +20,7 @@ from snakewalk.controller.animals.legged.animal_synthesis import (
 from snakewalk.controller.animals.legged.stride import measure_stride
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.kinds.walk_run import WalkRun
-from snakewalk.controller.track.readers.keypoints import choice_of
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.load import load_keypoints
 from tests.helpers.command import snakewalk
 from tests.helpers.tiers import slow_after
@@ -196,7 +196,7 @@ def test_files_as_trackers_write_them_give_the_stride(
         held.extract(name, tmp_path)
     lizard = read_animal("lizard")
     rate_hz = None if name.endswith(("slp", "is.h5", "rd.h5")) else 16 / lizard.cycle_s
-    keypoints = load_keypoints(tmp_path / name, rate_hz, choice=choice_of(individual, None, None))
+    keypoints = load_keypoints(tmp_path / name, rate_hz, choice=Choice(individual=individual))
     names = Names.of("nose,neck,mid,hip,tail,tip", "neck,hip", "FL,FR,HL,HR")
     mine = measure_animal(keypoints, names, "lizard", "mine", None, "above")
     assert not mine.rate_assumed

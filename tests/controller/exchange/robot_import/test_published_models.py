@@ -7,7 +7,6 @@ import sys
 import tomllib
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -29,20 +28,6 @@ from tests.helpers.foreign_robots import (
 )
 
 COMPILE = model_compiler.compile_model
-
-
-@pytest.fixture(autouse=True)
-def compile_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a process of its own, which imports MuJoCo again for half a second."""
-
-    def compile_(source: Path, made: Path) -> str | None:
-        try:
-            mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(str(source)), str(made), None)
-        except ValueError as error:
-            return str(error)
-        return None
-
-    monkeypatch.setattr(model_compiler, "compile_model", compile_)
 
 
 def imported(tmp_path: Path, text: str, suffix: str = ".urdf", *assumed: str) -> ImportedRobot:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.track.readers.keypoints import Choice
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.load import load_file
 from snakewalk.controller.track.readers.markers import is_unlabelled
 from snakewalk.controller.track.track import Track

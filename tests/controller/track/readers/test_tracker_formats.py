@@ -8,10 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from scipy.io import savemat
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.track.readers.keypoints import ALL, Choice, Keypoints
+from snakewalk.controller.track.choice import ALL, Choice
+from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.load import load_file
 from snakewalk.controller.track.readers.wcon import si_value
 from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
@@ -107,10 +109,10 @@ def test_what_a_tracker_was_not_sure_of_is_missing(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "s.h5", scores=sure)
     for name, usual in (("a.csv", 1), ("a.h5", 1), ("s.h5", 0)):
         for least, bridged in ((None, usual), (0.0, 0), (0.8, 3)):
-            track = load_file(tmp_path / name, RATE_HZ, least)
+            track = load_file(tmp_path / name, RATE_HZ, Choice(min_score=least))
             assert (track.dropped, track.bridged) == (0, bridged)
         with pytest.raises(InputError, match=r"scores less than 0.95.*lower the least score"):
-            load_file(tmp_path / name, RATE_HZ, 0.95)
+            load_file(tmp_path / name, RATE_HZ, Choice(min_score=0.95))
 
 
 def test_one_frame_is_told_as_such_and_not_as_a_low_score(tmp_path: Path) -> None:
@@ -300,9 +302,9 @@ def test_faults_of_deeplabcut_and_scores_are_one_line(tmp_path: Path) -> None:
         load_file(tmp_path / "bad.csv")
     (tmp_path / "pair.csv").write_text("frame_idx,a.x,a.y\n0,1,1\n1,2,2\n")
     with pytest.raises(InputError, match="holds no scores"):
-        load_file(tmp_path / "pair.csv", None, 0.5)
-    with pytest.raises(InputError, match="from 0 to 1"):
-        load_file(tmp_path / "pair.csv", None, 7.0)
+        load_file(tmp_path / "pair.csv", choice=Choice(min_score=0.5))
+    with pytest.raises(ValidationError, match="less than or equal to 1"):
+        Choice(min_score=7.0)
 
 
 @pytest.mark.parametrize(
