@@ -133,7 +133,6 @@ def probe_with(
                 data = port.read_until(reply_bytes, sent_s + _LATEST_S)
                 if data:  # the others may be as late
                     wait_s = _LATEST_S
-                    deadline_s = sent_s + wait_s
             if not data:
                 break
             for reply in reader.feed(data):

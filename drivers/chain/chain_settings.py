@@ -15,6 +15,9 @@ from snakewalk.drivers.protocol.registers import (
     WATCHDOG,
 )
 
+JOINT_NUMBER = "Velocity I Gain"
+"""Register that stores the joint number: in RAM, unused by position control, reset by a change of
+mode."""
 STARTUP = "Startup Configuration"
 """Name of a register that firmware before 45 lacks."""
 FEETECH_SETTINGS = ("Lock", "Secondary ID", "Acceleration", "Goal Velocity", "Kp", "Kd", "Ki")
@@ -113,6 +116,11 @@ def limitations(robot: RobotConfig) -> list[str]:
         "stall current"
         for facts in robot.records_by_model.values()
         if not facts.measures_current
+    ]
+    lines += [
+        f"{model}: cannot store a joint number: exchanged IDs are not detected; check them by hand"
+        for model, facts in robot.records_by_model.items()
+        if JOINT_NUMBER not in facts.registers
     ]
     return [*lines, *missing_watchdogs(robot)]
 

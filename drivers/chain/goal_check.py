@@ -22,8 +22,6 @@ of this run (ours). A line that loses 5 % of its packets loses four writes once 
 SEEN_READS, WATCHED_READS = 3, 256
 """Reads with a goal that was never sent that end a run though the goals between them are right, and
 the reads among which they count (ours). A program that writes rarely is seen in some reads only."""
-_SECOND_MASTER = "another program writes goals (a second master)"
-_LOST_TO_ALL = "no servo has the newest goals: the line or the adapter loses what is written"
 MOST_LATE = 8
 """Number of goals that a servo or an adapter holds back at most (ours). A goal that was replaced
 earlier does not come back by itself."""
@@ -163,9 +161,9 @@ class GoalCheck:
         """Difference of the first of ``joints``, and its cause."""
         first = self._differences[joints[0]]
         if first.is_foreign:
-            cause = _SECOND_MASTER
+            cause = "another program writes goals (a second master)"
         elif first.is_constant and 1 < len(self._differences) == len(self._labels):
-            cause = _LOST_TO_ALL
+            cause = "no servo has the newest goals: the line or the adapter loses what is written"
         elif first.is_constant and (first.count > 1 or first.lag > MOST_LATE):
             cause = "it ignores sync writes"
         elif first.count == 1:

@@ -1,7 +1,7 @@
 """Recheck after an interruption: whether chain and pose are the same."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,9 @@ from snakewalk.drivers.errors import ChainFault, FaultCause
 
 MOVED_RAD = 0.3
 """A joint found farther from its last position was bent, or has lost its turn count (ours)."""
+
+KEPT_RAD = 0.1
+"""Largest motion of a joint that lost its torque which still confirms its servo (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +38,16 @@ class Recheck:
     unidentified: tuple[str, ...] = ()
     """Ports on which every servo has lost its torque or its settings."""
 
+    unproven: tuple[str, ...] = ()
+    """Names of joints of other ports whose servos nothing confirms."""
+
     @property
     def doubt(self) -> str | None:
         """Reason why only a person can confirm the same robot; None if its servos confirm it."""
         if not self.unidentified:
-            return None
+            joints = ", ".join(self.unproven)
+            reason = "lost torque and settings; neither angle nor EEPROM shows whose servo this is"
+            return f"{joints}: {reason}" if joints else None
         return (
             f"{', '.join(self.unidentified)}: every servo has lost its torque or its settings: "
             "their supply was off, or this is another robot with the same IDs"
@@ -82,16 +90,15 @@ def recheck(
         here_rad[joint] = units.position_rad(joint, servo.registers["Present Position"])
     moved = here_rad - believed_rad
     faults: list[ChainFault] = []
+    reset = []
+    forgotten = []
     servo_by_id = {s.servo_id: s for s in before.servos} if before is not None else {}
     for joint, servo in enumerate(now.servos):
+        name = robot.joint_label(joint)
         old = servo_by_id.get(servo.servo_id, servo)
         if servo.firmware != old.firmware:
-            text = (
-                f"{robot.joint_label(joint)}: firmware {servo.firmware}, was {old.firmware}: "
-                "another servo?"
-            )
+            text = f"{name}: firmware {servo.firmware}, was {old.firmware}: another servo?"
             faults.append(ChainFault(FaultCause.OTHER_FIRMWARE, text))
-        name = robot.joint_label(joint)
         turns = round(moved[joint] / math.tau) if np.isfinite(moved[joint]) else 0
         if turns:
             text = f"{name}: off by {turns:+d} turns: its turn count is lost"
@@ -105,15 +112,16 @@ def recheck(
             ChainFault(FaultCause.OTHER_SETTINGS, line)
             for line in fingerprint_faults(robot, joint, before_it, servo.registers, unit_rad)
         ]
-    reset = []
-    for joint, servo in enumerate(now.servos):
         values = configured.get(joint, {})
         registers = {register: servo.registers[register] for register in values}
-        other = identity_fault(robot, joint, registers[IDENTITY]) if IDENTITY in registers else None
+        number = registers.get(IDENTITY, 0)
+        other = identity_fault(robot, joint, number)
         if other is not None:
-            faults.append(ChainFault(FaultCause.EXCHANGED, f"{robot.joint_label(joint)}: {other}"))
+            faults.append(ChainFault(FaultCause.EXCHANGED, f"{name}: {other}"))
         if not servo.torque_on or registers != values:
             reset.append(joint)
+            if number != values.get(IDENTITY):
+                forgotten.append(joint)
     lost = {robot.servo_ids[joint] for joint in reset}
     unidentified = tuple(
         part.port.name
@@ -121,4 +129,25 @@ def recheck(
         if lost.issuperset(i for i in robot.servo_ids if bus.port_of(i) is part.port)
     )
     names = tuple(map(robot.joint_label, reset))
-    return Recheck(tuple(faults), tuple(reset), names, moved, here_rad, unidentified)
+    doubted = _unproven(forgotten, moved, believed_rad, fingerprints)
+    unproven = tuple(map(robot.joint_label, doubted))
+    return Recheck(tuple(faults), tuple(reset), names, moved, here_rad, unidentified, unproven)
+
+
+def _unproven(
+    joints: Sequence[int],
+    moved_rad: Floats,
+    believed_rad: Floats,
+    fingerprints: Mapping[int, Fingerprint],
+) -> list[int]:
+    """Joints that moved, or have a twin of the same settings at about the same angle."""
+
+    def are_alike(joint: int, twin: int) -> bool:
+        is_near = abs(believed_rad[twin] - believed_rad[joint]) <= 2.0 * KEPT_RAD
+        return is_near and fingerprints.get(twin) == fingerprints.get(joint)
+
+    return [
+        joint
+        for joint in joints
+        if not abs(moved_rad[joint]) <= KEPT_RAD or sum(are_alike(joint, j) for j in joints) > 1
+    ]

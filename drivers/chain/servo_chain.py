@@ -480,10 +480,10 @@ class ServoChain:
     def _check_pause(self) -> None:
         pause_s = self._clock.now_s() - self._sent_at_s
         if self._armed and pause_s > self._watchdog_s:
-            effect = "no bus watchdog has stopped the servos"
-            if self._watchdogs:
-                effect = f"the bus watchdog ({self._watchdog_s:g} s) has stopped the servos"
-            raise BusError(f"{pause_s:.2f} s without a packet: this program did not run; {effect}")
+            raise BusError(
+                f"{pause_s:.2f} s without a packet: this program did not run; the bus watchdog "
+                f"({self._watchdog_s:g} s) has stopped the servos that have one"
+            )
 
     def explain(self, joint: int) -> str | None:
         """Read a joint's servo again; return the cause in its registers or its goal, or None."""

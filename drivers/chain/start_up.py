@@ -18,6 +18,7 @@ from snakewalk.drivers.bus.chain_bus import ChainBus
 from snakewalk.drivers.bus.dynamixel_bus import PingReply
 from snakewalk.drivers.chain.chain_settings import (
     FEETECH_SETTINGS,
+    JOINT_NUMBER,
     STARTUP,
     ChainSetting,
     chain_settings,
@@ -56,9 +57,7 @@ SHAPING_SETTINGS = (
     "Profile Velocity",
 )
 """Settings that another program would change, and a reboot would not."""
-IDENTITY = "Velocity I Gain"
-"""Register that stores the joint number: in RAM, unused by position control, reset by a change of
-mode."""
+IDENTITY = JOINT_NUMBER
 _REPORTED = (
     "Firmware Version",
     "Hardware Error Status",

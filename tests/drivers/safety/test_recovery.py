@@ -348,11 +348,41 @@ def test_a_supply_that_was_off_for_all_servos_is_asked_about(rig: Rig) -> None:
         rig.cycles(20)
 
 
-def test_one_servo_that_keeps_its_torque_shows_that_it_is_the_same_robot(rig: Rig) -> None:
-    for servo in range(3):
+def test_servos_whose_settings_and_angles_differ_are_gone_on_with(rig: Rig) -> None:
+    for servo in range(2):  # a yaw and a pitch joint have other limits in their EEPROM
         rig.line.firmware.reboot(servo)
     rig.cycles(20)
     assert rig.link.recoveries == 1
+
+
+def test_two_alike_servos_at_one_angle_may_be_exchanged(rig: Rig) -> None:
+    """They came back with exchanged IDs, and the chain was verified as the same servos."""
+    rig.line.firmware.reboot(0)
+    rig.line.firmware.reboot(2)
+    with pytest.raises(SafetyTrippedError, match=r"yaw_01 .*, joint yaw_03 .*neither angle nor"):
+        rig.cycles(20)
+    assert rig.link.recoveries == 0
+
+
+@pytest.mark.parametrize(
+    ("servos", "apart_rad", "moved_rad", "unproven"),
+    [
+        ((0,), 0.0, 0.02, ()),
+        ((0,), 0.0, 0.26, ("joint yaw_01 (ID 1)",)),  # a horn that was put back elsewhere
+        ((0, 2), 0.5, 0.02, ()),
+        ((0, 2), 0.15, 0.02, ("joint yaw_01 (ID 1)", "joint yaw_03 (ID 3)")),
+    ],
+)
+def test_each_joint_that_lost_its_number_needs_another_witness(
+    rig: Rig, servos: tuple[int, ...], apart_rad: float, moved_rad: float, unproven: tuple[str, ...]
+) -> None:
+    for servo in servos:
+        rig.line.firmware.reboot(servo)
+    rig.line.firmware.plant.position_rad[2] += apart_rad
+    believed_rad = rig.position
+    believed_rad[0] -= moved_rad
+    checked = rig.chain.recheck(believed_rad)
+    assert (checked.faults, checked.unproven, checked.doubt is None) == ((), unproven, not unproven)
 
 
 def test_a_stop_button_ends_the_waiting(rig: Rig) -> None:
