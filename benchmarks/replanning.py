@@ -77,7 +77,7 @@ def _walk(job: str, seed: int) -> tuple[list[float], list[float], list[int]]:
 @contextmanager
 def _forced_misses() -> Iterator[None]:
     """Let every path fail as soon as it may; each second time as if the body stood still."""
-    failing, stalled, count = Course._failing, Course._is_stalled, 0
+    failing, stalled, count = Course._failing, Course._body_is_stalled, 0
 
     def fails(course: Course, centre_m: object) -> str:
         nonlocal count
@@ -85,8 +85,8 @@ def _forced_misses() -> Iterator[None]:
         return "forced"
 
     Course._failing = fails  # type: ignore[method-assign, assignment]
-    Course._is_stalled = property(lambda course: count % 2 == 0)  # type: ignore[method-assign, assignment]
+    Course._body_is_stalled = property(lambda course: count % 2 == 0)  # type: ignore[method-assign, assignment]
     try:
         yield
     finally:
-        Course._failing, Course._is_stalled = failing, stalled  # type: ignore[method-assign]
+        Course._failing, Course._body_is_stalled = failing, stalled  # type: ignore[method-assign]

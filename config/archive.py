@@ -35,7 +35,7 @@ MOST_JSON_BYTES: Final = 64_000_000
 """Largest size of a JSON file that is read at once (ours)."""
 MOST_STORAGE_BYTES: Final = 1_000_000
 """Largest size of a calibration file (ours)."""
-_MOST_NESTED, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
+_DEEPEST_NESTING, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
 _NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
 _ENDS: Final = ("]", "}", "</", "/>")
 _SIDES: Final = re.compile(r"\b(?:rows|cols|sizes)\b[\"'>:\[\s]{1,20}([\d,\s]+)")
@@ -146,7 +146,7 @@ def check_matrices(file: Path) -> None:
     for mark in _NESTING.findall(text):
         depth += -1 if mark in _ENDS else 1
         deepest = max(deepest, depth)
-    if deepest > _MOST_NESTED:
+    if deepest > _DEEPEST_NESTING:
         raise InputError(
             f"{file}: is not a calibration file: its values are nested {deepest} "
             "deep; choose another file"

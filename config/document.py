@@ -116,7 +116,7 @@ def reference() -> str:
         parts += _tables(title, model)
     kinds: tuple[Kind, ...] = ("runs", "robots", "worlds")
     for kind in kinds:
-        parts += _shipped(kind)
+        parts += _shipped_names(kind)
     return "\n".join(parts)
 
 
@@ -138,7 +138,7 @@ def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, An
     return schema | head
 
 
-def _shipped(kind: Kind) -> list[str]:
+def _shipped_names(kind: Kind) -> list[str]:
     lines = [f"## Shipped {kind}", "", "| name | |", "|---|---|"]
     return [*lines, *(f"| `{name}` | {_comment(kind, name)} |" for name in shipped(kind)), ""]
 

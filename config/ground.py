@@ -39,11 +39,11 @@ def build_ground(world: WorldConfig) -> HeightField | None:
         case FlatGround() | WaterGround():
             return None
         case MapGround() as ground:
-            return _mapped(world.name, ground)
+            return _heights_from_map(world.name, ground)
         case ShoreGround() as ground:
             return _shore(ground)
         case ElevationGround() as ground:
-            z = _cropped(world.name, ground)
+            z = _cropped_map(world.name, ground)
             spacing_m = ground.spacing_m / ground.refine
         case RampGround() as ground:
             z = _ramp(ground)
@@ -76,7 +76,7 @@ def water_surface_m(world: WorldConfig, ground: HeightField | None) -> tuple[Flo
     return np.array([west_m + 0.5 * long_m, 0.0, water.depth_m]), np.array([long_m, wide_m])
 
 
-def _mapped(world: str, ground: MapGround) -> HeightField:
+def _heights_from_map(world: str, ground: MapGround) -> HeightField:
     try:
         field = read_map(Path(ground.source))
     except InputError as error:
@@ -148,7 +148,7 @@ def _drawn_out(profile_m: Floats, width_m: float, spacing_m: float) -> Floats:
     return np.tile(profile_m, (_cells(width_m, spacing_m) + 1, 1))
 
 
-def _cropped(world: str, ground: ElevationGround) -> Floats:
+def _cropped_map(world: str, ground: ElevationGround) -> Floats:
     """Crop, scale and refine a real elevation model.
 
     The crop counts rows from the north, like stored elevation models; here y grows to the north.
@@ -172,7 +172,7 @@ def _cropped(world: str, ground: ElevationGround) -> Floats:
     ]
     if not np.isfinite(crop).all():
         raise ConfigError(f"world {world}: ground: the crop of {ground.source} has gaps")
-    return _refined(crop[::-1] * ground.vertical_scale, ground.refine)
+    return _finer_heights(crop[::-1] * ground.vertical_scale, ground.refine)
 
 
 def _elevation_m(world: str, source: str) -> Floats:
@@ -208,7 +208,7 @@ def _jacksboro(where: str) -> Path:
     return folder / "jacksboro_fault_dem.npz"
 
 
-def _refined(z: Floats, refine: int) -> Floats:
+def _finer_heights(z: Floats, refine: int) -> Floats:
     if refine == 1:
         return z
     rows, columns = np.arange(z.shape[0]), np.arange(z.shape[1])

@@ -197,7 +197,7 @@ def load_gait(name_or_path: str) -> GaitSetConfig:
 
 def known_keys() -> list[str]:
     """Dotted keys of a run, a robot and a world, after the name of their file."""
-    keys = [key for name, model in _files().items() for key in _dotted(name, model)]
+    keys = [key for name, model in _files().items() for key in _dotted_keys(name, model)]
     return list(dict.fromkeys(keys))
 
 
@@ -237,12 +237,12 @@ def _files() -> dict[str, type[BaseModel]]:
     return {"run": schemas.run, "robot": schemas.robot, "world": schemas.world}
 
 
-def _dotted(path: str, kind: Any) -> Iterator[str]:
+def _dotted_keys(path: str, kind: Any) -> Iterator[str]:
     """Dotted keys of a table and of its single-valued tables, after ``path``."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         for name, field in kind.model_fields.items():
-            below = list(_dotted(f"{path}.{name}", field.annotation))
+            below = list(_dotted_keys(f"{path}.{name}", field.annotation))
             yield from below or [f"{path}.{name}"]
     elif get_origin(kind) not in {list, tuple, dict}:
         for part in get_args(kind):
-            yield from _dotted(path, part)
+            yield from _dotted_keys(path, part)

@@ -33,7 +33,7 @@ class RecordingConfig(Strict):
     )
 
     @model_validator(mode="after")
-    def _long_enough(self) -> "RecordingConfig":
+    def _check_length(self) -> "RecordingConfig":
         if self.rate_hz < 4.0 * self.frequency_hz:
             raise ValueError("rate_hz must be at least 4 frames a cycle")
         return self

@@ -51,7 +51,7 @@ def servo_model(name_or_path: str, folder: Path | None = None) -> ServoModel:
             f"{name_or_path}: no such servo model; {similar}describe another one in a file: "
             "docs/how-to/add-a-servo-model.md"
         )
-    return _shipped(path.stem) if path.parent == FOLDER else _read(path)
+    return _shipped_model(path.stem) if path.parent == FOLDER else _read(path)
 
 
 def model_file(name_or_path: str, start_folder: Path | None = None) -> Path | None:
@@ -107,7 +107,7 @@ def _shipped_by_number(protocol: int | str) -> Mapping[int, str]:
 
 
 @cache
-def _shipped(name: str) -> ServoModel:
+def _shipped_model(name: str) -> ServoModel:
     data, text = _shipped_data(name)
     return checked(ServoModel, data, str(FOLDER / f"{name}.toml"), text)
 
@@ -116,15 +116,15 @@ def _shipped(name: str) -> ServoModel:
 def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
     path = FOLDER / f"{name}.toml"
     data, text = read_toml(path)
-    return _merged(path, data, 1), text
+    return _merged_with_like(path, data, 1), text
 
 
 def _read(path: Path) -> ServoModel:
     data, text = read_toml(path)
-    return checked(ServoModel, _merged(path, data, 1), str(path), text)
+    return checked(ServoModel, _merged_with_like(path, data, 1), str(path), text)
 
 
-def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
+def _merged_with_like(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
     """Data of a file over those of the model in ``like``.
 
     Raises:
@@ -147,7 +147,9 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
         raise ConfigError(f"{path}: like: more than {_MOST_FILES} files that are each like another")
     shipped = other.parent == FOLDER
     base = (
-        _shipped_data(other.stem)[0] if shipped else _merged(other, read_toml(other)[0], depth + 1)
+        _shipped_data(other.stem)[0]
+        if shipped
+        else _merged_with_like(other, read_toml(other)[0], depth + 1)
     )
     base = dict(base)
     registers = dict(base.get("registers", {}))
@@ -157,14 +159,14 @@ def _merged(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:
     base["registers"] = {name: row for name, row in registers.items() if name not in without}
     for key in ("source", "friction"):  # they belong to the other model
         base.pop(key, None)
-    return _over(base, table)
+    return _with_changes(base, table)
 
 
-def _over(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def _with_changes(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Values of ``changes`` over those of ``base``, table by table."""
     merged = dict(base)
     for key, value in changes.items():
         below = merged.get(key)
         is_table = isinstance(value, dict) and isinstance(below, dict)
-        merged[key] = _over(dict(below or {}), value) if is_table else value
+        merged[key] = _with_changes(dict(below or {}), value) if is_table else value
     return merged

@@ -60,7 +60,7 @@ def checked(
 
     """
     try:
-        plain = to_json(data, inf_nan_mode="constants", fallback=_plain)
+        plain = to_json(data, inf_nan_mode="constants", fallback=_to_python)
         return model.model_validate_json(plain, strict=True)
     except PydanticSerializationError as error:
         raise ConfigError(f"{source}: {error}") from None
@@ -74,7 +74,7 @@ def checked(
         raise ConfigError(lines) from None
 
 
-def _plain(value: Any) -> Any:
+def _to_python(value: Any) -> Any:
     """Convert numpy's numbers and arrays to Python's.
 
     Raises:
@@ -153,7 +153,7 @@ def _keys(kind: Any) -> Iterator[str]:
             yield from _keys(part)
 
 
-def _meant(model: type[BaseModel], key: str, others: Schemas) -> str:
+def _key_hint(model: type[BaseModel], key: str, others: Schemas) -> str:
     """Hint on an unknown key: a similar key, or the file that has it."""
     near = get_close_matches(key, set(_keys(model)) - {key}, 1, 0.78)
     if near:
@@ -170,6 +170,6 @@ def _line(
     number = line_number(text, loc)
     if number is not None:
         path = f"{path}:{number}"
-    hint = _meant(model, str(loc[-1]), others) if fault["type"] == "extra_forbidden" else ""
+    hint = _key_hint(model, str(loc[-1]), others) if fault["type"] == "extra_forbidden" else ""
     text_of = in_words(fault, hint) + given(fault)
     return f"{path}: {where}: {text_of}" if where else f"{path}: {text_of}"

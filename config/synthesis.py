@@ -25,7 +25,7 @@ def _knots(curve: Curve) -> Curve:
     return curve
 
 
-def _within(low: float, high: float) -> AfterValidator:
+def _range_check(low: float, high: float) -> AfterValidator:
     def check(curve: Curve) -> Curve:
         if not all(low <= value <= high for value in _values(curve)):
             raise ValueError(f"values from {low:g} to {high:g}")
@@ -34,7 +34,7 @@ def _within(low: float, high: float) -> AfterValidator:
     return AfterValidator(check)
 
 
-def _some(along: Along) -> Along:
+def _check_not_empty(along: Along) -> Along:
     if not along:
         raise ValueError("one factor or more, from head to tail")
     return along
@@ -42,8 +42,8 @@ def _some(along: Along) -> Along:
 
 Knots = AfterValidator(_knots)
 """Knots of a ``Curve``: its times must increase."""
-_Along = AfterValidator(_some)
-_Share = Annotated[Curve, Knots, _within(0.0, 1.0)]
+_NotEmpty = AfterValidator(_check_not_empty)
+_Share = Annotated[Curve, Knots, _range_check(0.0, 1.0)]
 
 
 def curve_at(curve: Curve, time_s: ArrayLike) -> Floats:
@@ -145,13 +145,13 @@ class SynthesisConfig(Strict):
     sliding: _Share = Field(
         0.0, description="share w_d of the pulse that is lost by sliding; at 1 the body glides"
     )
-    sliding_along: Annotated[Along, _Along] = Field(
+    sliding_along: Annotated[Along, _NotEmpty] = Field(
         (1.0,), description="factors on w_d from head to tail"
     )
-    pulse_m_s: Annotated[Curve, Knots, _within(-10.0, 10.0)] = Field(
+    pulse_m_s: Annotated[Curve, Knots, _range_check(-10.0, 10.0)] = Field(
         0.0, description="speed g of the pulse in addition to the body's speed"
     )
-    pulse_along: Annotated[Along, _Along] = Field(
+    pulse_along: Annotated[Along, _NotEmpty] = Field(
         (1.0,), description="factors on g from head to tail"
     )
     pulse_spread_m_s: float = Field(
@@ -168,7 +168,7 @@ class SynthesisConfig(Strict):
         0.0, description="share by which the head points along the body's heading"
     )
     calm_tail: _Share = Field(0.0, description="share by which the bends of the tail are flattened")
-    tongue_speed: Annotated[Curve, Knots, _within(0.4, 2.5)] = Field(
+    tongue_speed: Annotated[Curve, Knots, _range_check(0.4, 2.5)] = Field(
         1.0, description="speed factor b_st of the tongue's flicks"
     )
 

@@ -46,7 +46,7 @@ class TagsConfig(Strict):
     )
 
     @model_validator(mode="after")
-    def _each_once(self) -> Self:
+    def _check_repeated_tags(self) -> Self:
         ids = [tag.id for tag in self.on]
         twice = sorted({number for number in ids if ids.count(number) > 1})
         if twice:

@@ -51,7 +51,9 @@ def _table(
         if row is not None:
             inner += _rows(row, (given or {}).get(key, ()), where)
         elif choices:
-            inner += _inner(field, choices, values.get(key), (given or {}).get(key), where)
+            inner += _inner_table_lines(
+                field, choices, values.get(key), (given or {}).get(key), where
+            )
         else:
             value = values.get(key, field.default)
             is_kind = (
@@ -61,7 +63,7 @@ def _table(
     yield from inner
 
 
-def _inner(
+def _inner_table_lines(
     field: FieldInfo, choices: list[type[BaseModel]], values: Any, given: Any, where: str
 ) -> Iterator[str]:
     """A table in a table; of several kinds the present one, else the first as comments."""

@@ -15,9 +15,9 @@ from snakewalk.config.constants import GRAVITY_M_S2
 
 CORRECTION_1_S: Final = 0.5
 """Rate of the correction of the up direction (ours): an error falls to a third in two seconds."""
-_AT_REST: Final = 0.15
+_REST_TOLERANCE: Final = 0.15
 """A force that differs from gravity by a greater part says nothing of up (ours)."""
-_LONGEST_S: Final = 0.2
+_LONGEST_PAUSE_S: Final = 0.2
 """Longest pause between readings that a correction counts, s (ours)."""
 
 
@@ -52,21 +52,21 @@ class AttitudeFilter:
         ``step_s``.
         """
         size = float(np.linalg.norm(force_m_s2))
-        still = abs(size - GRAVITY_M_S2) <= _AT_REST * GRAVITY_M_S2
+        still = abs(size - GRAVITY_M_S2) <= _REST_TOLERANCE * GRAVITY_M_S2
         if self._rotation is None:
-            self._rotation = _level(force_m_s2 / size) if size > 0.0 else np.eye(3)
+            self._rotation = _level_axes(force_m_s2 / size) if size > 0.0 else np.eye(3)
             return self._rotation
         turned = self._rotation @ rotation_by(rate_rad_s * step_s)
         if still:
             up = turned[2]  # the world's up in the device's axes
             error = np.cross(force_m_s2 / size, up)
-            share = CORRECTION_1_S * min(step_s, _LONGEST_S)
+            share = CORRECTION_1_S * min(step_s, _LONGEST_PAUSE_S)
             turned = turned @ rotation_by(error * share)
         self._rotation = np.asarray(turned)
         return self._rotation
 
 
-def _level(up: Floats) -> Floats:
+def _level_axes(up: Floats) -> Floats:
     """Axes, columns, of a device with ``up`` (3,) in its own axes; its x is at heading 0."""
     ahead = np.array([1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.array([0.0, 0.0, -up[0]])
     left = np.cross(up, ahead)

@@ -59,10 +59,10 @@ def compiled(
         model = "numpy" if divides_by_zero else "python"
         options: dict[str, Any] = {"fastmath": True} if fastmath else {}
         if not makes_arrays and _can_skip_counting():
-            options |= _UNCOUNTED
+            options |= _NO_REFERENCE_COUNTS
         # numba's cache does not know the options: a forced fallback would share its files
         cached = makes_arrays or not is_forced("numba")
-        jitted: F = _jitted(
+        jitted: F = _dispatcher(
             function, signature, cached=cached, nogil=nogil, error_model=model, **options
         )
         stats = getattr(jitted, "stats", None)
@@ -75,10 +75,10 @@ def compiled(
 
 def compiled_when_called(function: F) -> F:
     """Compile a function of the physics for the types of its first call; it is cached."""
-    return _jitted(function, None, cached=True, error_model="numpy")
+    return _dispatcher(function, None, cached=True, error_model="numpy")
 
 
-def _jitted(function: F, signature: Any, *, cached: bool, **options: Any) -> F:
+def _dispatcher(function: F, signature: Any, *, cached: bool, **options: Any) -> F:
     """Return numba's dispatcher of a function, compiled if a signature is given."""
     jitted: Any = _numba().njit(**options)(function)
     if jitted is function:  # NUMBA_DISABLE_JIT=1
@@ -153,11 +153,11 @@ def _numba() -> Any:
 
 _LEAST_MEMORY_BYTES = 700 * 2**20
 """Least limit of memory: `plan` works at 780 MiB and fails at 586 (ours)."""
-_UNCOUNTED = {"_nrt": False}
+_NO_REFERENCE_COUNTS = {"_nrt": False}
 """Numba's option that leaves out the counting of references. It is private to numba."""
 
 
-def _doubled(values: Any) -> float:
+def _double(values: Any) -> float:
     total = 0.0
     behind = values[1:]
     for k in range(len(behind)):
@@ -168,13 +168,15 @@ def _doubled(values: Any) -> float:
 
 @cache
 def _can_skip_counting() -> bool:
-    """Whether numba accepts ``_UNCOUNTED`` and compiles a small loop correctly with it."""
+    """Whether numba accepts ``_NO_REFERENCE_COUNTS`` and compiles a small loop correctly."""
     numba = _numba()
     if is_forced("numba"):
         fault = "the environment asks for it"
     else:
         try:
-            loop = _jitted(_doubled, "float64(float64[::1])", cached=True, **_UNCOUNTED)
+            loop = _dispatcher(
+                _double, "float64(float64[::1])", cached=True, **_NO_REFERENCE_COUNTS
+            )
             memory = array("d", [1.0, 2.0, 3.0])
             values = np.frombuffer(memory)
             before = sys.getrefcount(memory), sys.getrefcount(values)

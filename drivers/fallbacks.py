@@ -18,7 +18,7 @@ from typing import Final, Literal
 ENVIRONMENT: Final = "SNAKEWALK_FALLBACK"
 Interface = Literal["numba", "cache", "mujoco"]
 
-_reported: dict[Interface, str] = {}
+_reported_fallbacks: dict[Interface, str] = {}
 
 
 def is_forced(name: Interface) -> bool:
@@ -28,11 +28,11 @@ def is_forced(name: Interface) -> bool:
 
 def report_fallback(name: Interface, text: str) -> None:
     """Log one warning per process that the fallback of an interface is used."""
-    if name not in _reported:
-        _reported[name] = text
+    if name not in _reported_fallbacks:
+        _reported_fallbacks[name] = text
         logging.getLogger("snakewalk").warning(text)
 
 
 def fallbacks_in_use() -> tuple[str, ...]:
     """Return the warnings so far; some precede the log handlers of a command."""
-    return tuple(_reported.values())
+    return tuple(_reported_fallbacks.values())

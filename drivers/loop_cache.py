@@ -75,7 +75,7 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
     def __init__(self, py_func: Any) -> None:
         super().__init__(py_func)
         impl = self._impl
-        stamp = (impl.locator.get_source_stamp(), tuple(sorted(_called(py_func, {py_func}))))
+        stamp = (impl.locator.get_source_stamp(), tuple(sorted(_called_code(py_func, {py_func}))))
         stored = caching.InTreeCacheLocator(py_func, impl.locator._py_file)
         self._cache_file, self._stored = (
             caching.IndexDataCacheFile(
@@ -123,7 +123,7 @@ class LoopCache(caching.FunctionCache):  # type: ignore[misc]  # numba has no ty
             self._cache_file = usual
 
 
-def _called(loop: Any, visited: set[Any]) -> Iterator[str]:
+def _called_code(loop: Any, visited: set[Any]) -> Iterator[str]:
     """Describe the numbers and the functions of other files that are compiled into a loop.
 
     numba compares only the loop's own file, and would go on with the former text of the others.
@@ -139,7 +139,7 @@ def _called(loop: Any, visited: set[Any]) -> Iterator[str]:
         visited.add(function)
         with suppress(OSError):  # in an archive
             yield f"{name}: {_file_stamp(function.__code__.co_filename)}"
-        yield from _called(function, visited)
+        yield from _called_code(function, visited)
 
 
 def _names(code: CodeType) -> Iterator[str]:

@@ -17,9 +17,9 @@ from snakewalk.drivers.protocol.registers import BAUDS
 from snakewalk.sim.plant import LinkMotion
 
 _TABLE_BYTES = 256
-_SHORTEST_S = 1e-4
+_SAMPLE_PERIOD_S = 1e-4
 """Looks that follow each other faster see the same reading (ours)."""
-_UP = np.array([0.0, 0.0, GRAVITY_M_S2])
+_REACTION_TO_GRAVITY_M_S2 = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 class Imu:
@@ -46,7 +46,7 @@ class Imu:
         self._velocity_m_s = np.zeros(3)
         self._start_s = motion().time_s
         for name, value in self._identity().items():
-            self._set(name, value)
+            self._set_register(name, value)
 
     @property
     def model_number(self) -> int:
@@ -57,14 +57,14 @@ class Imu:
         """Bytes of a read; None if no register begins at ``address``."""
         if address not in self._starts or not 0 < length <= _TABLE_BYTES - address:
             return None
-        self._look()
+        self._measure_if_due()
         return self._table[address : address + length].tobytes()
 
-    def _look(self) -> None:
+    def _measure_if_due(self) -> None:
         """Measure, unless the last measurement is recent."""
         now, last = self._motion(), self._last
         step_s = 0.0 if last is None else now.time_s - last.time_s
-        if last is not None and step_s < _SHORTEST_S:
+        if last is not None and step_s < _SAMPLE_PERIOD_S:
             return
         rotation = now.rotation @ self._in_link
         rate = np.zeros(3)
@@ -79,7 +79,10 @@ class Imu:
         self._velocity_m_s = velocity
         noise = self._random.standard_normal((2, 3))
         rate = rate + self._bias_rad_s + np.deg2rad(self.config.gyro_noise_dps) * noise[0]
-        force = rotation.T @ (acceleration + _UP) + self.config.acceleration_noise_m_s2 * noise[1]
+        force = (
+            rotation.T @ (acceleration + _REACTION_TO_GRAVITY_M_S2)
+            + self.config.acceleration_noise_m_s2 * noise[1]
+        )
         attitude = self._filter.update(rate, force, step_s)
         shown = np.frombuffer(encode(self.config, rate, force, attitude), np.uint8)
         self._table[self._public.address : self._public.address + len(shown)] = shown
@@ -89,7 +92,7 @@ class Imu:
             "Millis": int(since_s * 1e3),
             "IMU TIMESTAMP": int(since_s * 1e6),
         }.items():
-            self._set(name, value & 0xFFFF_FFFF)
+            self._set_register(name, value & 0xFFFF_FFFF)
 
     def _identity(self) -> dict[str, int]:
         return {
@@ -99,7 +102,7 @@ class Imu:
             "Baud Rate (Bus)": BAUDS.index(self.baud),
         }
 
-    def _set(self, name: str, value: int) -> None:
+    def _set_register(self, name: str, value: int) -> None:
         register = self._public.registers.get(name)
         if register is not None:
             data = np.frombuffer(register.encode(value), np.uint8)

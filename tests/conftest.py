@@ -69,9 +69,9 @@ def all_figures() -> Iterator[tuple[object, ...]]:
     """
     from snakewalk.controller.report.figures import sections
 
-    figures = sections._ALL
+    figures = sections._SECTIONS
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sections, "_ALL", figures[:1])
+        patch.setattr(sections, "_SECTIONS", figures[:1])
         yield figures
 
 
@@ -81,7 +81,7 @@ def whole_report(all_figures: tuple[object, ...]) -> Iterator[None]:
     from snakewalk.controller.report.figures import sections
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sections, "_ALL", all_figures)
+        patch.setattr(sections, "_SECTIONS", all_figures)
         yield
 
 

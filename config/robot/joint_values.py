@@ -101,36 +101,44 @@ class JointValues(LinkValues):
         stiff = self.servo.position_p_gain
         soft = self.servo.pitch_p_gain
         usual = tuple(soft if axis == "p" else stiff for axis in self.all_axes)
-        return self._own("position_p_gain", usual)
+        return self._values_of_joints("position_p_gain", usual)
 
     @property
     def position_i_gains(self) -> tuple[int, ...]:
         """Position I Gain of each servo."""
-        return self._own("position_i_gain", (self.servo.position_i_gain,) * self.joint_count)
+        return self._values_of_joints(
+            "position_i_gain", (self.servo.position_i_gain,) * self.joint_count
+        )
 
     @property
     def position_d_gains(self) -> tuple[int, ...]:
         """Position D Gain of each servo."""
-        return self._own("position_d_gain", (self.servo.position_d_gain,) * self.joint_count)
+        return self._values_of_joints(
+            "position_d_gain", (self.servo.position_d_gain,) * self.joint_count
+        )
 
     @property
     def current_limits_a(self) -> tuple[float, ...]:
         """Goal current of each joint; infinite for joints that do not lift the spine."""
         pitch_a = self.servo.pitch_current_limit_a
         usual = tuple(pitch_a if axis == "p" else math.inf for axis in self.all_axes)
-        return self._own("current_limit_a", usual)
+        return self._values_of_joints("current_limit_a", usual)
 
     @property
     def armatures_kg_m2(self) -> tuple[float, ...]:
         """Inertia of rotor and gears at each joint's shaft."""
-        return self._own("armature_kg_m2", (self.servo.armature_kg_m2,) * self.joint_count)
+        return self._values_of_joints(
+            "armature_kg_m2", (self.servo.armature_kg_m2,) * self.joint_count
+        )
 
     @property
     def gear_drags_n_m_s(self) -> tuple[float, ...]:
         """Viscous loss of the gears at each joint's shaft."""
-        return self._own("gear_drag_n_m_s", (self.servo.gear_drag_n_m_s,) * self.joint_count)
+        return self._values_of_joints(
+            "gear_drag_n_m_s", (self.servo.gear_drag_n_m_s,) * self.joint_count
+        )
 
-    def _own(self, key: str, usual: tuple[N, ...]) -> tuple[N, ...]:
+    def _values_of_joints(self, key: str, usual: tuple[N, ...]) -> tuple[N, ...]:
         """Value of a key for each joint, by default ``usual``."""
         if not self.joints:
             return usual
@@ -143,7 +151,7 @@ class JointValues(LinkValues):
         usual = default_joint_names(
             self.all_axes, [limb_joint.side for limb_joint in self.limb_joints]
         )
-        return self._own("name", usual)
+        return self._values_of_joints("name", usual)
 
     def joint_label(self, joint: int) -> str:
         """Label of a joint in messages: name, servo ID, and port of a segment."""
@@ -175,7 +183,7 @@ class JointValues(LinkValues):
             for pair in self.limbs
             for axis in 2 * pair.joint_axes
         )
-        return self._own("limit_rad", spine + tuple(legs))
+        return self._values_of_joints("limit_rad", spine + tuple(legs))
 
 
 @cache

@@ -24,7 +24,7 @@ def port_fault(port: str) -> str | None:
     )
 
 
-def _checked(port: str) -> str:
+def _checked_port(port: str) -> str:
     fault = port_fault(port)
     if fault is not None:
         raise ValueError(f"{port}: {fault}")
@@ -34,7 +34,7 @@ def _checked(port: str) -> str:
 class PortConfig(Strict):
     """One adapter, and the segment of the chain that is behind it."""
 
-    port: Annotated[str, AfterValidator(_checked)] = Field(
+    port: Annotated[str, AfterValidator(_checked_port)] = Field(
         min_length=1,
         description="a device such as /dev/ttyUSB0, a URL such as socket://host:5000, or sim: "
         "these servos are simulated, and the others are real",

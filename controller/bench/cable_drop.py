@@ -36,7 +36,7 @@ _BAD_ERRORS: Final = 3.0
 """Difference of a bad cable's drop in standard errors (ours)."""
 _LINE: Final = 5
 """Cables between two leads from which on it is asked how those share the current (ours)."""
-_LEAST_A: Final = 1e-3
+_LEAST_CABLE_CURRENT_A: Final = 1e-3
 """A smaller current does not allow an estimate of a cable."""
 
 
@@ -87,7 +87,7 @@ def estimate_cables(voltage_v: Floats, drawn_a: Floats, leads: Cabling) -> Cable
     errors_v = np.hypot(_block_error(step_v), np.hypot(*_rounding_errors(voltage_v)))
     mean_v = step_v.mean(axis=0)
     flow_a, error_a = _flow(mean_v, errors_v, drawn_a.mean(axis=0), np.isfinite(leads.lead_ohm))
-    size_a = np.maximum(np.abs(flow_a), _LEAST_A)
+    size_a = np.maximum(np.abs(flow_a), _LEAST_CABLE_CURRENT_A)
     ohm = mean_v * np.sign(flow_a) / size_a
     error_ohm = np.hypot(errors_v, ohm * error_a) / size_a
     middle_ohm = max(_weighted_median(ohm, size_a), 0.0)

@@ -43,7 +43,7 @@ from snakewalk.drivers.types import ImuState
 
 _READS = 10
 _PAUSE_S = 0.02
-_LEVEL_DEG = 20.0
+_LEVEL_LINK_DEG = 20.0
 """A link that lies flat shows less (ours): more is a wrong mounting, or a robot that lies askew."""
 _STILL_DPS = 5.0
 """A robot on the bench turns by less (ours): a gyro in other units would show more."""
@@ -84,29 +84,29 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
         return Finding(
             "imu", "warn", imu_text, "does the robot lie still? is the range the board's?"
         )
-    if tilt_deg > _LEVEL_DEG:
+    if tilt_deg > _LEVEL_LINK_DEG:
         return Finding("imu", "warn", imu_text, "if it lies flat: correct mounting_deg of [imu]")
     return Finding("imu", "ok", imu_text)
 
 
 OnStep = Callable[[str], None]
 """Function that gets the name of each step."""
-_MEASURED = ("Realtime Tick", "Present Temperature")
+_DIFFERING_REGISTERS = ("Realtime Tick", "Present Temperature")
 """Registers that differ between two servos, however alike they are."""
 _FEETECH_MEASURED = ("Present Position", "Present Temperature")
-_PINGED = 6
+_MOST_PINGED = 6
 """Largest number of missing servos that are pinged at each baud rate; for more a broadcast is
 quicker (ours)."""
 _STILL_POSITIONS = 20
 """Positions, 1.8 degrees, by which a joint at rest may differ between two reads (ours)."""
-_STILL_RAD_S = 0.4
+_STILL_JOINT_RAD_S = 0.4
 """Velocity at which a joint turns by more than ``_STILL_POSITIONS`` between the two (ours)."""
 _NO_VELOCITY = "its sensor is off, so a run does not notice that it is blocked: exchange the servo"
-_STILL_S = 0.1
+_STILL_PAUSE_S = 0.1
 """Least time between the two (ours)."""
-_TIMED = 2
+_TIMED_SERVOS = 2
 """Servos, and pings of each, that show how late replies are (ours)."""
-_ASKED = 4
+_PING_ROUNDS = 4
 """Rounds of pings that show whose replies get lost (ours)."""
 _NOISE_TRIES = 10
 """Number of requests on a noisy line before a servo counts as silent (ours)."""
@@ -153,7 +153,7 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     present_ids = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    measured = _FEETECH_MEASURED if bus.table.facts.is_feetech else _MEASURED
+    measured = _FEETECH_MEASURED if bus.table.facts.is_feetech else _DIFFERING_REGISTERS
     reads = [bus.probe(i, measured) for i in present_ids]
     noise = line_checks.noise(pings, reads, overheard)
     alone = [] if noise is not None else servos.unshared(present_ids, (*pings, *reads))
@@ -192,11 +192,11 @@ def _find(
     bus = servo_bus(port, models, latency_s=latency_s)
     pinged = bus.find(expected)
     patience_s = line_checks.PATIENCE_S
-    for servo_id in [*pinged, *expected][:_TIMED]:
+    for servo_id in [*pinged, *expected][:_TIMED_SERVOS]:
         if bus.table.facts.is_feetech:
             timed = bus.probe(servo_id)
         else:
-            timed = probe(port, servo_id, _TIMED, patience_s)
+            timed = probe(port, servo_id, _TIMED_SERVOS, patience_s)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
             patient = servo_bus(port, models, latency_s=patience_s)
@@ -259,7 +259,7 @@ def _line_quality(
     ids = [s.servo_id for s in reports]
     fast = all(s.fast_reads for s in reports)
     cycle = servo_bus(port, models, latency_s=patience_s).cycle(ids, fast=fast)
-    asked = [servo_id for servo_id in ids for _ in range(_ASKED)]
+    asked = [servo_id for servo_id in ids for _ in range(_PING_ROUNDS)]
     return line_checks.line_quality(
         port, cycle, latency_s, lambda: [bus.probe(servo_id) for servo_id in asked]
     )
@@ -388,7 +388,7 @@ def _reports(
 def _settings(
     bus: DynamixelBus, robot: RobotConfig, reports: Sequence[ServoReport], noise: Finding | None
 ) -> list[Finding]:
-    bus.port.clock.sleep_until_s(bus.port.clock.now_s() + _STILL_S)
+    bus.port.clock.sleep_until_s(bus.port.clock.now_s() + _STILL_PAUSE_S)
     try:
         registers = [read_registers(bus, robot, report.servo_id) for report in reports]
         supply = servos.unsteady_supply(bus, reports)
@@ -420,7 +420,7 @@ def _moving(
                 register.values.get("Present Velocity", 0)
                 * units.rad_s_per_velocity[register.joint]
             )
-            > _STILL_RAD_S
+            > _STILL_JOINT_RAD_S
         ]
         if not fast:
             return []
@@ -447,7 +447,7 @@ def _at_other_bauds(
     before = port.getBaudRate()
     feetech = bus.table.facts.is_feetech
     others = [baud for baud in (bus.table.facts.bauds if feetech else BAUDS) if baud != before]
-    if len(missing) > _PINGED:
+    if len(missing) > _MOST_PINGED:
         if feetech:
             replying = find_feetech(port, others, on_progress)
             return {s.servo_id: s.baud for s in replying if s.servo_id in missing}

@@ -35,7 +35,7 @@ LATCH_S: Final = 1.0
 END_S: Final = 3.0
 """Longest time of a terminated run until torque is off: it asks for 2 s (ours)."""
 _TORQUE_OFF: Final = "snakewalk.controller.bench.torque_off"
-_LOOK_S: Final = 1e-3
+_POLL_S: Final = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ def runs_of(port: str | None = None, run: str | None = None) -> list[PressedButt
         asked = set(map(resolved, named_ports(port)))
         meant = [button for button in every if asked & set(button.run.ports)]
     elif run is not None:
-        meant = [button for button in every if _is_meant(button, run)]
+        meant = [button for button in every if _is_button_of_run(button, run)]
     else:
         meant = [button for button in every if button.run.ports] or every[:1]
     for button in every:
@@ -104,7 +104,7 @@ def named_ports(port: str) -> list[str]:
     return ports_in(port)
 
 
-def _is_meant(button: PressedButton, run: str) -> bool:
+def _is_button_of_run(button: PressedButton, run: str) -> bool:
     meant_run = button.run
     path = os.path.realpath(run)
     where = None if meant_run.folder is None else os.path.realpath(meant_run.folder)
@@ -118,7 +118,7 @@ def stop_runs(buttons: Iterable[PressedButton], who: str) -> list[StopOutcome]:
         opened = [stack.enter_context(button) for button in buttons]
         for button in opened:
             button.press(who)
-        return [_ended(button, clock) for button in opened]
+        return [_wait_for_end(button, clock) for button in opened]
 
 
 def stop_holders(ports: Iterable[str], who: str) -> list[StopOutcome]:
@@ -135,7 +135,7 @@ def stop_holders(ports: Iterable[str], who: str) -> list[StopOutcome]:
             if button is not None:
                 outcomes += stop_runs([button], who)
             elif holder.is_ours:
-                outcomes.append(_terminated(holder, port))
+                outcomes.append(_terminate_program(holder, port))
     return outcomes
 
 
@@ -150,7 +150,7 @@ def _button_of(holder: PortHolder) -> PressedButton | None:
     return None
 
 
-def _terminated(holder: PortHolder, port: str) -> StopOutcome:
+def _terminate_program(holder: PortHolder, port: str) -> StopOutcome:
     """End a program without a button; nothing is known of the torque after that."""
     clock = WallClock()
     how: How = "terminated"
@@ -183,7 +183,7 @@ def _terminated(holder: PortHolder, port: str) -> StopOutcome:
     )
 
 
-def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
+def _wait_for_end(button: PressedButton, clock: WallClock) -> StopOutcome:
     how: How = "latched"
     signals: tuple[tuple[signal.Signals | None, How, float], ...] = (
         (None, "latched", LATCH_S),
@@ -198,7 +198,7 @@ def _ended(button: PressedButton, clock: WallClock) -> StopOutcome:
                 os.kill(process, number)
         until_s = clock.now_s() + patience_s
         while button.end is None and button.is_held and clock.now_s() < until_s:
-            clock.sleep_until_s(clock.now_s() + _LOOK_S)
+            clock.sleep_until_s(clock.now_s() + _POLL_S)
         if button.end is not None or not button.is_held:
             break
     after_s = clock.now_s()

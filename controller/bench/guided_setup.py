@@ -159,12 +159,12 @@ class GuidedSetup:
                 self.files = replace(self.files, pose=self._ask(question))
             if step.name == "find":
                 self.files = replace(self.files, axes=self._axes())
-            self._do(step)
+            self._run_step(step)
             self._done.append(step.name)
             text = json.dumps({"port": self.files.port, "done": self._done})
             write_result(self._file, f"{text}\n")
 
-    def _do(self, step: SetupStep) -> None:
+    def _run_step(self, step: SetupStep) -> None:
         """Run the step's command until it succeeds, is skipped, or the person stops."""
         code = 0
         words = step.words(self.files)

@@ -27,11 +27,11 @@ _NO_GROUP_READS = (
     "update the firmware of the servos, or use an adapter that passes long replies: a run needs "
     "group reads"
 )
-_LATE_S = 3e-3
+_LATE_REPLY_S = 3e-3
 """A reply that is later than the wire and the servo make it is held up by adapter or driver."""
-_SLOW_S = 2e-3
+_DIFFERENCE_S = 2e-3
 """Difference between servos beyond any return delay, which is 0.508 ms at most (ours)."""
-_COMPARED = 3
+_LEAST_COMPARED = 3
 """Servos that a comparison needs (ours)."""
 _LOST = 2
 """Lost replies of one servo beyond chance (ours)."""
@@ -114,7 +114,7 @@ def _usual_response(late_s: Sequence[float], latency_s: float) -> Finding:
         response_text += f", the driver waits {latency_s * 1e3:.0f} ms: a run loses all of them"
         remedy = "lower the adapter's latency timer to 1 ms, or connect it without a hub or server"
         return Finding("response time", "fail", response_text, remedy)
-    if usual_ms * 1e-3 <= max(_LATE_S, latency_s / 2.0):
+    if usual_ms * 1e-3 <= max(_LATE_REPLY_S, latency_s / 2.0):
         return Finding("response time", "ok", response_text)
     response_text += ": each cycle of a run is longer by that time"
     remedy = "set the adapter's latency timer to 1 ms; else a USB hub, a server or a busy computer"
@@ -128,10 +128,12 @@ def _slow_servos(probes: Sequence[Probe]) -> Finding | None:
         if probe.late_s:
             late_s = min(probe.late_s)
             least_s[probe.servo_id] = min(late_s, least_s.get(probe.servo_id, late_s))
-    if len(least_s) < _COMPARED:
+    if len(least_s) < _LEAST_COMPARED:
         return None
     usual_s = float(np.median(list(least_s.values())))
-    slow = {i: late_s - usual_s for i, late_s in least_s.items() if late_s - usual_s > _SLOW_S}
+    slow = {
+        i: late_s - usual_s for i, late_s in least_s.items() if late_s - usual_s > _DIFFERENCE_S
+    }
     if not slow:
         return None
     names = ", ".join(f"servo {i} by {late_s * 1e3:.1f} ms" for i, late_s in slow.items())

@@ -24,7 +24,7 @@ from snakewalk.sim.serve.live_table import Packet, Rows
 from snakewalk.sim.sniff.decode import DecodedPacket
 
 MakeDecoder = Callable[[], AnyDecoder]
-_SHOWN: Final = 8
+_LISTED_PACKETS: Final = 8
 """Packets in words below the table."""
 _END_S: Final = 2.0
 """Longest time until the drawing process ends."""
@@ -78,7 +78,7 @@ class LiveScreen:
 def _draw(line: Connection, make_decoder: MakeDecoder) -> None:
     give_way()
     decoder = make_decoder()
-    recent = deque[DecodedPacket](maxlen=_SHOWN)
+    recent = deque[DecodedPacket](maxlen=_LISTED_PACKETS)
     screen = PlainConsole(file=sys.stderr)
     with Live(console=screen, auto_refresh=False) as live, suppress(EOFError, OSError):
         while True:

@@ -32,7 +32,7 @@ FOR_RUNS: Final = (
     ),
 )
 """Packages of each child whose loops a run in the simulator needs: about half of the work."""
-_COMPILED: Final = "snakewalk.drivers.compiling"
+_COMPILING_MODULE: Final = "snakewalk.drivers.compiling"
 """A module with a loop imports its decorator from here."""
 
 
@@ -47,7 +47,7 @@ def loop_modules(package: str) -> list[str]:
             modules += loop_modules(module_info.name)
             continue
         file = folder / f"{module_info.name.rpartition('.')[2]}.py"
-        if file.exists() and f"from {_COMPILED} import" in file.read_text(encoding="utf-8"):
+        if file.exists() and f"from {_COMPILING_MODULE} import" in file.read_text(encoding="utf-8"):
             modules.append(module_info.name)
     return modules
 

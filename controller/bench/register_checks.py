@@ -114,18 +114,18 @@ class _Checks:
             shutdown = feetech.shutdown_alarms(facts)
         return [
             self._pose(),
-            self._fixed(),
-            self._exchanged(),
+            self._fixed_registers(),
+            self._exchanged_servos(),
             self._secondary(),
             self._current_limit(),
             self._no_current(),
-            self._bad(
+            self._finding_on_servos(
                 "status return level",
                 "warn",
                 lambda servo: servo.values.get("Status Return Level", all_reply) != all_reply,
                 "to writes",
                 verb="do not reply",
-                remedy=f"a run sets {self._at('Status Return Level')} to {all_reply}; other "
+                remedy=f"a run sets {self._entry('Status Return Level')} to {all_reply}; other "
                 "programs wait in vain",
             ),
             self._homing(),
@@ -149,11 +149,11 @@ class _Checks:
                 0xFF,
                 "have torque or old RAM values again as soon as there is power",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "shutdown",
                 "warn",
                 lambda servo: servo.values.get("Shutdown", shutdown) & shutdown != shutdown,
-                f"on, overloaded or overheated: {self._at('Shutdown')} is masked",
+                f"on, overloaded or overheated: {self._entry('Shutdown')} is masked",
                 verb="stay",
             ),
             *self._pwm(),
@@ -162,10 +162,10 @@ class _Checks:
             self._unusual("gains", _GAINS),
             self._unusual("profile", _PROFILE),
             *self._watchdog(),
-            *self._usual(),
+            *self._usual_registers(),
         ]
 
-    def _fixed(self) -> Finding | None:
+    def _fixed_registers(self) -> Finding | None:
         """Registers that must have one value for the scale and the direction of positions."""
         faults = [
             (f"{self._robot.joint_label(servo.joint)}: {text}", remedy)
@@ -178,7 +178,7 @@ class _Checks:
             return None
         return Finding("position scale", "fail", *map("; ".join, zip(*faults, strict=True)))
 
-    def _usual(self) -> list[Finding | None]:
+    def _usual_registers(self) -> list[Finding | None]:
         """Other registers that shape the motion or protect a servo, against a new servo's."""
         names = dict.fromkeys(
             name
@@ -187,7 +187,7 @@ class _Checks:
         )
         return [self._not_factory(name) for name in names]
 
-    def _at(self, name: str) -> str:
+    def _entry(self, name: str) -> str:
         row = self._facts.registers.get(name)
         return name if row is None else f"{name}({row.address})"
 
@@ -196,31 +196,31 @@ class _Checks:
         full = self._full
         shown = " or ".join(map(str, dict.fromkeys(full[servo.joint] for servo in self._servos)))
         return [
-            self._bad(
+            self._finding_on_servos(
                 "PWM limit",
                 "fail",
                 lambda servo: servo.values.get("PWM Limit") == 0,
-                f"move: {self._at('PWM Limit')} is 0",
+                f"move: {self._entry('PWM Limit')} is 0",
                 verb="cannot",
                 remedy=f"set it to {shown}",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "PWM limit",
                 "warn",
                 lambda servo: (
                     0 < servo.values.get("PWM Limit", full[servo.joint]) < full[servo.joint]
                 ),
-                f"a {self._at('PWM Limit')} below {shown}: weak and slow",
+                f"a {self._entry('PWM Limit')} below {shown}: weak and slow",
                 remedy=f"set it to {shown}, unless it is meant",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "goal PWM",
                 "warn",
                 lambda servo: (
                     servo.values.get("Goal PWM", full[servo.joint])
                     < servo.values.get("PWM Limit", full[servo.joint])
                 ),
-                f"a {self._at('Goal PWM')} below its limit: weak or without power",
+                f"a {self._entry('Goal PWM')} below its limit: weak or without power",
             ),
         ]
 
@@ -230,7 +230,7 @@ class _Checks:
         rows = self._facts.registers
         low, high = (rows[f"{end} Position Limit"].address for end in ("Max", "Min"))
         return [
-            self._bad(
+            self._finding_on_servos(
                 "position limits",
                 "warn",
                 lambda servo: (
@@ -240,20 +240,20 @@ class _Checks:
                 ),
                 f"position limits ({low}, {high}) within the joint's range",
             ),
-            self._weak(
+            self._weak_pitch_joints(
                 "goal current",
                 "warn",
                 "Goal Current",
-                f"a {self._at('Goal Current')} below the robot's current limit: weak",
+                f"a {self._entry('Goal Current')} below the robot's current limit: weak",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "registered instruction",
                 "warn",
                 lambda servo: servo.values.get("Registered Instruction") == 1,
                 "a registered write waiting: the next Action moves or changes it",
                 remedy="switch its power off, on",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "current sensor",
                 "warn",
                 lambda servo: (
@@ -283,14 +283,14 @@ class _Checks:
 
     def _watchdog(self) -> list[Finding | None]:
         return [
-            self._bad(
+            self._finding_on_servos(
                 "watchdog",
                 "warn",
                 lambda servo: servo.values.get("Bus Watchdog") == WATCHDOG_TRIPPED,
                 "been stopped by the bus watchdog: goals are refused",
                 remedy="a run clears it: Bus Watchdog(98) = 0",
             ),
-            self._bad(
+            self._finding_on_servos(
                 "watchdog",
                 "warn",
                 lambda servo: 0 < servo.values.get("Bus Watchdog", 0) < WATCHDOG_TRIPPED,
@@ -299,7 +299,7 @@ class _Checks:
             ),
         ]
 
-    def _bad(
+    def _finding_on_servos(
         self,
         check: str,
         grade: Grade,
@@ -320,7 +320,7 @@ class _Checks:
         self, check: str, register: str, bits: int, verb: str, remedy: str = _BY_A_RUN
     ) -> Finding | None:
         first, _, rest = verb.partition(" ")
-        return self._bad(
+        return self._finding_on_servos(
             check,
             "warn",
             lambda servo: bool(servo.values.get(register, 0) & bits),
@@ -340,7 +340,7 @@ class _Checks:
             return Finding("pose", "fail", bend_faults, faults[0].partition("limit of ")[2])
         return Finding("pose", "ok", "every joint stands within its limits")
 
-    def _exchanged(self) -> Finding | None:
+    def _exchanged_servos(self) -> Finding | None:
         """Servos that were other joints in the last run, as far as they have had power since."""
         robot = self._robot
         others = [
@@ -367,33 +367,33 @@ class _Checks:
         return Finding("secondary ID", "fail", "; ".join(shadows), remedy)
 
     def _current_limit(self) -> Finding | None:
-        return self._weak(
+        return self._weak_pitch_joints(
             "current limit",
             "fail",
             "Current Limit",
-            f"a {self._at('Current Limit')} below the robot's current limit",
+            f"a {self._entry('Current Limit')} below the robot's current limit",
             "snakewalk bus set --current-limit, or a lower pitch_current_limit_a",
         )
 
     def _no_current(self) -> Finding | None:
         """Joints without a limit in the robot's file; a run checks the others."""
-        return self._bad(
+        return self._finding_on_servos(
             "current limit",
             "warn",
             lambda servo: (
                 self._robot.all_axes[servo.joint] != "p" and servo.values.get("Current Limit") == 0
             ),
-            f"a {self._at('Current Limit')} of 0: no torque in modes that control the current",
+            f"a {self._entry('Current Limit')} of 0: no torque in modes that control the current",
             remedy="snakewalk bus set --current-limit",
         )
 
-    def _weak(
+    def _weak_pitch_joints(
         self, check: str, grade: Grade, register: str, what: str, remedy: str = _BY_A_RUN
     ) -> Finding | None:
         """Pitch joints with a register of their current below the robot's limit."""
         robot = self._robot
         units = self._units
-        return self._bad(
+        return self._finding_on_servos(
             check,
             grade,
             lambda servo: (
@@ -414,9 +414,8 @@ class _Checks:
         ]
         if not moved:
             return None
-        remedy = (
-            f"a run leaves it: is each joint straight at 0? if not, {self._at('Homing Offset')} = 0"
-        )
+        entry = self._entry("Homing Offset")
+        remedy = f"a run leaves it: is each joint straight at 0? if not, {entry} = 0"
         return Finding("homing offset", "warn", f"the zero is moved: {', '.join(moved)}", remedy)
 
     def _unusual(self, check: str, registers: Sequence[str]) -> Finding | None:

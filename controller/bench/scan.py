@@ -20,13 +20,13 @@ from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, SECONDARY_
 
 _LOOKS = 3
 _LIKELY = (1_000_000, FACTORY_BAUD)
-_SAME = {"sound": 1, "noisy": 2, "lossy": 5}
+_SILENT_PINGS = {"sound": 1, "noisy": 2, "lossy": 5}
 """Number of broadcast pings in a row without a new servo before a line is left (ours)."""
-_NAMED = 3
+_MOST_NAMED_RATES = 3
 """Largest number of baud rates that are named for noise."""
-_MOST = 12
+_MOST_BROADCASTS = 12
 """Broadcast pings at one rate, at most (ours)."""
-_AGAIN = 2
+_REPEATED_SCANS = 2
 """How often silent rates that are likely are asked again on a bad line, or where nobody answers;
 the noisy ones where nobody answers (ours)."""
 _TRIES = 6
@@ -102,7 +102,7 @@ class ScanReport:
         """Fault of the line in words; None if no fault was seen."""
         if self.noise_bytes:
             shown = ", ".join(f"{count} at {baud} baud" for baud, count in self.noise_bytes.items())
-            if len(self.noise_bytes) > _NAMED:
+            if len(self.noise_bytes) > _MOST_NAMED_RATES:
                 shown = f"{sum(self.noise_bytes.values())} at {len(self.noise_bytes)} baud rates"
             fault_text = (
                 f"bytes came damaged ({shown}): noise on the line, or two servos with one ID"
@@ -148,12 +148,12 @@ def scan(
         silent = not any(replies.values())
         likely = {*_LIKELY, before, *(noise if silent else ())}
         again = [baud for baud in asked if baud in likely]
-        for baud in again * _AGAIN if patient and (bad or silent) else ():
+        for baud in again * _REPEATED_SCANS if patient and (bad or silent) else ():
             if not replies.get(baud) and port.setBaudRate(baud):
                 on_progress(f"{baud} baud again")
                 replies[baud], lost = _answers(port, noise, patient=patient)
                 lossy |= lost or bool(replies[baud])  # it was silent before
-        _tell_once(port, replies, before, on_progress)
+        _drop_repeated_replies(port, replies, before, on_progress)
         results = []
         for baud, servos in replies.items():
             if servos and port.setBaudRate(baud):
@@ -179,7 +179,7 @@ def _answers(
     replies: dict[int, StatusPacket] = {}
     state = "sound"
     same = 0
-    for turn in range(_MOST):
+    for turn in range(_MOST_BROADCASTS):
         answer = broadcast_ping(port)
         new = [reply for reply in answer.replies if reply.servo_id not in replies]
         replies |= {reply.servo_id: reply for reply in new}
@@ -189,14 +189,14 @@ def _answers(
             state = "noisy" if state == "sound" and replies else state
         if turn and (new or len(answer.replies) < len(replies)):
             state = "lossy"
-        if same >= _SAME[state] and turn:
+        if same >= _SILENT_PINGS[state] and turn:
             break
         if not replies and not (patient and baud in _LIKELY):
             break
     return replies, state == "lossy"
 
 
-def _tell_once(
+def _drop_repeated_replies(
     port: BytePort,
     replies: Mapping[int, dict[int, StatusPacket]],
     before: int,
@@ -233,12 +233,12 @@ def _pings_back(port: BytePort, servo_id: int, baud: int) -> bool:
 def _result(port: BytePort, baud: int, reply: StatusPacket, tries: int | None) -> ScanResult:
     number = int.from_bytes(reply.params[:2], "little")
     firmware = reply.params[2]
-    model = model_numbers().get(number) or _other(port, reply.servo_id, number)
+    model = model_numbers().get(number) or _other_device(port, reply.servo_id, number)
     shadow = _secondary_id(port, reply.servo_id, model, tries)
     return ScanResult(reply.servo_id, model, firmware, baud, shadow)
 
 
-def _other(port: BytePort, device_id: int, number: int) -> str:
+def _other_device(port: BytePort, device_id: int, number: int) -> str:
     published = imu_model(number)
     if published is not None:
         return published

@@ -372,7 +372,7 @@ def restarts(
     restarted = [
         servo_id
         for servo_id, first in before.items()
-        if servo_id in after and _is_restarted(first, after[servo_id])
+        if servo_id in after and _has_restarted(first, after[servo_id])
     ]
     if restarted:
         restart_text = (
@@ -382,7 +382,7 @@ def restarts(
     return findings
 
 
-def _is_restarted(before: ServoClock, after: ServoClock) -> bool:
+def _has_restarted(before: ServoClock, after: ServoClock) -> bool:
     shortest_s = after.asked_s - before.received_s
     longest_s = after.received_s - before.asked_s
     low_s = shortest_s * (1.0 - _DRIFT) - _SLACK_S

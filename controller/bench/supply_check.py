@@ -41,7 +41,7 @@ _VOLTAGE_AT = 20
 """Place of Present Input Voltage(144) in a block from Present PWM(124) on."""
 _SUPPLY_BYTES = 3
 """A block of Present Input Voltage and Present Temperature alone."""
-_ENOUGH = 10
+_LEAST_READINGS = 10
 """Readings of a wiggle that ended early, from which on they are judged (ours)."""
 
 
@@ -68,7 +68,7 @@ def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -
     """
     check = "supply under load"
     wiggled = wiggle(bus, robot, safety)
-    enough = len(wiggled.voltage_v) >= _ENOUGH
+    enough = len(wiggled.voltage_v) >= _LEAST_READINGS
     cables = [cable_finding(robot, wiggled.voltage_v, wiggled.drawn_a)] if enough else []
     if wiggled.fault is not None:
         text = f"the wiggle ended: {wiggled.fault}"

@@ -21,7 +21,7 @@ _COPIES: Final = 3
 _TRIES: Final = 8
 """Number of times that a servo is asked whether its torque is off (ours)."""
 _BITS_PER_BYTE: Final = 10
-_PAST: Final = 20
+_REPETITIONS: Final = 20
 """Number of times that torque off is sent past another program (ours): its packets hit some."""
 _PAST_EVERY_S: Final = 7e-3
 """Time between these; no divisor of a usual period of control (ours)."""
@@ -123,7 +123,7 @@ def _send_past(device: str) -> str:
     with suppress(OSError):  # an exclusive device; or a full one
         line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
-            while sent < _PAST:
+            while sent < _REPETITIONS:
                 os.write(line, _PACKETS)
                 sent += 1
                 clock.sleep_until_s(clock.now_s() + _PAST_EVERY_S)

@@ -211,7 +211,7 @@ def unlisted(
         unlisted_text = (
             f"{shown_subject(shared, 'answer')} twice or damaged: two servos have this ID"
         )
-        findings.append(Finding("duplicate IDs", "fail", unlisted_text, _ALONE))
+        findings.append(Finding("duplicate IDs", "fail", unlisted_text, _CONNECT_ALONE))
     if alarms:
         unlisted_text = f"{', '.join(alarms)} (not in the robot)"
         remedy = "remove the cause, then switch the servo power off, on"
@@ -225,7 +225,9 @@ def unlisted(
     return findings
 
 
-_ALONE = "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
+_CONNECT_ALONE = (
+    "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
+)
 
 
 def _state(bus: DynamixelBus, servo_id: int, reply: PingReply) -> tuple[str | None, bool]:

@@ -24,7 +24,7 @@ from snakewalk.controller.cameras.markers.lens_residual import Distortion, marke
 from snakewalk.controller.cameras.overhead_camera import LineDetection, OverheadDetector
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_LOOK_S: Final = 0.25
+_SEARCH_PERIOD_S: Final = 0.25
 """Time between two searches for markers, which need longer than a frame."""
 _LINE_S: Final = 0.05
 """Time between two frames in which the body is looked for."""
@@ -103,7 +103,7 @@ class CameraCheck:
         if self._joint_s and time_s - self._lined_s >= _LINE_S:
             self._lined_s = time_s
             self._add_line(image, time_s)
-        if time_s - self._looked_s < _LOOK_S:
+        if time_s - self._looked_s < _SEARCH_PERIOD_S:
             return
         self._looked_s = time_s
         self.markers = find_markers(image)

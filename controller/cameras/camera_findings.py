@@ -12,13 +12,13 @@ from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 
 Lock = Literal["locked", "automatic", "not reported"]
-_SLOW: Final = 0.8  # of the requested rate
+_LEAST_RATE: Final = 0.8  # of the requested rate
 _GAP: Final = 3.0  # periods of a frame
-_SEEN: Final = 0.9  # of the pictures: a marker with less is unreliable
+_LEAST_SEEN: Final = 0.9  # of the pictures: a marker with less is unreliable
 _SIDE: Final = 0.05  # of a marker's side: more is a wrong print, or wrong places
 _LIGHT: Final = 0.03  # of the brightness: more is flicker, or automatic exposure
-_RIGHT_S: Final = 0.01  # largest error of latency_s
-_MOVED_PX: Final = 0.5
+_LATENCY_TOLERANCE_S: Final = 0.01  # largest error of latency_s
+_MOVED_CAMERA_PX: Final = 0.5
 
 
 def camera_findings(
@@ -49,7 +49,7 @@ def _frames(report: CameraReport, camera: CameraConfig) -> Finding:
         return Finding(
             "frames", "fail", frames_text, f"asked for are {asked} pixels: correct [camera]"
         )
-    if not report.rate_hz >= _SLOW * camera.rate_hz:
+    if not report.rate_hz >= _LEAST_RATE * camera.rate_hz:
         return Finding(
             "frames",
             "warn",
@@ -70,7 +70,7 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         remedy = "snakewalk pose markers, and their places in [camera.markers_m]"
         return [Finding("markers", "warn", f"none are named{extra_text}", remedy)]
     shown = ", ".join(f"{name} in {100.0 * share:.0f} %" for name, share in report.seen.items())
-    seldom = [name for name, share in report.seen.items() if share < _SEEN]
+    seldom = [name for name, share in report.seen.items() if share < _LEAST_SEEN]
     steady = len(report.seen) - len(seldom)
     if steady >= len(report.seen):
         first = Finding("markers", "ok", f"all {steady} found in every picture, or nearly")
@@ -123,7 +123,7 @@ def _bump(report: CameraReport) -> list[Finding]:
     bump = report.bump
     if bump is None:
         return []
-    if bump.undone and bump.away_px < _MOVED_PX and not bump.left_out:
+    if bump.undone and bump.away_px < _MOVED_CAMERA_PX and not bump.left_out:
         return [Finding("place", "ok", f"where it was, to {bump.away_px:.1f} px")]
     remedy = "photograph the empty floor again"
     return [Finding("place", "warn" if bump.undone else "fail", str(bump), remedy)]
@@ -165,7 +165,7 @@ def _latency(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         f"{1e3 * fit.latency_s:.0f} ms, to {1e3 * max(fit.error_s, 1e-3):.0f} ms, from the joints' "
         f"motion (correlation {fit.correlation:.2f})"
     )
-    if camera.device is not None and abs(fit.latency_s - camera.latency_s) > _RIGHT_S:
+    if camera.device is not None and abs(fit.latency_s - camera.latency_s) > _LATENCY_TOLERANCE_S:
         remedy = f"[camera] latency_s = {max(fit.latency_s, 0.0):.3f}"
         return [Finding("latency", "warn", latency_text, remedy)]
     return [Finding("latency", "ok", latency_text)]

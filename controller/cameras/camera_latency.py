@@ -17,9 +17,9 @@ from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
 _PARTS: Final = 4  # of the record, whose latencies give the error
-_LEAST: Final = 30  # frames, and joint reads
-_LEAST_MOVED_RAD: Final = 0.03  # standard deviation of a heading: less is picture noise (ours)
-_LIKE: Final = 0.7  # least credible correlation (ours)
+_LEAST_SAMPLES: Final = 30  # frames, and joint reads
+_LEAST_MOTION_RAD: Final = 0.03  # standard deviation of a heading: less is picture noise (ours)
+_LEAST_LIKENESS: Final = 0.7  # least credible correlation (ours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class LatencyFit:
     """Why it must not be believed; empty where it may."""
 
 
-_NONE: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
+_NO_FIT: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
 
 
 def fit_latency(
@@ -53,23 +53,23 @@ def fit_latency(
     is_complete = np.isfinite(joint_rad).all(axis=1)
     joint_s, joint_rad = joint_s[is_complete], joint_rad[is_complete]
     finite_lines = [line for line in lines if np.isfinite(line.line_m).all()]
-    if min(len(finite_lines), len(joint_s)) < _LEAST:
+    if min(len(finite_lines), len(joint_s)) < _LEAST_SAMPLES:
         return replace(
-            _NONE,
+            _NO_FIT,
             fault=f"the whole body was seen in {len(finite_lines)} frames, its joints were read "
-            f"{len(joint_s)} times; {_LEAST} are needed of each",
+            f"{len(joint_s)} times; {_LEAST_SAMPLES} are needed of each",
         )
     origin = pose_at(np.zeros(2), 0.0)
     bodies = [body_in_world(robot, origin, joint_row).headings_rad for joint_row in joint_rad]
     headings_rad = np.unwrap(np.unwrap(np.array(bodies), axis=1), axis=0)
     headings_rad -= headings_rad.mean(axis=1, keepdims=True)
-    if float(headings_rad.std(axis=0).max()) < _LEAST_MOVED_RAD:
-        return replace(_NONE, fault="the joints did not move: turn one to and fro, unevenly")
+    if float(headings_rad.std(axis=0).max()) < _LEAST_MOTION_RAD:
+        return replace(_NO_FIT, fault="the joints did not move: turn one to and fro, unevenly")
     frame_s = np.array([line.time_s for line in finite_lines])
     delays = np.arange(_EARLIEST_S, _LATEST_S + 1e-9, _STEP_S)
     inside = (frame_s - _LATEST_S >= joint_s[0]) & (frame_s - _EARLIEST_S <= joint_s[-1])
-    if inside.sum() < _LEAST:
-        return replace(_NONE, fault="it looked too short: frames and joints hardly overlap")
+    if inside.sum() < _LEAST_SAMPLES:
+        return replace(_NO_FIT, fault="it looked too short: frames and joints hardly overlap")
     frame_s = frame_s[inside]
     expected = np.stack(
         [
@@ -87,17 +87,17 @@ def fit_latency(
     lines_m = _same_end_first(lines_m)
     shown, delay, likeness = max(
         (
-            (shape, *_best(delays, expected, shape))
+            (shape, *_best_delay(delays, expected, shape))
             for shape in (_shapes(robot, lines_m), _shapes(robot, [line[::-1] for line in lines_m]))
         ),
         key=lambda tried: tried[2],
     )
     parts = [
-        _best(delays, expected[:, part], shown[part])[0]
+        _best_delay(delays, expected[:, part], shown[part])[0]
         for part in np.array_split(np.arange(len(shown)), _PARTS)
     ]
     fit = LatencyFit(delay, float(np.std(parts, ddof=1) / np.sqrt(_PARTS)), likeness)
-    if likeness < _LIKE:
+    if likeness < _LEAST_LIKENESS:
         return replace(fit, fault="the body in the picture does not move as the joints do")
     if not delays[0] < delay < delays[-1]:
         return replace(fit, fault=f"it is beyond {1e3 * _LATEST_S:.0f} ms")
@@ -129,7 +129,7 @@ def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
     return np.array(shapes)
 
 
-def _best(delays: Floats, expected: Floats, shown: Floats) -> tuple[float, float]:
+def _best_delay(delays: Floats, expected: Floats, shown: Floats) -> tuple[float, float]:
     """Delay with the best correlation of the changes (to a fraction of a step), and that."""
     deviation = (expected - expected.mean(axis=1, keepdims=True)).reshape(len(delays), -1)
     two = (shown - shown.mean(axis=0)).ravel()

@@ -140,7 +140,7 @@ class CameraPose:
     def _prior_at(self, time_s: float) -> BodyPrior | None:
         if self._gap:
             return None
-        then = self._at(time_s)
+        then = self._moment_at(time_s)
         believed = self._rest.pose(_in_world(self._offset, then.place), then.joint_rad, time_s)
         body = body_in_world(self._robot, believed, then.joint_rad)
         return BodyPrior(body.link_m[:, :2], body.forward[:, :2])
@@ -161,18 +161,18 @@ class CameraPose:
         heading_rad = fitted.heading_rad
         self.covariance = fitted.covariance
         self._sigma_m.append(float(np.sqrt(np.linalg.eigvalsh(fitted.covariance[:2, :2])[-1])))
-        then = self._at(time_s)
+        then = self._moment_at(time_s)
         self.used += 1
         self._fixed_s = time_s
         turn = heading_rad - then.place[2]
-        self._offset = np.append(head_m - _turned(then.place[:2], turn), turn)
+        self._offset = np.append(head_m - _turned_point(then.place[:2], turn), turn)
 
     def _update(self, detection: LineDetection) -> None:
         self.frames += 1
         if detection.status is not FrameStatus.GOOD:
             self._reason = str(detection.status)
             return
-        then = self._at(detection.time_s)
+        then = self._moment_at(detection.time_s)
         fit = self._head_end(fit_both_ends(self._robot, detection.line_m, then.joint_rad), then)
         if fit.error_m > MISFIT * self._robot.mean_link_length_m:
             self._reason = f"the image lies {fit.error_m * 1e3:.0f} mm off the measured joints"
@@ -188,7 +188,7 @@ class CameraPose:
         c, s = np.cos(believed[2]), np.sin(believed[2])
         return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
 
-    def _at(self, time_s: float) -> _Moment:
+    def _moment_at(self, time_s: float) -> _Moment:
         if len(self._history) == 1:
             return self._history[0]
         times = np.array([moment.time_s for moment in self._history])
@@ -214,11 +214,11 @@ class CameraPose:
             )
 
 
-def _turned(point: Floats, by_rad: float) -> Floats:
+def _turned_point(point: Floats, by_rad: float) -> Floats:
     c, s = np.cos(by_rad), np.sin(by_rad)
     return np.array([c * point[0] - s * point[1], s * point[0] + c * point[1]])
 
 
 def _in_world(frame: Floats, place: Floats) -> Floats:
     """(3,) world place of a place in the drifting frame."""
-    return np.append(frame[:2] + _turned(place[:2], frame[2]), frame[2] + place[2])
+    return np.append(frame[:2] + _turned_point(place[:2], frame[2]), frame[2] + place[2])

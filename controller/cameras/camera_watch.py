@@ -78,10 +78,10 @@ class CameraWatch:
 
         """
         if self._camera.device is None:
-            return self._simulated(seconds, on_frame)
+            return self._check_simulated(seconds, on_frame)
         return self._real(seconds, on_frame)
 
-    def _simulated(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
+    def _check_simulated(self, seconds: float, on_frame: OnFrame) -> CameraCheck:
         """Deliver each frame a period after it was taken: the latency to be found."""
         from snakewalk.controller.cameras.rendered_camera import (  # noqa: PLC0415  simulator: an extra
             rendered_detector,

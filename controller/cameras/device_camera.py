@@ -131,7 +131,7 @@ class DeviceCamera:
         self._thread.join(timeout=PATIENCE_S)
         self._device.release()
 
-    def _look(self, frame: Image, time_s: float) -> LineDetection | TrackedPose:
+    def _search_frame(self, frame: Image, time_s: float) -> LineDetection | TrackedPose:
         """Search near the loop's estimate; anywhere while no loop answers."""
         while not self._answers.empty():  # for an abandoned frame
             self._answers.get_nowait()
@@ -160,7 +160,7 @@ class DeviceCamera:
                 self._on_picture(picture, time_s)
                 if taken % CHECK_FRAMES == 0:
                     self.detector = self.detector.registered(picture)
-                self._found.put(self._look(picture, time_s))
+                self._found.put(self._search_frame(picture, time_s))
             except InputError as fault:
                 self._found.put(InputError(f"{self._name}: {fault}"))
                 return

@@ -20,9 +20,9 @@ from snakewalk.controller.cameras.overhead_camera import OverheadDetector
 from snakewalk.controller.cameras.pose_tracking import REACH_M, BodyPrior, TrackedPose
 
 LEARN_EVERY_S: Final = 1.0
-_LONGEST_S: Final = 5.0  # longest time that one frame counts for, s
+_LONGEST_STEP_S: Final = 5.0  # longest time that one frame counts for, s
 _FITS: Final = 0.15  # of the radius: largest residual of a pose to learn from
-_BLEACHED: Final = 249.0  # grey levels: a brighter pixel is saturated
+_BLEACHED_LEVEL: Final = 249.0  # grey levels: a brighter pixel is saturated
 
 
 class FloorLearning:
@@ -62,9 +62,9 @@ class FloorLearning:
         self._last_s = tracked.time_s
         if self._floor is None or detector.background is not self._shown:  # or the camera moved
             self._floor = detector.background.astype(np.float32)
-        clear = cv2.inRange(image, (0.0,) * 3, (_BLEACHED,) * 3)
+        clear = cv2.inRange(image, (0.0,) * 3, (_BLEACHED_LEVEL,) * 3)
         free = cv2.subtract(clear, _body(detector, prior, tracked, self._robot))
-        part = 1.0 - float(np.exp(-min(passed_s, _LONGEST_S) / self._learn_s))
+        part = 1.0 - float(np.exp(-min(passed_s, _LONGEST_STEP_S) / self._learn_s))
         cv2.accumulateWeighted(in_light_of(image, detector.background), self._floor, part, free)
         self._shown = shown = np.asarray(cv2.convertScaleAbs(self._floor), dtype=np.uint8)
         pictured = detector.background if detector.pictured is None else detector.pictured

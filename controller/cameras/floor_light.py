@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Image
 
-_ONE: Final = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
+_UNIT_LIGHT: Final = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
 _DARKEST: Final = np.uint8(8)  # grey levels: a ratio to a darker level is meaningless
 _GLARE: Final = 0.3  # by which light may exceed that of the surroundings: soft edges (ours)
 _COARSE: Final = 4  # frame pixels per pixel of its wide light
@@ -29,7 +29,7 @@ def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:
     ``body_area_px``.
     """
     light = _light(image, floor, int(np.sqrt(2.0 * body_area_px)) + 1)
-    return np.asarray(cv2.multiply(floor, light, scale=1.0 / _ONE), dtype=np.uint8)
+    return np.asarray(cv2.multiply(floor, light, scale=1.0 / _UNIT_LIGHT), dtype=np.uint8)
 
 
 def banded_floor(image: Image, floor: Image) -> Image:
@@ -61,12 +61,14 @@ def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
     )
     light = _light(np.asarray(now, np.uint8), np.asarray(then, np.uint8), small[0] // 3)
     full_light = cv2.resize(np.maximum(light, 1), size, interpolation=cv2.INTER_LINEAR)
-    return np.asarray(cv2.divide(image, full_light, scale=_ONE, dtype=cv2.CV_32F), dtype=np.float32)
+    return np.asarray(
+        cv2.divide(image, full_light, scale=_UNIT_LIGHT, dtype=cv2.CV_32F), dtype=np.float32
+    )
 
 
 def _light(image: Image, floor: Image, side_px: int) -> Image:
     """(H, W[, 3]) factor of the floor's grey levels in a frame, in hundredths."""
-    ratio = cv2.divide(grey_of(image), np.maximum(grey_of(floor), _DARKEST), scale=_ONE)
+    ratio = cv2.divide(grey_of(image), np.maximum(grey_of(floor), _DARKEST), scale=_UNIT_LIGHT)
     light = np.asarray(
         cv2.medianBlur(np.asarray(ratio, dtype=np.uint8), min(side_px | 1, 255)), dtype=np.uint8
     )

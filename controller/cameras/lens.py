@@ -69,7 +69,7 @@ class Lens:
             raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
         if not file.is_file():
             raise InputError(why_no_file(file))
-        size, matrices = _stored(file)
+        size, matrices = _stored_matrices(file)
         faults = [
             f"{file}: holds no {name}"
             for name, value in zip(_MATRICES, matrices, strict=True)
@@ -112,7 +112,7 @@ def _numbers(value: Any) -> Floats:
         return np.zeros(0)
 
 
-def _stored(file: Path) -> tuple[list[float], list[Any]]:
+def _stored_matrices(file: Path) -> tuple[list[float], list[Any]]:
     """Width and height, and the two matrices; 0 and None for missing names.
 
     Raises:

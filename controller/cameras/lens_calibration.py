@@ -79,7 +79,7 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
             "needed and 15 are better; check pattern, squares, focus and light"
         )
     while True:
-        calibrated = _calibrated(used, size_px, len(views))
+        calibrated = _calibrated_lens(used, size_px, len(views))
         usual = float(np.nanmedian(calibrated.view_rms_px))
         keep = {
             k: view
@@ -91,7 +91,7 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
         used = keep
 
 
-def _calibrated(
+def _calibrated_lens(
     views: Mapping[int, BoardView], size_px: tuple[int, int], count: int
 ) -> LensCalibration:
     """Calibrate with all of ``views``, by their index among ``count``."""

@@ -44,12 +44,12 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _SHADOW = 0.02
 _LARGE_SHADOW = 0.05  # of the body's area: dark and colourless next to it (ours)
 _SURROUNDINGS = 0.25  # of the picture's width: a square in which the body is small
-_MOVED_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
-_HALF = 2  # reduction of the picture to match the floor
+_MOVED_CAMERA_PX, _FURTHEST_PX = 0.5, 24  # of a bumped camera's picture
+_SCALE_DOWN = 2  # reduction of the picture to match the floor
 _PARTS = 6, 4  # of a picture, across and down
-_BETTER = 0.8  # share of a part's squared residual, if a move explains it (ours)
+_BETTER_RESIDUAL = 0.8  # share of a part's squared residual, if a move explains it (ours)
 _LEAST_PARTS = 3
-_LIKE = 0.2  # correlation of two floor pictures, noise and robot included (ours)
+_LEAST_LIKENESS = 0.2  # correlation of two floor pictures, noise and robot included (ours)
 _SURFACE_ROUNDS = 6
 """Rounds in which the ray of a pixel meets the ground: on 30 degrees each leaves a third (ours)."""
 MISPLACED_M = 0.03
@@ -315,7 +315,7 @@ class OverheadDetector:
         back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
         off = np.hypot(*(projected(back, corners) - corners + self.model.moved_px).T)
         same = reference.left_out == now.left_out and reference.undone == now.undone
-        if same and off.max() < (_MOVED_PX if now.undone else np.inf):
+        if same and off.max() < (_MOVED_CAMERA_PX if now.undone else np.inf):
             return self
         if not now.undone:
             return replace(self, bump=now, first=first)
@@ -346,16 +346,16 @@ class OverheadDetector:
         worsens.
         """
         floor, now = (_texture(picture) for picture in (self.background, image))
-        far = _FURTHEST_PX // _HALF
+        far = _FURTHEST_PX // _SCALE_DOWN
         likeness = cv2.matchTemplate(now, floor[far:-far, far:-far], cv2.TM_CCOEFF_NORMED)
         _, best, _, (column, row) = cv2.minMaxLoc(likeness)
-        if best < _LIKE or not (0 < column < 2 * far and 0 < row < 2 * far):
+        if best < _LEAST_LIKENESS or not (0 < column < 2 * far and 0 < row < 2 * far):
             return self
         x, y = (
-            _HALF * (k - far + _peak(np.asarray(line[k - 1 : k + 2], dtype=float)))
+            _SCALE_DOWN * (k - far + _peak(np.asarray(line[k - 1 : k + 2], dtype=float)))
             for k, line in ((column, likeness[row]), (row, likeness[:, column]))
         )
-        if np.hypot(x, y) < _MOVED_PX:
+        if np.hypot(x, y) < _MOVED_CAMERA_PX:
             return self
         old = self.model.moved_px
         columns, rows = image.shape[1], image.shape[0]
@@ -425,7 +425,7 @@ class OverheadDetector:
             InputError: the frame's size differs from the background's.
 
         """
-        difference = self._apart(image)
+        difference = self._difference_from_floor(image)
         return BodyDetector(np.zeros_like(difference), Polarity.BOTH, "given").detect(difference)
 
     def outline(self, image: Image, time_s: float) -> LineDetection:
@@ -435,7 +435,7 @@ class OverheadDetector:
             InputError: the frame's size differs from the background's.
 
         """
-        difference = self._apart(image)
+        difference = self._difference_from_floor(image)
         body = silhouette_of(difference, np.zeros_like(difference), Polarity.BOTH)
         good = body.status is FrameStatus.GOOD
         skeleton = skeleton_of(body.mask) if good else no_skeleton(body.status)
@@ -443,7 +443,7 @@ class OverheadDetector:
         line = self.model.on_plane(points, self.axis_height_m)
         return LineDetection(time_s, line, skeleton.status)
 
-    def _apart(self, image: Image) -> Image:
+    def _difference_from_floor(self, image: Image) -> Image:
         """(H, W) grey levels of a frame's difference from its floor."""
         self._check_size(image)
         floor = self.background
@@ -475,7 +475,7 @@ def _next_to_shadow(
 def _texture(image: Image) -> NDArray[np.float32]:
     """(H / 2, W / 2) edges of a picture, without slow changes of light."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    half = grey.shape[1] // _HALF, grey.shape[0] // _HALF
+    half = grey.shape[1] // _SCALE_DOWN, grey.shape[0] // _SCALE_DOWN
     small = cv2.resize(grey, half, interpolation=cv2.INTER_AREA).astype(np.float32)
     fine, coarse = (cv2.GaussianBlur(small, (0, 0), reach) for reach in (1.0, 4.0))
     return np.asarray(np.clip(fine - coarse, -8.0, 8.0), dtype=np.float32)
@@ -484,13 +484,13 @@ def _texture(image: Image) -> NDArray[np.float32]:
 def _parts_explained(
     now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
 ) -> int:
-    far = _FURTHEST_PX // _HALF
+    far = _FURTHEST_PX // _SCALE_DOWN
     before, after = (
         cv2.resize(((now - texture) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA)
         for texture in (floor, moved)
     )
-    better = after < _BETTER * before
-    worse = before < _BETTER * after
+    better = after < _BETTER_RESIDUAL * before
+    worse = before < _BETTER_RESIDUAL * after
     return int(better.sum()) - int(worse.sum())
 
 

@@ -20,7 +20,7 @@ _BLUR_M = 0.003
 _TIPS_M = 0.02
 """Largest distance of the line's middle from the body's."""
 _STIFF = _BLUR_M / _TIPS_M  # keeps the total slide near 0, not one step
-_ALIKE = 0.2  # share of a link's variance common to all links (ours)
+_COMMON_ERROR = 0.2  # share of a link's variance common to all links (ours)
 _REGULAR = 3e-5  # limits slide and shift of a straight body, which are equivalent
 
 
@@ -58,9 +58,9 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     weight = np.ones(len(links))
     shift_along_m = 0.0
     for _ in range(_ROUNDS):
-        line, ahead = _along(line_m, arc, middle_m + shift_along_m)
+        line, ahead = _places_along_line(line_m, arc, middle_m + shift_along_m)
         turn, shift = _rigid(links, line, weight)
-        turned = _turned(links, turn)
+        turned = _turned_points(links, turn)
         away = line - turned - shift
         size = np.hypot(*away.T)
         usual = 1.4826 * float(np.median(size)) + 1e-4
@@ -76,7 +76,7 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     )
 
 
-def _along(line_m: Floats, arc: Floats, along: Floats) -> tuple[Floats, Floats]:
+def _places_along_line(line_m: Floats, arc: Floats, along: Floats) -> tuple[Floats, Floats]:
     """Places (L, 2) on the line and its directions; straight beyond its ends."""
     k = np.clip(np.searchsorted(arc, along), 1, len(arc) - 1)
     step = line_m[k] - line_m[k - 1]
@@ -117,8 +117,8 @@ def _covariance(links: Floats, ahead: Floats, weight: Floats, error_m: float) ->
     """(3, 3) of the head's place and heading; ``links`` (L, 2) are relative to the head."""
     matrix = _motions(links, ahead, weight)
     error_m = max(error_m, 0.5 * _BLUR_M)
-    turn = 12.0 * _ALIKE / float(np.square(links[-1] - links[0]).sum() + 1e-9)
-    least = error_m * error_m * np.diag([_ALIKE, _ALIKE, turn])
+    turn = 12.0 * _COMMON_ERROR / float(np.square(links[-1] - links[0]).sum() + 1e-9)
+    least = error_m * error_m * np.diag([_COMMON_ERROR, _COMMON_ERROR, turn])
     return np.asarray(error_m * error_m * np.linalg.inv(matrix.T @ matrix)[:3, :3] + least)
 
 
@@ -131,9 +131,9 @@ def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]
     cos = float((share * (p * q).sum(axis=1)).sum())
     size = float(np.hypot(sin, cos)) or 1.0
     turn = np.array([[cos, -sin], [sin, cos]]) / size
-    return turn, b - _turned(a, turn)
+    return turn, b - _turned_points(a, turn)
 
 
-def _turned(points: Floats, turn: Floats) -> Floats:
+def _turned_points(points: Floats, turn: Floats) -> Floats:
     """Points (..., 2) after ``turn`` (2, 2): ``points @ turn.T`` with a fixed order of sums."""
     return points[..., :1] * turn[:, 0] + points[..., 1:] * turn[:, 1]

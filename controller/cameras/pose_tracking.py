@@ -25,33 +25,33 @@ REACH_M: Final = 0.10
 _TURN_RAD: Final = 0.15
 _STEP_M, _STEP_RAD = 0.0125, 0.0375  # of the search
 _ROUNDS: Final = 8
-_WIDE: Final = 2.0  # initial half width of a section, radii
-_NARROW: Final = 1.5  # final one
-_STILL_M: Final = 3e-4  # a smaller step ends the fit
+_WIDE_SECTIONS: Final = 2.0  # initial half width of a section, radii
+_NARROW_SECTIONS: Final = 1.5  # final one
+_LEAST_STEP_M: Final = 3e-4  # a smaller step ends the fit
 _SAMPLES: Final = 17
-_OUTER: Final = 2  # of them, at each end of a section
-_FREE: Final = 0.3  # share of the body's contrast there, without another object (ours)
-_LEAST_FREE: Final = 0.5  # of the sections: with fewer free ones all are used
+_OUTER_SPOTS: Final = 2  # of them, at each end of a section
+_FREE_SECTION: Final = 0.3  # share of the body's contrast there, without another object (ours)
+_LEAST_FREE_SHARE: Final = 0.5  # of the sections: with fewer free ones all are used
 _TIP_IN_BLOCKS_M: Final = 0.009  # of a tip in a compressed frame, whose sections are worse (ours)
 _SECTION_M: Final = 0.003  # usual error of a section's middle
 _TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
 _CAP: Final = 0.4  # of the radius: a tip beyond its link
 _REGULAR: Final = np.array([1e-6, 1e-6, 1e-6])
-_LEAST_SEEN: Final = 0.7  # of the sections
-_LEAST_HALF: Final = 0.5  # of those of each half of the body
-_OFF: Final = 0.3  # of the radius: largest residual of an accepted fit
+_LEAST_SEEN_SHARE: Final = 0.7  # of the sections
+_LEAST_HALF_SHARE: Final = 0.5  # of those of each half of the body
+_LARGEST_ERROR_RADII: Final = 0.3  # of the radius: largest residual of an accepted fit
 _OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame (ours)
 _TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
 _NO_TIP: Final = "a tip of the body is not where it must be"
-_BOTH: Final = np.array([False, False])
-_ONE_HIDDEN: Final = np.array([True, False]), np.array([False, True])
-_SURE_M: Final = 0.008  # largest standard deviation of a pose with one hidden tip (ours)
+_NO_TIP_HIDDEN: Final = np.array([False, False])
+_ONE_TIP_HIDDEN: Final = np.array([True, False]), np.array([False, True])
+_SURE_SIGMA_M: Final = 0.008  # largest standard deviation of a pose with one hidden tip (ours)
 _UNKNOWN: Final = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows nothing
-_ALIKE: Final = 1.0  # adjacent sections have similar errors (ours)
-_ALIKE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
+_COMMON_VARIANCE: Final = 1.0  # adjacent sections have similar errors (ours)
+_COMMON_VARIANCE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
 _SHAPE: Final = 0.04  # radii: common error of all sections, from the body's look (ours)
-_THIN = 0.2
-_THICK = 1.5  # of the body's width: limits of a section's content
+_THINNEST_SECTION = 0.2
+_THICKEST_SECTION = 1.5  # of the body's width: limits of a section's content
 
 
 ToPixels = Callable[[Floats], Floats]
@@ -174,7 +174,7 @@ def _chain(robot: RobotConfig, prior: BodyPrior) -> _Chain:
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
+class _Comparison:
     """A chain at a shift and a turn, compared with a frame."""
 
     across: Floats
@@ -193,13 +193,13 @@ class _Look:
     """(K,) offsets of sections and tips, in their usual errors."""
 
 
-def _look(
+def _compare_frame(
     robot: RobotConfig,
     standing_out: StandingOut,
     chain: _Chain,
     place: tuple[Floats, float, float],
     hidden: NDArray[np.bool_],
-) -> _Look:
+) -> _Comparison:
     """Compare at a shift (2,), a turn and a half width of the sections in radii."""
     (shift, turn, wide), radius_m = place, robot.body_radius_m
     c, s = np.cos(turn), np.sin(turn)
@@ -217,11 +217,15 @@ def _look(
     count = section_spots.shape[0] * section_spots.shape[1]
     across, width = _sections(value[:count].reshape(section_spots.shape[:2]), off, radius_m)
     along, ends = _tips(value[count:].reshape(tip_spots.shape[:3]), off_tip)
-    sections = (width > _THIN) & (width < _THICK)
+    sections = (width > _THINNEST_SECTION) & (width < _THICKEST_SECTION)
     ends = ends & ~hidden
-    free = _outside(value[:count].reshape(section_spots.shape[:2])) < _FREE
+    free = _outside_difference(value[:count].reshape(section_spots.shape[:2])) < _FREE_SECTION
     used = sections & free
-    if wide != _NARROW or used.mean() < _LEAST_FREE or standing_out.compression is not None:
+    if (
+        wide != _NARROW_SECTIONS
+        or used.mean() < _LEAST_FREE_SHARE
+        or standing_out.compression is not None
+    ):
         used = sections
     tip_m = _TIP_M if standing_out.compression is None else _TIP_IN_BLOCKS_M
     normal = np.stack([-forward[:, 1], forward[:, 0]], axis=1)
@@ -229,7 +233,7 @@ def _look(
         [_rows(spun_m, normal)[used] / _SECTION_M, _rows(ends_m, out)[ends] / tip_m]
     )
     target = np.concatenate([across[used] / _SECTION_M, along[ends] / tip_m])
-    return _Look(across, sections, used, along, ends, rows, target)
+    return _Comparison(across, sections, used, along, ends, rows, target)
 
 
 def _fit(
@@ -243,11 +247,17 @@ def _fit(
 
     If only one tip is off its place, it counts as hidden.
     """
-    first_fit = _fit_tips(robot, standing_out, chain, time_s, start, _BOTH)
+    first_fit = _fit_tips(robot, standing_out, chain, time_s, start, _NO_TIP_HIDDEN)
     if first_fit.fault != _NO_TIP:
         return first_fit
-    tries = (_fit_tips(robot, standing_out, chain, time_s, start, hidden) for hidden in _ONE_HIDDEN)
-    good = [other_fit for other_fit in tries if not other_fit.fault and other_fit.sigma_m < _SURE_M]
+    tries = (
+        _fit_tips(robot, standing_out, chain, time_s, start, hidden) for hidden in _ONE_TIP_HIDDEN
+    )
+    good = [
+        other_fit
+        for other_fit in tries
+        if not other_fit.fault and other_fit.sigma_m < _SURE_SIGMA_M
+    ]
     return min(good, key=lambda candidate_fit: candidate_fit.error_m, default=first_fit)
 
 
@@ -260,10 +270,10 @@ def _fit_tips(
     hidden: NDArray[np.bool_],
 ) -> TrackedPose:
     shift, turn = start
-    wide = _WIDE
+    wide = _WIDE_SECTIONS
     for left in range(_ROUNDS, 0, -1):
-        wide = _NARROW if left <= _ROUNDS // 2 else wide
-        look = _look(robot, standing_out, chain, (shift, turn, wide), hidden)
+        wide = _NARROW_SECTIONS if left <= _ROUNDS // 2 else wide
+        look = _compare_frame(robot, standing_out, chain, (shift, turn, wide), hidden)
         if look.sections.sum() < 3:
             break
         size = np.abs(look.target)
@@ -272,10 +282,10 @@ def _fit_tips(
         step = least_squares(look.rows * weight[:, None], look.target * weight, _REGULAR)
         shift = shift + step[:2]
         turn = turn + float(step[2])
-        if float(np.hypot(*step[:2])) < _STILL_M:
-            if wide == _NARROW:
+        if float(np.hypot(*step[:2])) < _LEAST_STEP_M:
+            if wide == _NARROW_SECTIONS:
                 break
-            wide = _NARROW
+            wide = _NARROW_SECTIONS
     c, s = np.cos(turn), np.sin(turn)
     spin = np.array([[c, s], [-s, c]])
     head = spin.T @ (chain.head_m - chain.middle_m) + chain.middle_m + shift
@@ -283,7 +293,7 @@ def _fit_tips(
     off_m = look.across[look.used]
     error_m = float(np.sqrt(np.mean(off_m**2))) if off_m.size else np.inf
     blocks = standing_out.compression
-    alike = _ALIKE if blocks is None else _ALIKE_IN_BLOCKS * blocks.widening**2
+    alike = _COMMON_VARIANCE if blocks is None else _COMMON_VARIANCE_IN_BLOCKS * blocks.widening**2
     tracked = TrackedPose(
         time_s,
         head,
@@ -299,7 +309,7 @@ def _fit_tips(
     return replace(tracked, fault=str(blocks)) if vague else tracked
 
 
-def _covariance(robot: RobotConfig, look: _Look, head_m: Floats, alike: float) -> Floats:
+def _covariance(robot: RobotConfig, look: _Comparison, head_m: Floats, alike: float) -> Floats:
     """(3, 3) of the head at ``head_m`` from the middle of the sections."""
     size = np.abs(look.target)
     usual = max(1.0, 1.4826 * float(np.median(size))) if size.size else 1.0
@@ -373,9 +383,11 @@ def _sections(value: Floats, off: Floats, radius_m: float) -> tuple[Floats, Floa
     return (value @ off) / np.maximum(content, 1e-9), width
 
 
-def _outside(value: Floats) -> Floats:
+def _outside_difference(value: Floats) -> Floats:
     """(S,) difference at the outer ends of the sections (S, N), on the worse side."""
-    return np.asarray(np.maximum(value[:, :_OUTER].mean(axis=1), value[:, -_OUTER:].mean(axis=1)))
+    return np.asarray(
+        np.maximum(value[:, :_OUTER_SPOTS].mean(axis=1), value[:, -_OUTER_SPOTS:].mean(axis=1))
+    )
 
 
 def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floats]:
@@ -405,13 +417,16 @@ def _rows(r: Floats, direction: Floats) -> Floats:
     return np.column_stack([direction, turned])
 
 
-def _fault(robot: RobotConfig, look: _Look, error_m: float, shift: Floats) -> str:
+def _fault(robot: RobotConfig, look: _Comparison, error_m: float, shift: Floats) -> str:
     half = len(look.sections) // 2
     share = float(look.sections.mean())
     halves = look.sections[:half], look.sections[half:]
-    if share < _LEAST_SEEN or min(float(body_half.mean()) for body_half in halves) < _LEAST_HALF:
+    if (
+        share < _LEAST_SEEN_SHARE
+        or min(float(body_half.mean()) for body_half in halves) < _LEAST_HALF_SHARE
+    ):
         return f"{100.0 * share:.0f} % of the body is seen where it must be"
-    if error_m > _OFF * robot.body_radius_m:
+    if error_m > _LARGEST_ERROR_RADII * robot.body_radius_m:
         return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"
     if not look.ends.any():
         return "neither tip of the body is seen"

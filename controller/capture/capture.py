@@ -29,7 +29,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
 _FAINT_TAIL = 0.1  # of the length: expected error if something faint goes on beyond a tip
-_STILL = 0.02  # of the length: a smaller change does not count as motion
+_STILL_BODY = 0.02  # of the length: a smaller change does not count as motion
 
 
 _ADVICE = {
@@ -172,9 +172,9 @@ def captured_from(
     aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
     points = np.stack([skeleton.points_px for skeleton in aligned.skeletons])
     radius = np.stack([skeleton.radius_px for skeleton in aligned.skeletons])
-    if not part and _change(points) < _STILL:
+    if not part and _change(points) < _STILL_BODY:
         raise InputError(
-            f"{name}: no motion: the body changes by less than {_STILL:.0%} of its length in "
+            f"{name}: no motion: the body changes by less than {_STILL_BODY:.0%} of its length in "
             f"{len(points)} frames"
         )
     score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)

@@ -44,9 +44,18 @@ from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
 
-_MANY = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
-_EXPLAINED = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED, FrameStatus.LEFT_OUT}
-_TOO_FEW = 1.0 / 3.0  # of the frames that show the animal: fewer are used if its outline is unseen
+_MANY_UNEXPLAINED = (
+    1.0 / 3.0
+)  # share of frames that are not used from which the capture needs a look
+_EXPLAINED_STATUSES = {
+    FrameStatus.NOTHING,
+    FrameStatus.CUT,
+    FrameStatus.MERGED,
+    FrameStatus.LEFT_OUT,
+}
+_LEAST_USED = (
+    1.0 / 3.0
+)  # of the frames that show the animal: fewer are used if its outline is unseen
 _UNCLEAR = REJECTED | {
     FrameStatus.SEVERAL,
     FrameStatus.BLOB,
@@ -61,7 +70,7 @@ _BROKEN = {
     FrameStatus.EMPTY,
     FrameStatus.LENGTH,
 }  # the outline of the animal is not seen as one
-_HALF = 0.5  # of the frames with an outline
+_LEAST_AGREEING = 0.5  # of the frames with an outline
 _VARIES = 0.15  # of the length: most animals do not change their length so much (ours)
 _DOUBTFUL = 0.1  # of the length: expected error of a film with mostly broken outlines (ours)
 _INACCURATE = 0.015  # of the length: a larger expected error needs a look
@@ -203,7 +212,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         parts.folder.clear()
     facts = facts_of(options, footage, detector, captured, m_per_px, options.output)
     warn_of(options, footage, facts)
-    if len(_unexplained(captured)) >= _MANY * len(captured.status):
+    if len(_unexplained_statuses(captured)) >= _MANY_UNEXPLAINED * len(captured.status):
         better = remedy(options, film, detector)
         if better is not None:
             LOGGER.warning("%s: %s", options.recording, better)
@@ -249,12 +258,12 @@ def _captured_clearly(
         "shapes are in view; use other light, or give --background, --roi or --threshold"
     )
     try:
-        captured = _captured(parts, film, detector, bar)
+        captured = _captured_parts(parts, film, detector, bar)
     except UnusableFilmError as error:
-        if error.reason not in {None, *_EXPLAINED} and stands_out_both_ways(film.some):
+        if error.reason not in {None, *_EXPLAINED_STATUSES} and stands_out_both_ways(film.some):
             raise fault from None
         raise
-    few = captured.used.sum() < _TOO_FEW * len(_shown(captured))
+    few = captured.used.sum() < _LEAST_USED * len(_expected_statuses(captured))
     if few and stands_out_both_ways(film.some):
         raise fault
     check_chance_finds(options, captured)
@@ -283,11 +292,11 @@ def in_doubt(captured: Capture) -> Capture:
     """
     used = int(captured.used.sum())
     broken = sum(frame_status in _BROKEN for frame_status in captured.status)
-    unsolved = len(_shown(captured)) - used
+    unsolved = len(_expected_statuses(captured)) - used
     low, usual, high = np.nanpercentile(captured.length_px, (5.0, 50.0, 95.0))
     varies = float((high - low) / usual)
     contradicted = broken if varies < _VARIES else unsolved
-    if used >= _HALF * (used + contradicted):
+    if used >= _LEAST_AGREEING * (used + contradicted):
         return captured
     rough = {FrameStatus.GOOD: FrameStatus.ROUGH}
     least_px = max(_DOUBTFUL, varies) * captured.length_px
@@ -298,16 +307,16 @@ def in_doubt(captured: Capture) -> Capture:
     )
 
 
-def _shown(captured: Capture) -> list[FrameStatus]:
+def _expected_statuses(captured: Capture) -> list[FrameStatus]:
     """Statuses of the frames in which a whole animal is expected."""
     return [
         frame_status
         for frame_status in captured.status
-        if frame_status.has_points or frame_status not in _EXPLAINED
+        if frame_status.has_points or frame_status not in _EXPLAINED_STATUSES
     ]
 
 
-def _captured(
+def _captured_parts(
     parts: FilmParts, film: OpenedFilm, detector: BodyDetector, bar: ProgressBar
 ) -> Capture:
     first = len(film.stated_s)
@@ -408,8 +417,8 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
             f"head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
             f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
         )
-    unused = _unexplained(captured)
-    if len(unused) >= _MANY * len(captured.status):
+    unused = _unexplained_statuses(captured)
+    if len(unused) >= _MANY_UNEXPLAINED * len(captured.status):
         reason = max(dict.fromkeys(unused), key=unused.count)
         doubts.append(
             f"{len(unused)} of {len(captured.status)} frames are not used, mostly because "
@@ -427,12 +436,12 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
     return f"{options.recording}: {'. '.join(doubts)}" if doubts else None
 
 
-def _unexplained(captured: Capture) -> list[FrameStatus]:
+def _unexplained_statuses(captured: Capture) -> list[FrameStatus]:
     """Statuses of the frames that should show an animal and have no points."""
     return [
         frame_status
         for frame_status in captured.status
-        if not frame_status.has_points and frame_status not in _EXPLAINED
+        if not frame_status.has_points and frame_status not in _EXPLAINED_STATUSES
     ]
 
 

@@ -32,8 +32,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _SAMPLE = 40  # good frames from which the body and its usual residual are learnt
 _FEWEST = 5  # good frames
-_BETWEEN = 4  # good frames between two coils that are also solved
-_LONGEST = 400  # frames of a stretch
+_MOST_BETWEEN = 4  # good frames between two coils that are also solved
+_LONGEST_STRETCH = 400  # frames of a stretch
 _CHANGE = 2.0  # times the usual change from frame to frame, while a body coils
 _LEAST_CHANGE = (0.3, 0.3, 0.004, *[0.05] * COIL_BENDS)  # working px, log, rad
 _ROUNDS = 10
@@ -41,13 +41,18 @@ _AGREE = 0.02  # of the length: solutions further apart are two
 _RIVAL = 150.0  # squares of the usual residual: a solution of higher cost is rejected
 _OF_FIT, _OF_MODEL = 3.0, 2.5  # weight of the fit's own error and of its body's error
 _STEP = 100.0  # the same of a step from frame to frame
-_BESIDE = 3  # frames on both sides of a frame with two solutions, equally doubtful
-_LEFT_OVER = 0.015  # of the body's area, or
-_OF_USUAL = 3.0  # times what good frames leave
+_NEIGHBOURS = 3  # frames on both sides of a frame with two solutions, equally doubtful
+_MOST_UNEXPLAINED = 0.015  # of the body's area, or
+_MOST_OVER_USUAL = 3.0  # times what good frames leave
 COIL_LEAST = 1.4
 """Least error, relative to the usual expected error of the other frames."""
-_OTHERS = {FrameStatus.BLOB, FrameStatus.LARGER, FrameStatus.PART, FrameStatus.GHOST}  # or else
-COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_OTHERS}
+_UNCLEAR_STATUSES = {
+    FrameStatus.BLOB,
+    FrameStatus.LARGER,
+    FrameStatus.PART,
+    FrameStatus.GHOST,
+}  # or else
+COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_UNCLEAR_STATUSES}
 """Statuses that a coil may have."""
 
 
@@ -99,7 +104,7 @@ def solve_coils(
     known_errors_px = expected_px[good]
     own_px = float(np.nanmedian(known_errors_px)) if np.isfinite(known_errors_px).any() else 0.0
     for stretch in _stretches(coils, set(good)):
-        if len(stretch) > _LONGEST:
+        if len(stretch) > _LONGEST_STRETCH:
             continue
         solved = film.solved(stretch, out, own_px)
         if solved.turned:  # the later frames have the other end first
@@ -117,7 +122,7 @@ def _stretches(coils: Sequence[int], good: set[int]) -> list[list[int]]:
     out: list[list[int]] = []
     for k in coils:
         between = range(out[-1][-1] + 1, k) if out else range(0)
-        if out and len(between) <= _BETWEEN and good.issuperset(between):
+        if out and len(between) <= _MOST_BETWEEN and good.issuperset(between):
             out[-1] += [*between, k]
         else:
             out.append([k])
@@ -139,7 +144,7 @@ class _End:
 
 
 @dataclass(frozen=True, slots=True)
-class _Solved:
+class _SolvedStretch:
     """Result for the frames of a stretch."""
 
     skeletons: list[Skeleton]
@@ -180,7 +185,11 @@ class _Film:
             left.append(left_over(fit, body, shapes[k]))
             off = body.line(fit, shapes[k]) - body.line(values[k], shapes[k])
             misfit.append(float(np.hypot(*off.T).mean()))
-        steps = [_near(values[k], values[k - 1]) - values[k - 1] for k in good if k - 1 in values]
+        steps = [
+            _nearest_turns(values[k], values[k - 1]) - values[k - 1]
+            for k in good
+            if k - 1 in values
+        ]
         floor = np.square(_LEAST_CHANGE)
         spread = np.diag(floor)
         if len(steps) > _FEWEST:
@@ -195,20 +204,22 @@ class _Film:
             np.linalg.inv(spread),
         )
 
-    def solved(self, stretch: list[int], skeletons: Sequence[Skeleton], own_px: float) -> "_Solved":
+    def solved(
+        self, stretch: list[int], skeletons: Sequence[Skeleton], own_px: float
+    ) -> "_SolvedStretch":
         shapes = [Shape.of(self.outlines[k], self.body.scale) for k in stretch]
         before, after = (self._end(k, skeletons) for k in (stretch[0] - 1, stretch[-1] + 1))
         if before is None or after is None:
-            return _Solved(
-                [_unsolved(skeletons[k], FrameStatus.COIL_ALONE) for k in stretch],
+            return _SolvedStretch(
+                [_unsolved_skeleton(skeletons[k], FrameStatus.COIL_ALONE) for k in stretch],
                 [np.nan] * len(stretch),
                 turned=False,
             )
         best, turned = self._solution(shapes, before, after)
-        out = _Solved([], [], turned)
+        out = _SolvedStretch([], [], turned)
         for n, k in enumerate(stretch):
             solved_skeleton, status, error = skeletons[k], *self._check(n, best)
-            body = _unsolved(solved_skeleton, status)
+            body = _unsolved_skeleton(solved_skeleton, status)
             error_px = np.nan
             if status is FrameStatus.COIL:
                 line = self.body.line(best.values[n], shapes[n], 4 * SEGMENTS)
@@ -216,7 +227,7 @@ class _Film:
                 error_px = float(np.hypot(error / self.body.scale, own_px))
             is_beside_end = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
             if solved_skeleton.status is FrameStatus.GOOD and (
-                is_beside_end or _apart(solved_skeleton, body) < error_px
+                is_beside_end or _mean_distance_px(solved_skeleton, body) < error_px
             ):
                 body = solved_skeleton
                 error_px = np.nan  # the medial axis was right
@@ -238,22 +249,22 @@ class _Film:
     ) -> tuple[_Solution, bool]:
         """The stretch from both sides, and whether the ends changed places in it."""
         first, last = before.values, after.values
-        ahead = self._followed(shapes, first)
+        ahead = self._fitted_from_previous(shapes, first)
         turned = False
         if self._distance(ahead[-1], after.turned) < 0.5 * self._distance(ahead[-1], last):
-            back = self._followed(shapes[::-1], after.turned)[::-1]
+            back = self._fitted_from_previous(shapes[::-1], after.turned)[::-1]
             turned = self._distance(back[0], first) < 0.5 * self._distance(back[0], before.turned)
         if turned:
             last = after.turned
         else:
-            back = self._followed(shapes[::-1], last)[::-1]
+            back = self._fitted_from_previous(shapes[::-1], last)[::-1]
         chains = [ahead, back]
         both = first, last
-        whole_paths = [self._as_a_whole(chain, shapes, both) for chain in chains]
+        whole_paths = [self._fit_stretch(chain, shapes, both) for chain in chains]
         tried = [*chains, *(path.values for path in whole_paths)]
-        choice = np.argmin(self._ways(tried, shapes, both), axis=1)
+        choice = np.argmin(self._least_costs(tried, shapes, both), axis=1)
         joined = np.array([tried[source][n] for n, source in enumerate(choice)])
-        whole_paths.append(self._as_a_whole(joined, shapes, both))
+        whole_paths.append(self._fit_stretch(joined, shapes, both))
         whole_paths.sort(key=lambda whole_path: whole_path.cost)
         others = [*chains, *(path.values for path in whole_paths[1:])]
         rivals = self._rivals([whole_paths[0].values, *others], shapes, both)
@@ -263,7 +274,7 @@ class _Film:
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
         """(K,) distance of another solution of about the same cost, working px."""
-        ways = self._ways(chains, shapes, ends)
+        ways = self._least_costs(chains, shapes, ends)
         out = np.zeros(len(shapes))
         for n, row in enumerate(ways):
             for chain, cost in zip(chains[1:], row[1:], strict=True):
@@ -271,7 +282,7 @@ class _Film:
                     out[n] = max(out[n], self._distance(chain[n], chains[0][n]))
         return out
 
-    def _ways(
+    def _least_costs(
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
         """(K, chains) least cost of the stretch if a frame has its value from that chain.
@@ -300,7 +311,7 @@ class _Film:
         return np.asarray(np.array(before) + np.array(after[::-1]) - cost)
 
     def _step_cost(self, shape: Floats, other: Floats) -> float:
-        step = _near(other, shape) - shape
+        step = _nearest_turns(other, shape) - shape
         return float(step @ self.change @ step)
 
     def _distance(self, shape: Floats, other: Floats) -> float:
@@ -309,7 +320,7 @@ class _Film:
         lines = [curve(values, self.body.length, ends) for values in (shape, other)]
         return float(np.hypot(*(lines[0] - lines[1]).T).mean())
 
-    def _followed(self, shapes: Sequence[Shape], start: Floats) -> Floats:
+    def _fitted_from_previous(self, shapes: Sequence[Shape], start: Floats) -> Floats:
         """(K, PARAMETERS) each frame fitted from the one before it."""
         before = start
         shape_now = start
@@ -326,7 +337,7 @@ class _Film:
             out.append(shape_now)
         return np.array(out)
 
-    def _as_a_whole(
+    def _fit_stretch(
         self, chain: Floats, shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> _Solution:
         """Fit all frames of a stretch at once, tied to each other and to the good frames."""
@@ -389,13 +400,13 @@ class _Film:
         tie = self.change
         for n, end in ((0, ends[0]), (count - 1, ends[1])):
             systems[n] = systems[n] + tie
-            push[n] = push[n] + tie @ (_near(end, values[n]) - values[n])
+            push[n] = push[n] + tie @ (_nearest_turns(end, values[n]) - values[n])
         for n in range(count - 1):
             off = tie @ (values[n + 1] - values[n])
             push[n] = push[n] + off
             push[n + 1] = push[n + 1] - off
-        before = self._eliminated(systems, push)
-        after = self._eliminated(systems[::-1], push[::-1])[::-1]
+        before = self._eliminated_frames(systems, push)
+        after = self._eliminated_frames(systems[::-1], push[::-1])[::-1]
         steps = []
         covariance = []
         for n in range(count):
@@ -405,7 +416,7 @@ class _Film:
             steps.append(inverse @ (push[n] + before[n][1] + after[n][1]))
         return np.array(steps), np.array(covariance)
 
-    def _eliminated(
+    def _eliminated_frames(
         self, systems: Sequence[Floats], push: Sequence[Floats]
     ) -> list[tuple[Floats, Floats]]:
         """Information and push that the frames before each frame add."""
@@ -425,10 +436,10 @@ class _Film:
 
     def _check(self, n: int, best: _Solution) -> tuple[FrameStatus, float]:
         """Whether all solutions of a frame agree, and their possible error, working px."""
-        strange = best.left > max(_LEFT_OVER, _OF_USUAL * self.left)
+        strange = best.left > max(_MOST_UNEXPLAINED, _MOST_OVER_USUAL * self.left)
         if strange[n]:
             return FrameStatus.COIL_UNLIKE, np.nan
-        neighbour_gaps = best.apart[max(0, n - _BESIDE) : n + _BESIDE + 1]
+        neighbour_gaps = best.apart[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1]
         leaps = best.steps > _STEP
         leaps[:-1] |= strange
         tied = not leaps[: n + 1].any() or not leaps[n + 1 :].any()
@@ -448,17 +459,17 @@ class _Film:
         return Skeleton(points, radius / self.body.scale, length, FrameStatus.COIL)
 
 
-def _unsolved(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
+def _unsolved_skeleton(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
     """Skeleton of a frame that is not solved, with its own reason if it may not be a coil."""
-    return skeleton if skeleton.status in _OTHERS else no_skeleton(status)
+    return skeleton if skeleton.status in _UNCLEAR_STATUSES else no_skeleton(status)
 
 
-def _apart(skeleton: Skeleton, other: Skeleton) -> float:
+def _mean_distance_px(skeleton: Skeleton, other: Skeleton) -> float:
     """Mean distance of corresponding points, px."""
     return float(np.hypot(*(skeleton.points_px - other.points_px).T).mean())
 
 
-def _near(values: Floats, reference: Floats) -> Floats:
+def _nearest_turns(values: Floats, reference: Floats) -> Floats:
     """The same body, its angles nearest to those of another by whole turns."""
     turns = np.rint((values[3:] - reference[3:]).mean() / (2.0 * np.pi))
     out = values.copy()

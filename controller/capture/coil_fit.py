@@ -27,17 +27,17 @@ WIDTH_PX = 8.0
 """Greatest width of the body during the fit, working px."""
 _DISCS = 60
 _MARGIN_PX = 14  # working px around a silhouette
-_HALF = 127.5  # of a packed silhouette: its boundary
+_THRESHOLD_GREY = 127.5  # of a packed silhouette: its boundary
 _HOLE = 0.1  # squares of the width: a smaller hole is a light spot
-_COARSE = (1.5, 0.3)
-_FINE = (0.4, 0.2)  # of the width: largest distance outside and inside
+_COARSE_SPOTS = (1.5, 0.3)
+_FINE_SPOTS = (0.4, 0.2)  # of the width: largest distance outside and inside
 _ROUNDS = 12
-_SETTLED = 1e-3  # of the cost
-_TOGETHER = 9.0  # neighbouring pixels with nearly the same residual
+_LEAST_GAIN = 1e-3  # of the cost
+_COMMON_PIXELS = 9.0  # neighbouring pixels with nearly the same residual
 _LEAST_PX = 0.25  # working px: the residual of a silhouette of pixels
 _LENGTH = 0.015  # prior standard deviation of the log of a frame's length
 _STIFF = 2.0  # rad, of second differences of the bends
-_APART_PX = 1.25  # working px on both sides of the boundary: the edge
+_LEAST_GAP_PX = 1.25  # working px on both sides of the boundary: the edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +56,13 @@ class Outline:
         scale = 1.0 if width_px == 0.0 else min(1.0, 2.0 * WIDTH_PX / width_px)
         level = silhouette.level
         if scale < 1.0:
-            level = np.asarray(_resized(level, scale), dtype=np.float32)
-        grey = np.clip(np.rint(level * (_HALF / silhouette.threshold)), 0.0, 255.0)
+            level = np.asarray(_resized_picture(level, scale), dtype=np.float32)
+        grey = np.clip(np.rint(level * (_THRESHOLD_GREY / silhouette.threshold)), 0.0, 255.0)
         packed = cv2.imencode(".png", grey.astype(np.uint8))[1]
         return cls(np.asarray(packed, dtype=np.uint8), silhouette.origin_px, scale)
 
 
-def _resized(level: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+def _resized_picture(level: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
     """The resized picture; pixel centres at ``(x + 0.5) scale - 0.5``."""
     if scale < 1.0:
         level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
@@ -93,8 +93,8 @@ class Shape:
     def of(cls, outline: Outline, scale: float) -> "Shape":
         """Unpack a silhouette at ``scale`` working pixels a pixel."""
         level = np.asarray(cv2.imdecode(outline.packed, cv2.IMREAD_GRAYSCALE), dtype=np.float32)
-        fine = np.pad(_resized(level, scale / outline.scale), _MARGIN_PX)
-        solid = (fine > _HALF).astype(np.uint8)
+        fine = np.pad(_resized_picture(level, scale / outline.scale), _MARGIN_PX)
+        solid = (fine > _THRESHOLD_GREY).astype(np.uint8)
         count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
         for k in range(1, count):
             if k != label[0, 0] and stats[k, cv2.CC_STAT_AREA] < _HOLE * WIDTH_PX**2:
@@ -243,7 +243,7 @@ def normal_of(
 
     """
     line = body.line(values, shape)
-    low, high = (v * WIDTH_PX for v in (_COARSE if coarse else _FINE))
+    low, high = (v * WIDTH_PX for v in (_COARSE_SPOTS if coarse else _FINE_SPOTS))
     depth, nearest = body_depth(line, body.half_width, shape, low)
     clipped = np.clip(shape.depth, -low, high)
     rest = clipped - np.clip(depth, -low, high)
@@ -254,7 +254,7 @@ def normal_of(
     away /= np.maximum(np.hypot(*away.T), 0.5)[:, None]
     slopes = line_slopes(values, body.length)[disc]
     jacobian = (away[:, :, None] * slopes).sum(axis=1)
-    heavy = 1.0 / (squares * _TOGETHER)
+    heavy = 1.0 / (squares * _COMMON_PIXELS)
     mean = float((rest[near] ** 2).mean())
     prior, target = _own_prior(values)
     information = heavy * (jacobian.T @ jacobian) + prior.T @ prior
@@ -297,7 +297,7 @@ def fit_coil(
                 off = prior[0] - values
                 cost += float(off @ prior[1] @ off)
             if cost < best:
-                done = best - cost < _SETTLED * cost
+                done = best - cost < _LEAST_GAIN * cost
                 best = cost
                 kept = values
                 normal = trial
@@ -320,8 +320,8 @@ def fit_coil(
 def left_over(values: Floats, body: CoilBody, shape: Shape) -> float:
     """Area that only the body or only the silhouette covers, beyond the edges, of the body's."""
     line = body.line(values, shape)
-    depth, _ = body_depth(line, body.half_width, shape, 2.0 * _APART_PX)
-    alone = (depth > _APART_PX) & (shape.depth < -_APART_PX)
-    bare = (depth < -_APART_PX) & (shape.depth > _APART_PX)
+    depth, _ = body_depth(line, body.half_width, shape, 2.0 * _LEAST_GAP_PX)
+    alone = (depth > _LEAST_GAP_PX) & (shape.depth < -_LEAST_GAP_PX)
+    bare = (depth < -_LEAST_GAP_PX) & (shape.depth > _LEAST_GAP_PX)
     area = 2.0 * float(body.half_width.mean()) * body.length
     return float(np.count_nonzero(alone | bare)) / area

@@ -23,7 +23,7 @@ from snakewalk.controller.images.equipartition import NoEquipartitionError, equi
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_LONGEST: Final = 4.0
+_LONGEST_LINE: Final = 4.0
 """Longest line, as a multiple of the film's usual length (ours)."""
 
 
@@ -147,7 +147,7 @@ def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats
     """The drawn line at equal chords, with the usual thickness."""
     line = np.array(drawn.points_px, dtype=float)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum()) if np.isfinite(line).all() else 0.0
-    if not 1.0 < length < _LONGEST * usual_px:
+    if not 1.0 < length < _LONGEST_LINE * usual_px:
         raise InputError(
             f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px; "
             "redraw it"

@@ -24,7 +24,7 @@ _BAND = 0.6  # of the longest light band: another one may be hidden beyond a thi
 _WITHOUT_OUTLINE = {FrameStatus.NOTHING, FrameStatus.CUT, FrameStatus.MERGED}
 _CLEAR_FRAMES = 0.5  # of the frames with an outline
 _NOISY = 0.35  # of half of the contrast: pattern and noise of the ground break outlines (measured)
-_HIDDEN = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
+_HIDDEN_PART = 0.1  # of the length: error if half of the contrast of the faint parts is only noise
 # because a tail that fades into the noise goes on beyond its visible end (measured on larvae)
 
 
@@ -96,14 +96,14 @@ class Detections:
                 self.tails += 1
             elif detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
-                axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN * hidden**2 * body.length_px)
+                axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN_PART * hidden**2 * body.length_px)
                 self.bands_px.append(_longest_band_px(body, detection))
                 self.faint_error_px[number] = axis_px
         may_coil = body.status in COILS and silhouette.status is FrameStatus.GOOD
         if may_coil or (body.status is FrameStatus.GOOD and not is_tailed):
             width_px = 2.0 * float(np.max(body.radius_px))
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
-        self._keep(number, frame, detection)
+        self._keep_surroundings(number, frame, detection)
         if body.length_px <= LONGEST_PX and not (detection.faint_parts or is_tailed):
             self._last = number
             self._points = body.points_px
@@ -152,7 +152,7 @@ class Detections:
         self.axis_error_px.append(np.nan)
         self.ends_px.append(NO_ENDS)
 
-    def _keep(self, number: int, frame: DeepImage, detection: Detection) -> None:
+    def _keep_surroundings(self, number: int, frame: DeepImage, detection: Detection) -> None:
         """Keep the surroundings of the silhouette and of the last place of a small body."""
         body = detection.silhouette
         corner = np.array([body.origin_px, np.add(body.origin_px, body.level.shape[::-1])])

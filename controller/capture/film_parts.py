@@ -26,7 +26,7 @@ PART_FRAMES: Final = 1000
 """Frames of a part (ours)."""
 _LONGEST_PART: Final = 1500
 _CALM: Final = 5  # good frames before the end of a part
-_GIVEN: Final = 1e9  # weight of a part whose head the user has named
+_GIVEN_WEIGHT: Final = 1e9  # weight of a part whose head the user has named
 _SUREST: Final = 0.9999
 _ARRAYS: Final = ("points_px", "radius_px", "length_px", "expected_px", "distractors")
 
@@ -45,7 +45,7 @@ class FilmParts:
     """Folder of the finished parts; None: they stay in memory."""
     part_frames: int = PART_FRAMES
     finished: list[FinishedPart] = field(default_factory=list)
-    _found: Detections = field(default_factory=Detections)
+    _detections: Detections = field(default_factory=Detections)
     _done: int = 0
 
     def __post_init__(self) -> None:
@@ -59,18 +59,18 @@ class FilmParts:
 
     def add(self, frame: DeepImage, detection: Detection, at_s: float = float("nan")) -> None:
         """Add the next frame; ``at_s`` is the time that the film states."""
-        self._found.add(frame, detection)
-        self._counted(at_s)
+        self._detections.add(frame, detection)
+        self._count_frames(at_s)
 
     def skip(self, status: FrameStatus) -> None:
         """Add a frame in which the animal is not searched for."""
-        self._found.skip(status)
-        self._counted(float("nan"))
+        self._detections.skip(status)
+        self._count_frames(float("nan"))
 
-    def _counted(self, at_s: float) -> None:
-        self._found.stated_s.append(at_s)
+    def _count_frames(self, at_s: float) -> None:
+        self._detections.stated_s.append(at_s)
         self._done += 1
-        bodies = self._found.skeletons
+        bodies = self._detections.skeletons
         if len(bodies) < self.part_frames or self.count - self._done < self.part_frames // 2:
             return
         calm = all(body.status is FrameStatus.GOOD for body in bodies[-_CALM:])
@@ -78,7 +78,7 @@ class FilmParts:
             self._finish()
 
     def _finish(self) -> None:
-        detections = self._found
+        detections = self._detections
         part = captured_from(
             detections,
             self.rate_hz,
@@ -91,7 +91,7 @@ class FilmParts:
         number = len(self.finished)
         kept = FinishedPart.of(part) if self.folder is None else self.folder.add(number, part)
         self.finished.append(kept)
-        self._found = Detections()
+        self._detections = Detections()
 
     def _head(self) -> tuple[float, float] | None:
         """The given place of the head, in the first part with a body only."""
@@ -107,9 +107,13 @@ class FilmParts:
         """
         if not self.finished:
             return captured_from(
-                self._found, self.rate_hz, name=self.name, head_px=self.head_px, fixed=self.fixed
+                self._detections,
+                self.rate_hz,
+                name=self.name,
+                head_px=self.head_px,
+                fixed=self.fixed,
             )
-        if self._found.skeletons:
+        if self._detections.skeletons:
             self._finish()
         folder = None if self.folder is None else self.folder.large_files
         return joined(self.finished, self.rate_hz, self.name, folder)
@@ -139,7 +143,7 @@ def joined(
     status: list[FrameStatus] = []
     fixed = True
     for film_part, s in zip(parts, sign, strict=True):
-        part = _reversed(film_part.read()) if s * score < 0.0 else film_part.read()
+        part = _reversed_capture(film_part.read()) if s * score < 0.0 else film_part.read()
         fixed = part.places_recorded
         for array_name in _ARRAYS:
             values = getattr(part, array_name)
@@ -177,7 +181,7 @@ def _signs(parts: Sequence[FinishedPart]) -> list[int]:
 
 def _head_of(parts: Sequence[FinishedPart], sign: Sequence[int]) -> tuple[float, str]:
     """Whether the first end of the first part is the head: the mean log-odds of all parts."""
-    weights = [part.used * (part.head_by != "given" or _GIVEN) for part in parts]
+    weights = [part.used * (part.head_by != "given" or _GIVEN_WEIGHT) for part in parts]
     if not any(weights):
         return 0.0, "taper"
     odds = [
@@ -188,7 +192,7 @@ def _head_of(parts: Sequence[FinishedPart], sign: Sequence[int]) -> tuple[float,
     return float(np.tanh(sum(odds) / sum(weights))), parts[strongest].head_by
 
 
-def _reversed(capture: Capture) -> Capture:
+def _reversed_capture(capture: Capture) -> Capture:
     return replace(
         capture, points_px=capture.points_px[:, ::-1], radius_px=capture.radius_px[:, ::-1]
     )

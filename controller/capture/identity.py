@@ -16,20 +16,22 @@ from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import track_from_points
 from snakewalk.controller.track.wave import measure_wave
 
-_SURE = 0.2  # margin from which one frame is enough to distinguish the ends
+_SURE_MARGIN = 0.2  # margin from which one frame is enough to distinguish the ends
 _WAVE_FRAMES = 8  # from which a wave's direction is looked at
 _BY_TRAVEL = 4.0  # log-odds of the first end, by its sign (from films with known heads)
 _BY_SLOW_TRAVEL = 1.0  # the same where the travel may be that of the camera
 _BY_WAVE = 4.0
 _BY_TAPER, _MOST_BY_TAPER = 8.0, 6.0
-_EVEN = 0.1  # of the mean thickness: a smaller taper says nothing
-_SHARED = 0.5  # share of the weaker of travel and wave: both turn if an animal moves backwards
+_EVEN_TAPER = 0.1  # of the mean thickness: a smaller taper says nothing
+_WEAKER_SHARE = (
+    0.5  # share of the weaker of travel and wave: both turn if an animal moves backwards
+)
 _DECIDES = 1.0  # log-odds from which a sign is named as the reason, in the order of the signs
 _TRAVEL_S = 0.25
 _TRAVEL_PX = 1.0  # over that time; less is what a camera that goes with the animal by pixels leaves
 _TRAVEL_OF_WAVE = 0.075  # of the wave's speed: less travel is that of the camera, not of the animal
 _CONTRARY = 0.25  # of the mean thickness: a taper that contradicts the motion
-_DOUBTED = 0.2  # certainty of a head that the taper contradicts: an animal may move backwards
+_DOUBTED_SCORE = 0.2  # certainty of a head that the taper contradicts: an animal may move backwards
 _GAP = 3  # frames without a skeleton after which the place alone is not enough
 
 
@@ -66,7 +68,7 @@ def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
             continue
         before = good[number - 1]
         margin = margin_of(out[k], out[before])
-        if abs(margin) < _SURE or k - before > _GAP:
+        if abs(margin) < _SURE_MARGIN or k - before > _GAP:
             thick = _agreement(_asymmetry(out[k]), profile)
             margin = margin if abs(margin) > 2.0 * abs(thick) else thick
         if margin < 0.0:
@@ -161,7 +163,7 @@ def head_end(
     """Which end is the head: given, or by the log-odds of travel, wave and taper.
 
     Both motions turn together if an animal moves backwards, so the weaker one counts half. If a
-    clear taper contradicts the motion, the score is at most ``_DOUBTED``.
+    clear taper contradicts the motion, the score is at most ``_DOUBTED_SCORE``.
 
     Args:
         points: (T, P, 2) pixels, the same end first in all; NaN for a frame without a body.
@@ -196,12 +198,16 @@ def head_end(
     by_wave = 0.0 if wave is None else _BY_WAVE * (1.0 - 2.0 * wave.headward)
     weaker, stronger = sorted((by_travel, by_wave), key=abs)
     taper = taper_score(radius[good])
-    return _weighed(stronger + _SHARED * weaker, taper, {"travel": by_travel, "wave": by_wave})
+    return _weighed_score(
+        stronger + _WEAKER_SHARE * weaker, taper, {"travel": by_travel, "wave": by_wave}
+    )
 
 
-def _weighed(motion: float, taper: float, signs: dict[str, float]) -> tuple[float, str]:
+def _weighed_score(motion: float, taper: float, signs: dict[str, float]) -> tuple[float, str]:
     """The score by the log-odds of the motion and by a taper, and its reason among all signs."""
-    by_taper = np.copysign(min(_BY_TAPER * max(abs(taper) - _EVEN, 0.0), _MOST_BY_TAPER), taper)
+    by_taper = np.copysign(
+        min(_BY_TAPER * max(abs(taper) - _EVEN_TAPER, 0.0), _MOST_BY_TAPER), taper
+    )
     total = motion + float(by_taper)
     signs = {**signs, "taper": float(by_taper)}
     agreeing = {by: abs(sign) for by, sign in signs.items() if sign * total > 0.0}
@@ -211,5 +217,5 @@ def _weighed(motion: float, taper: float, signs: dict[str, float]) -> tuple[floa
     by = next(clear, max(agreeing, key=lambda name: agreeing[name]))
     score = float(np.tanh(0.5 * total))
     if motion * taper < 0.0 and abs(taper) >= _CONTRARY:
-        score = float(np.clip(score, -_DOUBTED, _DOUBTED))
+        score = float(np.clip(score, -_DOUBTED_SCORE, _DOUBTED_SCORE))
     return score, by

@@ -17,7 +17,7 @@ _SPREADS = 6.0  # standard deviations, estimated from the median deviation
 _LENGTH = 0.06  # of the median: smaller deviations are ignored
 _AREA = 0.08
 _THICK = 0.3
-_LEAST_PX = 0.3
+_LEAST_RADIUS_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
 _FAINT = 0.25  # of the usual contrast: below, compression and noise of an empty frame
@@ -61,7 +61,7 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     area = _deviation(area_px[good], _AREA)
     radius = uniform_filter1d(np.stack([out[k].radius_px for k in good]), _STRETCH, axis=1)
     radius = radius[:, _TIPS:-_TIPS]
-    median = np.maximum(np.median(radius, axis=0), _LEAST_PX)
+    median = np.maximum(np.median(radius, axis=0), _LEAST_RADIUS_PX)
     spread = 1.4826 * np.median(np.abs(radius / median - 1.0), axis=0)
     most = np.maximum(_THICK, _SPREADS * spread)
     # after a coil the other end may be first, which makes no body thick

@@ -23,13 +23,13 @@ from snakewalk.controller.images.video import in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _TEMPLATE: Final = Path(__file__).with_name("review.html")
-_LARGEST_PX: Final = 1280
-_SMALLEST_PX: Final = 320
+_LARGEST_SIDE_PX: Final = 1280
+_SMALLEST_SIDE_PX: Final = 320
 """Longest side of the pictures on the page."""
 _MOST_BYTES: Final = 150_000_000
 """Limit for all pictures together (ours): a browser opens such a page in seconds."""
 _QUALITY: Final = 85
-_WORDS: Final = [str(frame_status) for frame_status in FrameStatus]
+_STATUS_TEXTS: Final = [str(frame_status) for frame_status in FrameStatus]
 
 
 def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
@@ -45,11 +45,11 @@ def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
 
     """
     longest: int = max(max(frame.shape[:2]) for frame in some)
-    scale = min(1.0, _LARGEST_PX / longest)
-    expected = count * float(np.mean([len(_packed(frame, scale)) for frame in some]))
+    scale = min(1.0, _LARGEST_SIDE_PX / longest)
+    expected = count * float(np.mean([len(_packed_picture(frame, scale)) for frame in some]))
     if expected > _MOST_BYTES:
         scale *= math.sqrt(_MOST_BYTES / expected)
-        if scale * longest < _SMALLEST_PX:
+        if scale * longest < _SMALLEST_SIDE_PX:
             raise InputError(
                 f"{name}: a page with pictures of {count} frames would be too large for a browser; "
                 "capture a part of the film, or look at less of the picture by --roi"
@@ -82,7 +82,7 @@ def review_page(
     sizes: list[tuple[int, int]] = []
     for frame in frames:
         sizes.append((frame.shape[1], frame.shape[0]))
-        pictures.append(base64.b64encode(_packed(frame, scale)).decode())
+        pictures.append(base64.b64encode(_packed_picture(frame, scale)).decode())
         if on_progress is not None:
             on_progress()
     data = {
@@ -91,7 +91,7 @@ def review_page(
         "time_s": np.round(captured.time_s, 4).tolist(),
         "origin": list(origin_px),
         "sizes": sizes,
-        "words": _WORDS,
+        "words": _STATUS_TEXTS,
         "animals": [_of_animal(animal, file) for animal, file in zip(animals, tracks, strict=True)],
         "images": pictures[: len(captured.status)],
     }
@@ -120,7 +120,7 @@ def _of_animal(file: CaptureFile, track: Path) -> dict[str, Any]:
             ]
         ),
         "length": round(float(np.nanmedian(captured.length_px)), 2),
-        "status": [_WORDS.index(str(frame_status)) for frame_status in captured.status],
+        "status": [_STATUS_TEXTS.index(str(frame_status)) for frame_status in captured.status],
         "points": [
             np.round(line, 2).ravel().tolist() if np.isfinite(line).all() else None
             for line in captured.points_px
@@ -130,7 +130,7 @@ def _of_animal(file: CaptureFile, track: Path) -> dict[str, Any]:
     }
 
 
-def _packed(frame: DeepImage, scale: float) -> bytes:
+def _packed_picture(frame: DeepImage, scale: float) -> bytes:
     if scale < 1.0:
         size = tuple(max(1, round(side * scale)) for side in frame.shape[1::-1])
         frame = as_deep_as(frame, cv2.resize(frame, size, interpolation=cv2.INTER_AREA))

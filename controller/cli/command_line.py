@@ -104,15 +104,15 @@ def former_name(words: Sequence[str], names: Collection[str]) -> tuple[str, str]
     for count in (2, 1):
         old = " ".join(words[:count])
         new = FORMER.get(old, "")
-        if not new or not _below(new, names):
+        if not new or not _words_below(new, names):
             continue
-        kinds = _below(old, names)
+        kinds = _words_below(old, names)
         if not kinds or (new.startswith(f"{old} ") and _is_argument(words[count:], kinds)):
             return old, new
     return None
 
 
-def _below(words: str, names: Collection[str]) -> list[str]:
+def _words_below(words: str, names: Collection[str]) -> list[str]:
     """Return the words that follow, an empty one for a command of this name."""
     return [
         f"{name} ".removeprefix(f"{words} ") for name in names if f"{name} ".startswith(f"{words} ")
@@ -129,7 +129,7 @@ def _is_argument(rest: Sequence[str], kinds: Sequence[str]) -> bool:
     )
 
 
-_FIRST: Final = (*VERBS, *(words for words in FAMILIES if " " not in words))
+_FIRST_WORDS: Final = (*VERBS, *(words for words in FAMILIES if " " not in words))
 """First words in the order of ``--help``; those of other packages follow by name."""
 _COMMON: Final = ("robot", "world", "run", "motion", "port", "seconds")
 """Options that come first in the help of a command; the others follow as declared."""
@@ -167,12 +167,16 @@ class CommandGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the words that may follow."""
-        words = dict.fromkeys(_next_word(plugin, self.prefix) for plugin in _listed(self.prefix))
+        words = dict.fromkeys(
+            _next_word(plugin, self.prefix) for plugin in _listed_commands(self.prefix)
+        )
         return [*words]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command with its options, a family, or None."""
-        entries = [e for e in _listed(self.prefix) if _next_word(e, self.prefix) == cmd_name]
+        entries = [
+            e for e in _listed_commands(self.prefix) if _next_word(e, self.prefix) == cmd_name
+        ]
         if not entries:
             return None
         path = f"{self.prefix} {cmd_name}".strip()
@@ -200,7 +204,9 @@ class CommandGroup(TyperGroup):
         near = get_close_matches(word, self.list_commands(ctx), 2, 0.7)
         meant = [f"{self.prefix} {suggestion}".strip() for suggestion in near]
         if not meant:
-            names = {plugin.name.split()[-1]: plugin.name for plugin in reversed(_listed(""))}
+            names = {
+                plugin.name.split()[-1]: plugin.name for plugin in reversed(_listed_commands(""))
+            }
             meant = [names[close_match] for close_match in get_close_matches(word, names, 1, 0.8)]
         return f"; did you mean {' or '.join(meant)}?" if meant else ""
 
@@ -213,7 +219,7 @@ class CommandGroup(TyperGroup):
             formatter.write_usage(ctx.command_path, _USAGE)
             formatter.write(f"{self.help}\n")
             groups: dict[str, list[tuple[str, str]]] = {}
-            for name, title in {_next_word(e, ""): _title(e) for e in _listed("")}.items():
+            for name, title in {_next_word(e, ""): _title(e) for e in _listed_commands("")}.items():
                 groups.setdefault(title, []).append((name, self.get_command(ctx, name).help))
             for title, rows in groups.items():
                 formatter.write(f"{title}\n")
@@ -267,7 +273,7 @@ class CommandGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Read the words of a command line; a former name of a command becomes the current one."""
-        names = {plugin.name for plugin in _listed("")}
+        names = {plugin.name for plugin in _listed_commands("")}
         renamed = None if self.prefix else former_name(args, names)
         if renamed is not None:
             old, new = renamed
@@ -302,7 +308,7 @@ def _print_fault(error: Any) -> None:
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 
-def _listed(prefix: str) -> list[Plugin]:
+def _listed_commands(prefix: str) -> list[Plugin]:
     """Return the commands below a prefix in the order of ``--help``."""
     commands: dict[str, Plugin] = {}
     for plugin in plugins("command"):
@@ -311,7 +317,9 @@ def _listed(prefix: str) -> list[Plugin]:
 
     def order(plugin: Plugin) -> tuple[int, str]:
         first = plugin.name.split()[0]
-        return _FIRST.index(first) if first in _FIRST else len(_FIRST), plugin.name
+        return _FIRST_WORDS.index(first) if first in _FIRST_WORDS else len(
+            _FIRST_WORDS
+        ), plugin.name
 
     return sorted(commands.values(), key=order)
 
@@ -319,7 +327,7 @@ def _listed(prefix: str) -> list[Plugin]:
 def _title(plugin: Plugin) -> str:
     """Return the group of a command, or of its family, in ``--help`` of the first level."""
     first = plugin.name.split()[0]
-    if first in _FIRST:
+    if first in _FIRST_WORDS:
         return EVERY_DAY if first in VERBS else SUBJECTS
     return plugin.group or OTHERS
 

@@ -91,7 +91,7 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
     if file.suffix != ".py" or not file.is_file():
         return None
     tree = ast.parse(file.read_text(encoding="utf-8"))
-    defined = {name: node for node in tree.body for name in _defined(node)}
+    defined = {name: node for node in tree.body for name in _defined_names(node)}
     namespace: dict[str, Any] = {"__name__": module, "__file__": str(file)}
     needed: dict[ast.stmt, set[str]] = {}
     waiting = sorted(names)
@@ -103,17 +103,17 @@ def _names(module: str, names: set[str], *, is_declared: bool = False) -> dict[s
         if is_declared and name in names and isinstance(node, ast.FunctionDef):
             node.body = [ast.Expr(ast.Constant(ast.get_docstring(node, clean=False)))]
         if node not in needed:
-            waiting += _used(node)
+            waiting += _used_names(node)
         needed.setdefault(node, set()).add(name)
     for node in sorted(needed, key=lambda import_node: import_node.lineno):
-        namespace |= _imported(node, needed[node])
+        namespace |= _imported_names(node, needed[node])
         if not isinstance(node, ast.Import | ast.ImportFrom):
             code = ast.fix_missing_locations(ast.Module([node], []))
             exec(compile(code, str(file), "exec"), namespace)
     return namespace
 
 
-def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
+def _imported_names(node: ast.stmt, names: set[str]) -> dict[str, Any]:
     namespace: dict[str, Any] = {}
     if isinstance(node, ast.ImportFrom):
         needed = [alias for alias in node.names if (alias.asname or alias.name) in names]
@@ -130,7 +130,7 @@ def _imported(node: ast.stmt, names: set[str]) -> dict[str, Any]:
     return namespace
 
 
-def _defined(node: ast.stmt) -> Iterator[str]:
+def _defined_names(node: ast.stmt) -> Iterator[str]:
     """Yield the names that a statement of a module defines."""
     if isinstance(node, ast.Import | ast.ImportFrom):
         for alias in node.names:
@@ -146,7 +146,7 @@ def _defined(node: ast.stmt) -> Iterator[str]:
             )
 
 
-def _used(node: ast.stmt) -> set[str]:
+def _used_names(node: ast.stmt) -> set[str]:
     return {
         used_node.id
         for used_node in ast.walk(node)

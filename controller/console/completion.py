@@ -19,7 +19,7 @@ def names(*kinds: str, files: tuple[str, ...] = (".toml",)) -> Complete:
 
     def complete(incomplete: str) -> list[str]:
         shipped_names = [
-            name for kind in kinds for name in _shipped(kind) if name.startswith(incomplete)
+            name for kind in kinds for name in _shipped_names(kind) if name.startswith(incomplete)
         ]
         return [*shipped_names, *_files(incomplete, files)]
 
@@ -36,7 +36,7 @@ def keys(incomplete: str) -> list[str]:
     return [f"{key}=" for key in _loader().known_keys() if key.startswith(incomplete)]
 
 
-def _shipped(kind: str) -> list[str]:
+def _shipped_names(kind: str) -> list[str]:
     if kind in ("all gaits", "spine gaits"):
         from snakewalk.controller.gaits import registry  # noqa: PLC0415  --help does not need it
 

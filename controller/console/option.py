@@ -167,16 +167,18 @@ def _type_of_words(field: FieldInfo) -> Any:
         return list[str] | None
     arguments = get_args(field.annotation)
     if get_origin(field.annotation) is tuple and arguments[1:] == (Ellipsis,):
-        return list[_word(arguments[0])] | None  # type: ignore[misc]
-    return _word(field.annotation)
+        return list[_type_word(arguments[0])] | None  # type: ignore[misc]
+    return _type_word(field.annotation)
 
 
-def _word(annotation: Any) -> Any:
+def _type_word(annotation: Any) -> Any:
     if get_origin(annotation) is Annotated:
         inner, *rules = get_args(annotation)
-        return str if any(isinstance(rule, BeforeValidator) for rule in rules) else _word(inner)
+        return (
+            str if any(isinstance(rule, BeforeValidator) for rule in rules) else _type_word(inner)
+        )
     if get_origin(annotation) in {Union, UnionType}:
-        return Union[tuple(_word(arg) for arg in get_args(annotation))]  # noqa: UP007  a list of types
+        return Union[tuple(_type_word(arg) for arg in get_args(annotation))]  # noqa: UP007  a list of types
     return str if get_origin(annotation) is tuple else annotation
 
 

@@ -80,13 +80,13 @@ def _is_terminal(device: int) -> bool:
     return not subsystem.exists() or subsystem.resolve().name == "tty"
 
 
-_WIDE: Final = 200
+_PIPE_COLUMNS: Final = 200
 """Columns of a pipe or a file, which break no line."""
 console = PlainConsole(
     highlight=False,
     markup=False,
     emoji=False,  # er:100:9 is a graph
-    width=None if sys.stdout.isatty() else _WIDE,
+    width=None if sys.stdout.isatty() else _PIPE_COLUMNS,
 )
 DEFAULT_RUN = "jacksboro-traverse"
 RunName = Annotated[

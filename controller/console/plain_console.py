@@ -11,7 +11,7 @@ from rich.text import Text
 
 from snakewalk.config.plain_text import plain
 
-_UNLIMITED: Final = 10_000
+_UNLIMITED_COLUMNS: Final = 10_000
 """Width at which no table breaks a line."""
 _HEAD: Final = 12
 """Fewest characters of a heading in a column that may break words (ours)."""
@@ -25,7 +25,8 @@ class PlainConsole(Console):
     def print(self, *objects: Any, **options: Any) -> None:
         """Print objects; a table fits the width."""
         shown = [
-            _fitted(printed, self) if isinstance(printed, Table) else printed for printed in objects
+            _fitted_table(printed, self) if isinstance(printed, Table) else printed
+            for printed in objects
         ]
         super().print(*shown, **options)
 
@@ -44,12 +45,12 @@ class PlainConsole(Console):
                 yield Segment(plain(segment.text), segment.style)
 
 
-def _fitted(table: Table, console: Console) -> RenderableType:
+def _fitted_table(table: Table, console: Console) -> RenderableType:
     """Return what shows a table within the width of ``console``, no word cut.
 
     The widths of the columns are set here: rich shortens words while other columns have space.
     """
-    unlimited = console.options.update(width=_UNLIMITED)
+    unlimited = console.options.update(width=_UNLIMITED_COLUMNS)
     if not table.columns or Measurement.get(console, unlimited, table).maximum <= console.width:
         return table
     table.padding = (0, 1, 0, 0)
@@ -69,7 +70,7 @@ def _fitted(table: Table, console: Console) -> RenderableType:
 
 def _widths(column: Column, console: Console, sentence: int) -> tuple[int, int]:
     """Return the fewest characters of a readable column, and those of its longest line."""
-    unlimited = console.options.update(width=_UNLIMITED)
+    unlimited = console.options.update(width=_UNLIMITED_COLUMNS)
     cells = [Measurement.get(console, unlimited, cell) for cell in column.cells]
     head = Measurement.get(console, unlimited, column.header)
     most = max(cell.maximum for cell in (head, *cells))

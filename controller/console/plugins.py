@@ -170,10 +170,12 @@ def builtin_plugins() -> tuple[Plugin, ...]:
 @cache
 def foreign_plugins() -> tuple[Plugin, ...]:
     """Return the plug-ins of other distributions; a broken manifest becomes a problem."""
-    return tuple(plugin for entry in entry_points(group=ENTRY_POINTS) for plugin in _of(entry))
+    return tuple(
+        plugin for entry in entry_points(group=ENTRY_POINTS) for plugin in _plugins_of_entry(entry)
+    )
 
 
-def _of(entry: EntryPoint) -> Iterator[Plugin]:
+def _plugins_of_entry(entry: EntryPoint) -> Iterator[Plugin]:
     package = entry.dist.name if entry.dist is not None else entry.value
     try:
         yield from _read(entry.load().PLUGINS, package)

@@ -57,7 +57,7 @@ def body_frames(record: RunRecord) -> BodyFrames:
     quaternion = np.zeros((len(time_s), count, 4))
     translation[:, 0], quaternion[:, 0] = head_m, Rotation.from_matrix(turn).as_quat()
     for joint, (at_m, axis) in enumerate(_joints(robot)):
-        half_rad = 0.5 * _at(time_s, cycle.time_s, cycle.measured_rad[:, joint])
+        half_rad = 0.5 * _angles_at(time_s, cycle.time_s, cycle.measured_rad[:, joint])
         translation[:, joint + 1] = at_m
         quaternion[:, joint + 1, 3] = np.cos(half_rad)
         quaternion[:, joint + 1, :3] = np.sin(half_rad)[:, None] * axis
@@ -86,7 +86,7 @@ def _joints(robot: RobotConfig) -> Iterator[tuple[Floats, Floats]]:
         yield np.array(at_m), np.array((0.0, 0.0, -side) if swings else (side, 0.0, 0.0))
 
 
-def _at(time_s: Floats, sampled_s: Floats, angle_rad: Floats) -> Floats:
+def _angles_at(time_s: Floats, sampled_s: Floats, angle_rad: Floats) -> Floats:
     """(T,) angle at other times; zero where it is never known."""
     is_known = np.isfinite(angle_rad)
     if not is_known.any():

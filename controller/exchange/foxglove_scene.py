@@ -45,7 +45,7 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.sim.physics.solids import solids
 
 Schema = dict[str, Any]
-_WHOLE: Final[Schema] = {"type": "integer"}
+_INTEGER: Final[Schema] = {"type": "integer"}
 _KINDS: Final = {"DOUBLE": "number", "FLOAT": "number", "STRING": "string", "BOOL": "boolean"}
 """JSON types by protobuf's; the others are integers."""
 
@@ -63,7 +63,7 @@ def foxglove_schema(name: str) -> Schema:
 
 def _message(descriptor: Any) -> Schema:
     if descriptor.full_name in {"google.protobuf.Timestamp", "google.protobuf.Duration"}:
-        fields = {"sec": _WHOLE, "nsec": _WHOLE}
+        fields = {"sec": _INTEGER, "nsec": _INTEGER}
         title = descriptor.name.lower()
         return {"title": title, "type": "object", "properties": fields, "required": [*fields]}
     return {
@@ -121,9 +121,9 @@ _GROUND: Final = ((0.33, 0.36, 0.30, 1.0), (0.80, 0.78, 0.68, 1.0))
 _WATER: Final = (0.55, 0.80, 0.92, 0.25)
 """Colours (ours): red, green, blue, opacity; of the ground's lowest and highest point."""
 _UPRIGHT: Final = (0.0, 0.0, 0.0, 1.0)
-_ALONG: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
+_TURN_TO_X: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
 """Turns a cylinder, which stands along z, along x."""
-_ACROSS: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+_TURN_TO_Y: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
 """Quaternion that turns a cylinder, which stands along z, along y."""
 _MARGIN_M: Final = 1.0
 """Width of the flat floor that is drawn beyond the path (ours)."""
@@ -171,7 +171,7 @@ def _rows(record: RunRecord) -> Iterator[Row]:
     yield from _frames(record)
     yield from _joints(record)
     yield from _imu(record)
-    yield from _others(record)
+    yield from _remaining_rows(record)
     for event in record.events:
         message = {
             "timestamp": _time(event.time_s),
@@ -184,7 +184,7 @@ def _rows(record: RunRecord) -> Iterator[Row]:
         yield event.time_s, FOXGLOVE_LOG, message
 
 
-def _others(record: RunRecord) -> Iterator[Row]:
+def _remaining_rows(record: RunRecord) -> Iterator[Row]:
     """Rows of the log without the fields that other messages contain."""
     yield 0.0, ConfigTable.topic.name, record.header.row()
     for table, columns in remaining_fields(record, SHOWN):
@@ -249,7 +249,7 @@ def _joints(record: RunRecord) -> Iterator[Row]:
             {
                 "timestamp": now,
                 "joints": [
-                    {"name": name} | _known(position=q, velocity=v, effort=e)
+                    {"name": name} | _known_schemas(position=q, velocity=v, effort=e)
                     for name, (q, v, e) in zip(names, states, strict=True)
                 ],
             },
@@ -260,7 +260,7 @@ def _joints(record: RunRecord) -> Iterator[Row]:
             {
                 "timestamp": now,
                 "joints": [
-                    {"name": name} | _known(position=goal)
+                    {"name": name} | _known_schemas(position=goal)
                     for name, goal in zip(names, goals, strict=True)
                 ],
             },
@@ -275,7 +275,7 @@ def _body(record: RunRecord) -> Iterator[Json]:
         if length_m == 0.0:
             continue
         cylinder = {
-            "pose": _pose([0.0 if link == 0 else -0.5 * length_m, 0.0, 0.0], _ALONG),
+            "pose": _pose([0.0 if link == 0 else -0.5 * length_m, 0.0, 0.0], _TURN_TO_X),
             "size": _xyz([width_m, width_m, 0.94 * length_m]),  # a gap shows the joint
             "bottom_scale": 1.0,
             "top_scale": 1.0 if link else 0.6,  # the head's tip
@@ -287,7 +287,7 @@ def _body(record: RunRecord) -> Iterator[Json]:
         side = joint.outward
         length_m, width_m = pair.segments_m[joint.place], 2.0 * pair.foot_radius_m
         cylinder = {
-            "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _ACROSS),
+            "pose": _pose([0.0, 0.5 * side * length_m, 0.0], _TURN_TO_Y),
             "size": _xyz([width_m, width_m, length_m]),
             "bottom_scale": 1.0,
             "top_scale": 1.0,
@@ -438,5 +438,5 @@ def _color(values: Any) -> Json:
     return {"r": r, "g": g, "b": b, "a": a}
 
 
-def _known(**values: float | None) -> Json:
+def _known_schemas(**values: float | None) -> Json:
     return {name: value for name, value in values.items() if value is not None}

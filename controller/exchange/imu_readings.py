@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import RunRecord
 
-_SAME_S: Final = 1e-4
+_SAME_READING_S: Final = 1e-4
 """Readings that were measured closer to each other are one: ages are rounded in the log."""
 
 
@@ -36,7 +36,7 @@ def imu_readings(record: RunRecord) -> ImuReadings:
     pose = record.pose
     link = 0 if config is None else config.link
     measured_at_s = table.time_s - table.age_s
-    fresh = np.diff(measured_at_s, prepend=-np.inf) > _SAME_S
+    fresh = np.diff(measured_at_s, prepend=-np.inf) > _SAME_READING_S
     time_s = measured_at_s[fresh]
     link_m = np.zeros((int(fresh.sum()), 3))
     if len(pose.time_s):

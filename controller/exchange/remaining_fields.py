@@ -24,13 +24,13 @@ def remaining_fields(record: RunRecord, shown: Shown) -> Iterator[tuple[Table, d
             for name, column in table.topic.columns.items()
             if name not in shown.get(type(table), ())
             and name != TIME
-            and _is_known(getattr(table, name))
+            and _has_value(getattr(table, name))
         }
         if columns:
             yield table, columns
 
 
-def _is_known(values: Any) -> bool:
+def _has_value(values: Any) -> bool:
     """Whether a field has a value in any row."""
     if isinstance(values, np.ndarray) and values.dtype.kind == "f":
         return bool(np.isfinite(values).any())

@@ -129,7 +129,7 @@ class RosMessages:
         yield from self.imu(record)
         yield from self._diagnostics(record)
         yield from self._events(record)
-        yield from self._others(record)
+        yield from self._other_fields(record)
 
     def _events(self, record: RunRecord) -> Iterator[Row]:
         for event in record.events:
@@ -192,11 +192,11 @@ class RosMessages:
                 strict=True,
             )
             transforms = [
-                self._new(
+                self._new_message(
                     "geometry_msgs/msg/TransformStamped",
                     header=self._header(time_s, world if parent == WORLD else parent),
                     child_frame_id=name,
-                    transform=self._new(
+                    transform=self._new_message(
                         "geometry_msgs/msg/Transform",
                         translation=self._xyz("Vector3", place),
                         rotation=self._quaternion(turn),
@@ -240,14 +240,14 @@ class RosMessages:
         for k, time_s in enumerate(frames.time_s.tolist()):
             place = frames.translation_m[k, 0]
             turn = frames.quaternion[k, 0]
-            pose = self._new(
+            pose = self._new_message(
                 "geometry_msgs/msg/PoseWithCovariance",
                 pose=self._bare_pose(place.tolist(), turn.tolist()),
                 covariance=self._floats(np.diag(variance).ravel()),
             )
-            twist = self._new(
+            twist = self._new_message(
                 "geometry_msgs/msg/TwistWithCovariance",
-                twist=self._new("geometry_msgs/msg/Twist", linear=nothing, angular=nothing),
+                twist=self._new_message("geometry_msgs/msg/Twist", linear=nothing, angular=nothing),
                 covariance=unknown,
             )
             yield self._row(
@@ -296,7 +296,7 @@ class RosMessages:
         header = self._header(time_s, frame)
         return self._row(time_s, topic, _PATH, header=header, poses=poses)
 
-    def _others(self, record: RunRecord) -> Iterator[Row]:
+    def _other_fields(self, record: RunRecord) -> Iterator[Row]:
         """Fields that no message above contains: each has a topic of its own."""
         name = ConfigTable.topic.name
         frame = pose_frame(record.header)
@@ -319,10 +319,10 @@ class RosMessages:
         numbers = np.asarray(value, dtype=float).ravel()
         label = topic.rpartition("/")[2]
         size = len(numbers)
-        dimension = self._new(
+        dimension = self._new_message(
             "std_msgs/msg/MultiArrayDimension", label=label, size=size, stride=size
         )
-        layout = self._new("std_msgs/msg/MultiArrayLayout", dim=[dimension], data_offset=0)
+        layout = self._new_message("std_msgs/msg/MultiArrayLayout", dim=[dimension], data_offset=0)
         kind = "std_msgs/msg/Float64MultiArray"
         data = self._floats(numbers)
         return self._row(time_s, topic, kind, layout=layout, data=data)
@@ -364,14 +364,14 @@ class RosMessages:
         self, name: str, level: int, text: str, hardware: str, values: Mapping[str, str]
     ) -> Any:
         """Return a ``DiagnosticStatus``."""
-        return self._new(
+        return self._new_message(
             "diagnostic_msgs/msg/DiagnosticStatus",
             level=self._byte(level),
             name=name,
             message=text,
             hardware_id=hardware,
             values=[
-                self._new("diagnostic_msgs/msg/KeyValue", key=key, value=value)
+                self._new_message("diagnostic_msgs/msg/KeyValue", key=key, value=value)
                 for key, value in values.items()
             ],
         )
@@ -382,35 +382,35 @@ class RosMessages:
         return self._row(time_s, DIAGNOSTICS, TYPES[DIAGNOSTICS], header=header, status=status)
 
     def _pose(self, time_s: float, frame: str, place: list[float], turn: list[float]) -> Any:
-        return self._new(
+        return self._new_message(
             TYPES[HEAD_POSE],
             header=self._header(time_s, frame),
             pose=self._bare_pose(place, turn),
         )
 
     def _bare_pose(self, place: list[float], turn: list[float]) -> Any:
-        return self._new(
+        return self._new_message(
             "geometry_msgs/msg/Pose",
             position=self._xyz("Point", place),
             orientation=self._quaternion(turn),
         )
 
     def _header(self, time_s: float, frame: str) -> Any:
-        return self._new("std_msgs/msg/Header", stamp=self._stamp(time_s), frame_id=frame)
+        return self._new_message("std_msgs/msg/Header", stamp=self._stamp(time_s), frame_id=frame)
 
     def _stamp(self, time_s: float) -> Any:
         seconds, nanoseconds = divmod(round(self._ros_time_s(time_s) * 1e9), 1_000_000_000)
-        return self._new("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+        return self._new_message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
 
     def _xyz(self, kind: str, values: list[float]) -> Any:
-        return self._new(f"geometry_msgs/msg/{kind}", x=values[0], y=values[1], z=values[2])
+        return self._new_message(f"geometry_msgs/msg/{kind}", x=values[0], y=values[1], z=values[2])
 
     def _quaternion(self, values: list[float]) -> Any:
         x, y, z, w = values
-        return self._new("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
+        return self._new_message("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
 
     def _row(self, time_s: float, topic: str, kind: str, **fields: Any) -> Row:
         return Row(time_s, topic, kind, self._make(kind, fields))
 
-    def _new(self, kind: str, **fields: Any) -> Any:
+    def _new_message(self, kind: str, **fields: Any) -> Any:
         return self._make(kind, fields)

@@ -44,7 +44,7 @@ def body_map(
     low, high = limits
     axes.set_facecolor(PALE)
     image = axes.imshow(
-        _thin(full).T,
+        _thinned_rows(full).T,
         aspect="auto",
         cmap=ANGLES if low < 0.0 < high else SPEEDS,
         vmin=low,
@@ -61,7 +61,7 @@ def body_map(
     colour_bar(figure, image, axes, label if beyond < 0.02 else f"{label} ({beyond:.0%} beyond)")
 
 
-def _thin(rows: Floats) -> Floats:
+def _thinned_rows(rows: Floats) -> Floats:
     """Means of as many neighbouring rows as share a column of the picture."""
     size = -(-len(rows) // _COLUMNS)
     if size == 1:

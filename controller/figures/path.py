@@ -97,7 +97,7 @@ def draw_ground(axes: Axes, ground: HeightField) -> None:
     y = np.linspace(extent[2], extent[3], ground.z_m.shape[0])
     columns, rows = slice(None), slice(None)
     if not axes.get_autoscalex_on():  # labels only where they are seen
-        columns, rows = _within(x, axes.get_xlim()), _within(y, axes.get_ylim())
+        columns, rows = _slice_within(x, axes.get_xlim()), _slice_within(y, axes.get_ylim())
     lines = axes.contour(
         x[columns],
         y[rows],
@@ -115,7 +115,7 @@ def draw_ground(axes: Axes, ground: HeightField) -> None:
         bar.outline.set_visible(False)
 
 
-def _within(values: Floats, limits: tuple[float, float]) -> slice:
+def _slice_within(values: Floats, limits: tuple[float, float]) -> slice:
     first, last = np.searchsorted(values, limits).tolist()
     first = min(max(first, 0), len(values) - 2)
     return slice(first, max(last, first + 2))

@@ -120,7 +120,7 @@ def fit_backbone(
 
     """
     curve = SpaceCurve(robot, curve_m)
-    rotation, joints = _seed(robot, curve, roll_rad)
+    rotation, joints = _starting_shape(robot, curve, roll_rad)
     limit = np.array(robot.limit_rad)
     joints = np.clip(joints, -limit, limit)
     tip = curve.points_m[0].copy()
@@ -164,7 +164,9 @@ def _body(robot: "RobotConfig", joint_rad: Floats, tip_m: Floats, rotation: Floa
     return body_in_world(robot, BodyPose(0.0, head_m, rotation), joint_rad)
 
 
-def _seed(robot: "RobotConfig", curve: SpaceCurve, roll_rad: float) -> tuple[Floats, Floats]:
+def _starting_shape(
+    robot: "RobotConfig", curve: SpaceCurve, roll_rad: float
+) -> tuple[Floats, Floats]:
     """Rotation of the head and bends of the joints, from the curve's bends in its Bishop frame."""
     forward = -curve.tangents
     up = np.array([0.0, 0.0, 1.0])

@@ -12,7 +12,7 @@ from snakewalk.controller import gaits
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.spine import SpineGait, heading_loop
 
-_FIRST: Final = (
+_FIRST_MODULES: Final = (
     "lateral_undulation",
     "sidewinding",
     "rolling",
@@ -61,7 +61,7 @@ def _gaits() -> Iterator[type[Gait]]:
     modules = {
         module_info.name for module_info in iter_modules(gaits.__path__) if not module_info.ispkg
     }
-    for name in [*_FIRST, *sorted(modules - {*_FIRST, *_WITHOUT_GAITS})]:
+    for name in [*_FIRST_MODULES, *sorted(modules - {*_FIRST_MODULES, *_WITHOUT_GAITS})]:
         module = import_module(f"{gaits.__name__}.{name}")
         for value in vars(module).values():
             if (

@@ -23,21 +23,23 @@ from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhoue
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _HIDING = 0.5  # of the threshold: noise of single pixels hides a faint tail
-_TAILED = 1.15  # times the length without a faint tail that is followed; less may be dirt at a tip
-_THAN_TAILED = 1.12  # the same, for parts that a followed tail does not contain
+_TAILED_LENGTH = (
+    1.15  # times the length without a faint tail that is followed; less may be dirt at a tip
+)
+_LONGER_THAN_TAILED = 1.12  # the same, for parts that a followed tail does not contain
 _NEAR_TIP = slice(2, 6)  # stations
-_POINTED = 0.45  # of the median radius, near a tip: half of the contrast may end it too early
-_LONGER = 1.15  # times the length without the faint parts: they belong to the body
+_THIN_END = 0.45  # of the median radius, near a tip: half of the contrast may end it too early
+_LONGER_THAN_CORE = 1.15  # times the length without the faint parts: they belong to the body
 _LENGTH_TOLERANCE = 0.15  # of the length: frames agree on it
-_BETTER = 0.04  # of the frames: this many more must agree for another ground than the median
+_BETTER_SHARE = 0.04  # of the frames: this many more must agree for another ground than the median
 _FEWEST = 5  # frames to estimate a ground
 _CALM = 8  # frames whose median has little noise
 _CLEAR = 0.9  # share above which no other size of the surroundings is tried
 _VOTES = 9  # frames that usually decide whether the animal is dark or light
-_SURE = 0.5  # share above which a ground's body length is trusted
+_SURE_SHARE = 0.5  # share above which a ground's body length is trusted
 _FAINT = 0.5  # of the strongest contrast: a fainter body may be a stain
 _PARTS = (0.015, 0.04, 0.1)  # of the smaller side: half the side of the surroundings
-_BESIDE_PX = 9  # side of a square: pixels next to a body, for the light of the ground under it
+_ADJACENT_PX = 9  # side of a square: pixels next to a body, for the light of the ground under it
 _WIDTHS = 1.5  # of the body's width: half the side of the surroundings
 
 
@@ -102,7 +104,7 @@ class BodyDetector:
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
         body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
-        detection = self._judged(image, background, body)
+        detection = self._judged_detection(image, background, body)
         if self.threshold is not None:
             return detection
         faint = may_have_faint_parts(body)
@@ -110,20 +112,22 @@ class BodyDetector:
             return replace(detection, may_have_faint_parts=faint)
         hidden = body.noise_level > _HIDING * body.threshold
         part = detection.skeleton.status is FrameStatus.PART
-        may_go_on = faint or hidden or part or _is_pointed(detection.skeleton)
+        may_go_on = faint or hidden or part or _has_thin_end(detection.skeleton)
         tailed = self._with_tails(image, background, body) if may_go_on else None
         best = detection if tailed is None else tailed
         if faint:
             fuller = with_faint_parts(image, background, self.polarity, body)
             if fuller is not None:
-                other = self._judged(image, background, fuller)
+                other = self._judged_detection(image, background, fuller)
                 length = np.nan_to_num(best.skeleton.length_px)
-                least = _LONGER if tailed is None else _THAN_TAILED
+                least = _LONGER_THAN_CORE if tailed is None else _LONGER_THAN_TAILED
                 if other.skeleton.length_px > least * length:
                     return replace(other, faint_parts=True, core_threshold=body.threshold)
         return best if tailed is not None else replace(detection, may_have_faint_parts=faint)
 
-    def _judged(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Detection:
+    def _judged_detection(
+        self, image: DeepImage, background: DeepImage, body: Silhouette
+    ) -> Detection:
         if self.inside is not None and body.status is FrameStatus.GOOD:
             left, top = (int(v) for v in body.origin_px)
             rows, columns = body.mask.shape
@@ -135,9 +139,9 @@ class BodyDetector:
         if body.status is not FrameStatus.GOOD:
             return Detection(body, no_skeleton(body.status), background)
         skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
-        return self._checked(image, background, body, skeleton)
+        return self._checked_detection(image, background, body, skeleton)
 
-    def _checked(
+    def _checked_detection(
         self, image: DeepImage, background: DeepImage, body: Silhouette, skeleton: Skeleton
     ) -> Detection:
         """The body if it explains the picture around it."""
@@ -158,9 +162,9 @@ class BodyDetector:
         if core.status is not FrameStatus.GOOD:
             return None
         tailed = with_tails(image, background, self.polarity, body, core)
-        if tailed is None or tailed.skeleton.length_px < _TAILED * core.length_px:
+        if tailed is None or tailed.skeleton.length_px < _TAILED_LENGTH * core.length_px:
             return None
-        checked = self._checked(image, background, tailed.silhouette, tailed.skeleton)
+        checked = self._checked_detection(image, background, tailed.silhouette, tailed.skeleton)
         if checked.skeleton.status is not FrameStatus.GOOD:
             return None
         return replace(checked, tip_error_px=tailed.tip_error_px)
@@ -174,11 +178,11 @@ class BodyDetector:
         return smooth_background(image)
 
 
-def _is_pointed(body: Skeleton) -> bool:
+def _has_thin_end(body: Skeleton) -> bool:
     """Whether an end is much thinner than the body."""
     radius = body.radius_px
     ends = radius[_NEAR_TIP].mean(), radius[::-1][_NEAR_TIP].mean()
-    return bool(min(ends) < _POINTED * float(np.median(radius)))
+    return bool(min(ends) < _THIN_END * float(np.median(radius)))
 
 
 def make_detector(
@@ -217,11 +221,11 @@ def make_detector(
         given.detect(frames[0])
         return replace(given, polarity=usual_polarity(frames, background))
     best = _learnt(replace(plain, search_faint_parts=False), frames, cropped=cropped)
-    if best.share < _SURE:
+    if best.share < _SURE_SHARE:
         other = _learnt(plain, frames, cropped=cropped)
-        best = other if other.share > best.share + _BETTER else best
-    elif best.faint_share >= _SURE:
-        best = _best_of([best, _learnt(plain, frames, cropped=cropped)])
+        best = other if other.share > best.share + _BETTER_SHARE else best
+    elif best.faint_share >= _SURE_SHARE:
+        best = _best_candidate([best, _learnt(plain, frames, cropped=cropped)])
     return replace(best.detector, search_faint_parts=True)
 
 
@@ -236,7 +240,7 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
     if around is not None:
         alone.append(_Candidate.of(around, frames))
     if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
-        return _best_of(alone)
+        return _best_candidate(alone)
     median, *quantiles = [
         replace(
             plain,
@@ -247,10 +251,10 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
         for candidate, polarity, source in background_candidates(frames)
     ]
     fixed = [median, *quantiles]
-    painted = _painted_out(_best(alone), frames)
+    painted = _repainted_detector(_best_detector(alone), frames)
     if painted is not None:
         fixed.insert(1, painted)
-    return _best_of([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
+    return _best_candidate([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
 
 
 def whole_share(detector: BodyDetector, frames: Sequence[DeepImage]) -> float:
@@ -293,16 +297,16 @@ class _Candidate:
         return cls(detector, share, usual, width, float(np.median(edges)), faint)
 
 
-def _best(candidates: Sequence[_Candidate]) -> BodyDetector:
-    return _best_of(candidates).detector
+def _best_detector(candidates: Sequence[_Candidate]) -> BodyDetector:
+    return _best_candidate(candidates).detector
 
 
-def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
+def _best_candidate(candidates: Sequence[_Candidate]) -> _Candidate:
     """Return the first candidate with about the highest share, weighted by length.
 
     A part of a body has the same contrast as the whole; a longer, much fainter object is a stain.
     """
-    sure = [candidate for candidate in candidates if candidate.share >= _SURE]
+    sure = [candidate for candidate in candidates if candidate.share >= _SURE_SHARE]
     strongest = max((candidate.contrast for candidate in sure), default=0.0)
     lengths_px = [
         candidate.length_px for candidate in sure if candidate.contrast >= _FAINT * strongest
@@ -316,7 +320,7 @@ def _best_of(candidates: Sequence[_Candidate]) -> _Candidate:
     return next(
         candidate
         for candidate, score in zip(candidates, scores, strict=True)
-        if score >= best - _BETTER
+        if score >= best - _BETTER_SHARE
     )
 
 
@@ -337,10 +341,10 @@ def _with_surroundings(
         candidates.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
         if candidates[-1].share >= _CLEAR:
             break
-    return _best(candidates)
+    return _best_detector(candidates)
 
 
-def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
+def _repainted_detector(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:
     """Detector with the median of painted-out frames; None if too few are usable."""
     out = []
     for frame in frames:
@@ -354,7 +358,7 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
         cover = np.zeros(frame.shape[:2], dtype=np.uint8)
         cover[top : top + rows, left : left + columns] = body.mask
         cover = np.asarray(cv2.dilate(cover, np.ones((reach, reach), np.uint8)), dtype=np.uint8)
-        out.append(_filled(frame, detection.background, cover))
+        out.append(_with_ground(frame, detection.background, cover))
     if len(out) < max(_CALM, len(frames) // 2):
         return None
     ground = median_background(out)
@@ -366,13 +370,13 @@ def _painted_out(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDet
     )
 
 
-def _filled(frame: DeepImage, ground: DeepImage, cover: Image) -> DeepImage:
+def _with_ground(frame: DeepImage, ground: DeepImage, cover: Image) -> DeepImage:
     """The frame (H, W[, C]) with its ground where ``cover`` (H, W) is above 0.
 
     The surroundings of a place are lighter than a patterned ground (darker for a light animal), so
     the difference next to the cover is added.
     """
-    is_adjacent = cv2.dilate(cover, np.ones((_BESIDE_PX, _BESIDE_PX), np.uint8)) > cover
+    is_adjacent = cv2.dilate(cover, np.ones((_ADJACENT_PX, _ADJACENT_PX), np.uint8)) > cover
     difference = frame[is_adjacent].astype(float) - ground[is_adjacent]
     filled = ground[cover > 0] + (np.median(difference, axis=0) if is_adjacent.any() else 0.0)
     out = frame.copy()

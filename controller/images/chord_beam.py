@@ -17,9 +17,9 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 _LIMITS = ((12.0, 48), (30.0, 192), (90.0, 192))
 """Limit of a place's crossings, in chords along the curve, and number of chords tried."""
-_KEPT = 400
+_KEPT_PLACES = 400
 """Places of a step that are followed."""
-_NEAREST = 24
+_NEAREST_BRANCHES = 24
 """Branches of a chord whose last places are moved to B."""
 _MOST_CROSSINGS = 33
 _WIDENINGS = 6
@@ -48,8 +48,8 @@ def sampled_solutions(
 
     """
     least, most = chords
-    steps = np.zeros((_NEAREST, segments), dtype=np.int8)
-    excess = np.empty(_NEAREST)
+    steps = np.zeros((_NEAREST_BRANCHES, segments), dtype=np.int8)
+    excess = np.empty(_NEAREST_BRANCHES)
     for reach, number in _LIMITS:
         # halves, quarters, ...: the chords of most solutions are in the middle
         order = np.argsort([_bit_reversed(k) for k in range(number)], kind="stable")
@@ -107,11 +107,11 @@ def follow_places(
 
     """
     count = steps.shape[1]
-    along = np.zeros(_KEPT)
-    piece = np.zeros(_KEPT, dtype=np.int64)
-    parent = np.zeros((count, _KEPT), dtype=np.int64)
-    taken = np.zeros((count, _KEPT), dtype=np.int8)
-    places = _KEPT * _MOST_CROSSINGS
+    along = np.zeros(_KEPT_PLACES)
+    piece = np.zeros(_KEPT_PLACES, dtype=np.int64)
+    parent = np.zeros((count, _KEPT_PLACES), dtype=np.int64)
+    taken = np.zeros((count, _KEPT_PLACES), dtype=np.int8)
+    places = _KEPT_PLACES * _MOST_CROSSINGS
     kept = 1
     new_at, new_piece = np.empty(places), np.empty(places, dtype=np.int64)
     new_parent, new_taken = np.empty(places, dtype=np.int64), np.empty(places, dtype=np.int8)
@@ -133,7 +133,7 @@ def follow_places(
         if number == 0:
             return 0
         order = np.argsort(new_at[:number])
-        kept = min(number, _KEPT)
+        kept = min(number, _KEPT_PLACES)
         for k in range(kept):
             selected = order[k * number // kept]
             along[k], piece[k] = new_at[selected], new_piece[selected]

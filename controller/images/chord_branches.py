@@ -24,7 +24,7 @@ _LIMITS = ((12.0, 64), (3.0, 64), (6.0, 128), (30.0, 256))
 _MOST_PLACES = 200_000  # of all branches of a chord: about 20 ms of CPU time
 _MOST_BRANCHES = 2000
 _MOST_CROSSINGS = 33
-_MOST_ABANDONED = 6  # chords with more branches than the limits permit
+_MOST_ABANDONED_BRANCHES = 6  # chords with more branches than the limits permit
 _BISECTIONS = 45
 
 
@@ -81,9 +81,9 @@ class BranchSearch:
             for chord in tried[1:]:
                 low = self.branches(float(chord), reach)
                 abandoned += not low.is_complete
-                if abandoned > _MOST_ABANDONED:
+                if abandoned > _MOST_ABANDONED_BRANCHES:
                     break
-                yield from self._between(low, high, reach, root)
+                yield from self._branches_between(low, high, reach, root)
                 high = low
 
     def branches(self, chord: float, reach: float) -> ChordBranches:
@@ -96,7 +96,7 @@ class BranchSearch:
         by_steps = {steps[k].tobytes(): float(excess[k]) for k in kept}
         return ChordBranches(chord, sign_sum, by_steps, places <= _MOST_PLACES)
 
-    def _between(
+    def _branches_between(
         self,
         low: ChordBranches,
         high: ChordBranches,

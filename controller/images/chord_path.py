@@ -16,11 +16,11 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_CLOSE = 1e-13
+_PATH_TOLERANCE = 1e-13
 """Residual of a point on the path, as a share of the length of the curve."""
 _NEWTON = 8
-_STRAIGHT = 0.9  # smallest cosine between tangents before and after a step
-_SMALLEST = 1e-12
+_STRAIGHT_LEAD = 0.9  # smallest cosine between tangents before and after a step
+_SMALLEST_STEP = 1e-12
 _CURVE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}"
 
 
@@ -125,7 +125,7 @@ def follow(curve: Floats, arc: Floats, places: Floats, piece: Ints, most_steps: 
     least = np.diff(arc).min()
     reach = 0.05 * length
     for _ in range(most_steps):
-        if reach < _SMALLEST * length:
+        if reach < _SMALLEST_STEP * length:
             return False
         share = np.inf
         place = 0
@@ -146,7 +146,7 @@ def follow(curve: Floats, arc: Floats, places: Floats, piece: Ints, most_steps: 
         for _newton in range(_NEWTON):
             equations(curve, arc, there, piece, gap, slopes)
             off = value - (there[place] if meets else (tangent * there).sum())
-            if max(np.abs(gap).max(), abs(off)) <= _CLOSE * length:
+            if max(np.abs(gap).max(), abs(off)) <= _PATH_TOLERANCE * length:
                 close = True
                 break
             solve(gap, slopes, step, along)
@@ -173,7 +173,7 @@ def follow(curve: Floats, arc: Floats, places: Floats, piece: Ints, most_steps: 
         lead = (along[place] if ahead else -along[place]) if meets else (tangent * along).sum()
         if lead < 0.0:
             along *= -1.0
-        if not meets and abs(lead) < _STRAIGHT:
+        if not meets and abs(lead) < _STRAIGHT_LEAD:
             reach *= 0.5
             continue
         places[:], tangent[:] = there, along

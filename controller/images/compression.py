@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats, Image
 _BLOCK_PX: Final = 8  # of JPEG and of MJPEG
 _BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
 _STEP: Final = 4  # grey levels: a larger step is an edge of the scene (ours)
-_ALONE: Final = 3.0  # times the single steps at other columns: more is compression (ours)
+_BLOCK_EXCESS: Final = 3.0  # times the single steps at other columns: more is compression (ours)
 _LUMA: Final = np.array([
     [16, 11, 10, 16, 24, 40, 51, 61], [12, 12, 14, 19, 26, 58, 60, 55],
     [14, 13, 16, 24, 40, 57, 69, 56], [14, 17, 22, 29, 51, 87, 80, 62],
@@ -33,8 +33,8 @@ _REGULAR: Final = 0.8  # mean cosine of the coefficients over the steps: they ar
 _SHIFTS: Final = tuple((k, (7 * k + off) % 16) for k in range(16) for off in (0, 8))
 """Offsets x, y of the shifted grids: even over the 16 px of a block of colour."""
 _CLEAN: Final = 16.0  # quality below which poses are less accurate than the sections show (ours)
-_LEAST: Final = 18  # quality below which no pose is used (ours)
-_USUAL: Final = 20  # quality from which most poses are used (ours)
+_LEAST_QUALITY: Final = 18  # quality below which no pose is used (ours)
+_USUAL_QUALITY: Final = 20  # quality from which most poses are used (ours)
 _SIGMA = 0.22
 _SIGMA_BELOW = 0.15  # radii: largest standard deviation from it on, below it (ours)
 _SIGMA_UNKNOWN: Final = 0.25  # radii: the same if the quality is not known (ours)
@@ -57,9 +57,9 @@ class Compression:
         """Largest standard deviation of a pose that is used, in radii of the body; 0: none is."""
         if self.quality is None:
             return _SIGMA_UNKNOWN
-        if self.quality < _LEAST:
+        if self.quality < _LEAST_QUALITY:
             return 0.0
-        return _SIGMA if self.quality >= _USUAL else _SIGMA_BELOW
+        return _SIGMA if self.quality >= _USUAL_QUALITY else _SIGMA_BELOW
 
     def __str__(self) -> str:
         """State the compression and the remedy."""
@@ -69,7 +69,7 @@ class Compression:
     @property
     def explains_faults(self) -> bool:
         """Whether it is strong enough that a pose is rejected for no other reason."""
-        return self.quality is None or self.quality < _USUAL
+        return self.quality is None or self.quality < _USUAL_QUALITY
 
 
 def compression_of(image: Image) -> Compression | None:
@@ -106,7 +106,7 @@ def _has_blocks(image: Image) -> bool:
     moved = (steps > 0).astype(np.float32)
     block_edges = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
     alone = ((moved > 0) & (block_edges < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
-    return bool(alone[-1] > _ALONE * max(float(np.median(alone[:-1])), 1.0))
+    return bool(alone[-1] > _BLOCK_EXCESS * max(float(np.median(alone[:-1])), 1.0))
 
 
 def _quality(image: Image) -> int | None:

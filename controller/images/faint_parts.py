@@ -16,8 +16,8 @@ from snakewalk.controller.images.silhouette import (
 )
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_AWAY = 1.2  # widths from the silhouette: blur and shadow stay nearer
-_MUCH = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
+_AWAY_WIDTHS = 1.2  # widths from the silhouette: blur and shadow stay nearer
+_NOTABLE_AREA = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
 FAINTEST: Final = 0.07
 """Least contrast of a part, relative to that of the body: fainter areas are stains or trails."""
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
@@ -74,8 +74,8 @@ def with_faint_parts(
     core[top : top + rows, left : left + columns] = body.mask
     thick = 2.0 * float(cv2.distanceTransform(core, cv2.DIST_L2, 5).max())
     away = np.asarray(cv2.distanceTransform(1 - core[window], cv2.DIST_L2, 5))
-    beyond = joined & (away > _AWAY * thick)
-    if np.count_nonzero(beyond) < _MUCH * body.area_px:
+    beyond = joined & (away > _AWAY_WIDTHS * thick)
+    if np.count_nonzero(beyond) < _NOTABLE_AREA * body.area_px:
         return None
     middle, _ = noise_of(contrast_image)
     depth = np.asarray(cv2.distanceTransform(np.pad(joined, 1).astype(np.uint8), cv2.DIST_L2, 5))

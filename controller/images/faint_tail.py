@@ -19,20 +19,23 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, contrast
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_AHEAD_PX = 9.0  # length of the rays that are compared
+_DIRECTION_PX = 9.0  # length of the rays that are compared
 _RADIUS_PX = 9.0  # smallest radius of a bend
 _FAN = np.linspace(-1.0, 1.0, 21)  # directions of the rays that are compared
 _FAN_RAD = 0.7  # largest turn of a ray
-_BESIDE_PX = 2.5  # beyond the half width: the ground on both sides of the ridge
+_GROUND_GAP_PX = 2.5  # beyond the half width: the ground on both sides of the ridge
 _CLEAR = 3.0  # standard deviations of a ray on bare ground
-_MOST = 2.0  # times the length of the silhouette's line: a longer tail is a trail
-_AVERAGED = 6  # steps whose clearness is the usual one at the tip
+_MOST_LENGTHENING = 2.0  # times the length of the silhouette's line: a longer tail is a trail
+_AVERAGED_STEPS = 6  # steps whose clearness is the usual one at the tip
 _UNSURE = 2.0  # clearness of a tail that may go on below the limit for stains (ours)
 _SAMPLES = 400  # rays on bare ground
-_LEAST_PX = 4.0  # a shorter extension is ignored
+_LEAST_LENGTH_PX = 4.0  # a shorter extension is ignored
 _THINNEST_PX, _WIDEST_PX = 1.0, 3.0  # half width of a tail
-_AROUND, _MARGIN_PX = 1.0, 20  # of the length of the silhouette, and px: where tails are searched
-_FREE_PX = 12.0  # from the silhouette: bare ground, but for the tail
+_MARGIN_LENGTHS, _MARGIN_PX = (
+    1.0,
+    20,
+)  # of the length of the silhouette, and px: where tails are searched
+_FREE_DISTANCE_PX = 12.0  # from the silhouette: bare ground, but for the tail
 _END_STATIONS = 10  # of the skeleton: the width at its end
 _SMOOTH = 2.0  # stations
 _DRAWN = 1.2  # of the threshold: contrast that the silhouette receives along the tail
@@ -76,28 +79,28 @@ def follow_tail(
 
     """
     half = float(np.clip(half_px, _THINNEST_PX, _WIDEST_PX))
-    noise = _noise(level, half, away_px > _FREE_PX)
+    noise = _noise(level, half, away_px > _FREE_DISTANCE_PX)
     if noise is None:
         return None
     is_limited = noise < faintest / _CLEAR
     noise = max(noise, faintest / _CLEAR)
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
-    back = max(1, round(_AHEAD_PX * (len(line) - 1) / max(length, 1e-6)))
+    back = max(1, round(_DIRECTION_PX * (len(line) - 1) / max(length, 1e-6)))
     ahead = line[-1] - line[max(0, len(line) - 1 - back)]
     angle = float(np.arctan2(ahead[1], ahead[0]))
     tip = line[-1]
     points: list[Floats] = []
     clear = [0.0]
     rows, columns = level.shape
-    for _ in range(round(_MOST * length)):
+    for _ in range(round(_MOST_LENGTHENING * length)):
         ways = angle + _FAN_RAD * _FAN
         ridge_levels = _ridge(level, np.broadcast_to(tip, (len(ways), 2)), ways, half) / noise
         best = int(np.argmax(ridge_levels - np.abs(_FAN)))
         ahead_px = 1.0
         if ridge_levels[best] < _CLEAR:
             # a ray that only begins on the tail is as clear as its part on the tail is long
-            usual = float(np.mean(clear[-_AVERAGED:]))
-            ahead_px = _AHEAD_PX * min(1.0, float(ridge_levels[best]) / max(usual, _CLEAR))
+            usual = float(np.mean(clear[-_AVERAGED_STEPS:]))
+            ahead_px = _DIRECTION_PX * min(1.0, float(ridge_levels[best]) / max(usual, _CLEAR))
         angle += float(np.clip(_FAN_RAD * _FAN[best], -1.0 / _RADIUS_PX, 1.0 / _RADIUS_PX))
         unit = np.array([np.cos(angle), np.sin(angle)])
         if ridge_levels[best] < _CLEAR:
@@ -108,7 +111,7 @@ def follow_tail(
             break
         points.append(tip)
         clear.append(float(ridge_levels[best]))
-    if len(clear) - 1 < _LEAST_PX or _returns(np.array(points), away_px):
+    if len(clear) - 1 < _LEAST_LENGTH_PX or _returns(np.array(points), away_px):
         return None
     clearness = float(np.median(clear[1:]))
     if is_limited:
@@ -118,11 +121,11 @@ def follow_tail(
 
 def _ridge(level: NDArray[np.float32], start: Floats, ways: Floats, half: float) -> Floats:
     """(W,) mean contrast along a ray from each point (W, 2), less that of its clearer side."""
-    along = np.arange(1.0, _AHEAD_PX + 1.0)
+    along = np.arange(1.0, _DIRECTION_PX + 1.0)
     unit = np.column_stack([np.cos(ways), np.sin(ways)])
     side = np.column_stack([-unit[:, 1], unit[:, 0]])
     middle = start[:, None] + along[None, :, None] * unit[:, None]
-    ring = half + _BESIDE_PX
+    ring = half + _GROUND_GAP_PX
     across = np.array([-0.5 * half, 0.0, 0.5 * half, -ring, ring])
     places = middle[:, :, None] + across[:, None] * side[:, None, None]
     x, y = np.moveaxis(places.reshape(len(ways), -1, 2), -1, 0).astype(np.float32)
@@ -167,7 +170,7 @@ def with_tails(
         body_skeleton: its skeleton.
 
     """
-    around = round(_AROUND * body_skeleton.length_px) + _MARGIN_PX
+    around = round(_MARGIN_LENGTHS * body_skeleton.length_px) + _MARGIN_PX
     rows, columns = body.level.shape
     left, top = (int(v) for v in body.origin_px)
     x, y = max(0, left - around), max(0, top - around)
@@ -211,5 +214,5 @@ def with_tails(
     body_level[mask == 2] = np.maximum(body_level[mask == 2], _DRAWN * body.threshold)
     area = float(np.count_nonzero(body_level > body.threshold))
     silhouette = replace(body, level=body_level, origin_px=(float(x), float(y)), area_px=area)
-    error = _TIP * _AHEAD_PX / min(clearness)
+    error = _TIP * _DIRECTION_PX / min(clearness)
     return TailedBody(silhouette, skeleton, error)

@@ -23,13 +23,13 @@ from snakewalk.drivers.compiling import compiled
 Level = NDArray[np.float32]
 SEGMENTS = 100
 _MARGIN = 3
-_LARGEST_PX = 8000  # largest side of the enlarged cut-out
+_LARGEST_SIDE_PX = 8000  # largest side of the enlarged cut-out
 _HOLE = 0.35  # squares of the width: a larger hole is a loop of the body
 _THIN_TIP = 0.2  # share of the contrast that ends a body two pixels wide: blur hides its tips
 _UNSURE_PX = 4.5  # a thinner body needs a fit of its blurred picture
-_POINTED_PX = 3.5  # tips of a thinner body come from its fit
+_POINTED_WIDTH_PX = 3.5  # tips of a thinner body come from its fit
 _UNIFORM = 0.85  # of the working width: a deeper body has a wide part
-_LONG = 2.5  # widths: a shorter object is not a long body
+_LONG_WIDTHS = 2.5  # widths: a shorter object is not a long body
 _BRANCH = 0.14  # of the length: a longer side branch is a part of the body
 WORKING_WIDTH = 14.0
 """Width of the body while it is thinned, px."""
@@ -42,7 +42,7 @@ _WIDE_END = 1.35  # of the median depth: an end with a deeper place is a head wi
 _NEAR_END = 0.3  # of the axis: that place lies nearer to the end
 _SHORT_END = 3.6  # depths, from that place to the end of the axis
 _AS_DEEP = 0.85  # of the largest depth: the eyes are about as wide as the place between them
-_HOOKED = float(np.cos(np.radians(25.0)))  # the axis turns there into one half of the wide end
+_HOOK_COSINE = float(np.cos(np.radians(25.0)))  # the axis turns there into one half of the wide end
 _REACH = 3.0  # depths from that place: pixels of the wide end
 _FRONT = 95.0  # percentile of the pixels ahead of the place: the front of a wide end
 
@@ -128,12 +128,12 @@ def skeleton_of_level(
     width = _width(level > threshold)
     if width is None:
         return no_skeleton(FrameStatus.BLOB)
-    step = min(WORKING_WIDTH / width, _LARGEST_PX / max(level.shape))
-    fine = _rescaled(level, step)
-    solid = _largest(fine > threshold)
+    step = min(WORKING_WIDTH / width, _LARGEST_SIDE_PX / max(level.shape))
+    fine = _rescaled_level(level, step)
+    solid = _largest_part(fine > threshold)
     if solid is None:
         return no_skeleton(FrameStatus.NOTHING)
-    solid, looped = _filled(solid, _HOLE * WORKING_WIDTH**2)
+    solid, looped = _filled_holes(solid, _HOLE * WORKING_WIDTH**2)
     if looped:
         return no_skeleton(FrameStatus.LOOP)
     depth = np.asarray(cv2.distanceTransform(solid, cv2.DIST_L2, 5), dtype=np.float32)
@@ -156,7 +156,7 @@ def skeleton_of_level(
         line = _fitted_line(line, level, width, depth, step)
     if line is None:
         return no_skeleton(FrameStatus.BLOB)
-    if grey and width >= _POINTED_PX:
+    if grey and width >= _POINTED_WIDTH_PX:
         line = to_pointed_tips(line, fine, WORKING_WIDTH, step)
     return _in_segments(line, depth, step, origin_px, heads)
 
@@ -206,10 +206,10 @@ def _width(mask: Bools) -> float | None:
     if square <= 0.0 or area < 6.0:
         return None
     wide = 0.5 * (half - np.sqrt(square))
-    return float(wide) if half > _LONG * wide + wide else None
+    return float(wide) if half > _LONG_WIDTHS * wide + wide else None
 
 
-def _rescaled(level: Level, scale: float) -> Level:
+def _rescaled_level(level: Level, scale: float) -> Level:
     if scale < 1.0:
         level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
     rows, columns = (max(1, round(side * scale)) for side in level.shape)
@@ -249,7 +249,7 @@ def _to_the_tips(
         return None
     core = line[first : last + 1]
     for _ in range(_CENTRINGS):
-        core = _centred(core, fine, threshold)
+        core = _centred_line(core, fine, threshold)
     reach = min(round(WORKING_WIDTH), len(core))
     ends = []
     for end, fork in ((core[::-1], forks[0]), (core, forks[1])):
@@ -276,7 +276,7 @@ def _wide_end(line: Floats, deep: Floats) -> int | None:
     every = max(1, min(place, round(0.5 * most)))
     ways = line[: place + 1 - every] - line[every : place + 1]
     straight = ways @ ahead / np.maximum(np.hypot(*ways.T) * np.hypot(*ahead), 1e-9)
-    return place if float(straight.min()) < _HOOKED else None
+    return place if float(straight.min()) < _HOOK_COSINE else None
 
 
 def _to_the_front(end: Floats, deep: float, solid: Image) -> Floats:
@@ -289,12 +289,12 @@ def _to_the_front(end: Floats, deep: float, solid: Image) -> Floats:
     near = (along > 0.0) & (np.hypot(*away.T) < _REACH * deep)
     if not near.any():
         return np.empty((0, 2))
-    ahead = _bounded(away[near].mean(axis=0), ahead)  # the middle between both halves
+    ahead = _bounded_direction(away[near].mean(axis=0), ahead)  # the middle between both halves
     front = float(np.percentile(away[near] @ ahead, _FRONT))
     return np.asarray(end[-1] + np.arange(1.0, front)[:, None] * ahead)
 
 
-def _centred(line: Floats, fine: Level, threshold: float) -> Floats:
+def _centred_line(line: Floats, fine: Level, threshold: float) -> Floats:
     """Move each point to the middle between both sides.
 
     Thinning is off by up to a pixel, and smoothing shortens bends.
@@ -340,13 +340,13 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
         weight = np.maximum(level[1:] - threshold, 0.0)
         off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
         turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
-        ahead = _bounded(turned, first)
+        ahead = _bounded_direction(turned, first)
         tip = there + 0.5 * _TURN_GAIN * off * side
         tips.append(tip)
     return np.asarray(tips)
 
 
-def _bounded(turned: Floats, first: Floats) -> Floats:
+def _bounded_direction(turned: Floats, first: Floats) -> Floats:
     """Unit vector of a direction (2,), at most 37 degrees from the unit vector ``first``."""
     side = np.array([-first[1], first[0]])
     slope = float(turned @ side) / max(float(turned @ first), 1e-9)
@@ -369,7 +369,7 @@ def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
     return np.asarray(samples, dtype=float).reshape(points.shape[:-1])
 
 
-def _largest(mask: Bools) -> Image | None:
+def _largest_part(mask: Bools) -> Image | None:
     """Largest part (h, w), 1 inside; None if the mask is empty."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     if count < 2:
@@ -378,7 +378,7 @@ def _largest(mask: Bools) -> Image | None:
     return np.asarray(label == best, dtype=np.uint8)
 
 
-def _filled(solid: Image, hole_px: float) -> tuple[Image, bool]:
+def _filled_holes(solid: Image, hole_px: float) -> tuple[Image, bool]:
     """Fill holes; also return whether one exceeds ``hole_px``, so that the body encloses it."""
     count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
     outside = label[0, 0]

@@ -11,7 +11,7 @@ from snakewalk.config.arrays import Bools, DeepImage, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.video import read_image
 
-_LEAST_PX = 16  # smallest side
+_LEAST_SIDE_PX = 16  # smallest side
 _SOFT_PX = (
     5  # the fill of the outside is averaged over this distance, so that its noise forms no pattern
 )
@@ -73,8 +73,10 @@ def region_of(roi: str | None, mask: Path | None, frame_shape: tuple[int, ...]) 
             f"--roi {roi}: reaches beyond the picture of {columns} x {rows} pixels; expected "
             "X,Y,W,H: the first pixel, width and height"
         )
-    if min(wide, high) < _LEAST_PX:
-        raise InputError(f"--roi {roi}: at least {_LEAST_PX} x {_LEAST_PX} pixels are needed")
+    if min(wide, high) < _LEAST_SIDE_PX:
+        raise InputError(
+            f"--roi {roi}: at least {_LEAST_SIDE_PX} x {_LEAST_SIDE_PX} pixels are needed"
+        )
     if mask is None:
         return Region((x, y), (wide, high))
     image = read_image(mask)
@@ -85,7 +87,7 @@ def region_of(roi: str | None, mask: Path | None, frame_shape: tuple[int, ...]) 
         )
     grey = image if image.ndim == 2 else image.max(axis=2)
     inside = grey[y : y + high, x : x + wide] > 0.5 * float(grey.max())
-    if int(inside.sum()) < _LEAST_PX**2:
+    if int(inside.sum()) < _LEAST_SIDE_PX**2:
         raise InputError(
             f"--mask {mask}: leaves {int(inside.sum())} pixels; white is where the animal may be"
         )

@@ -9,10 +9,10 @@ from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, as_deep_as, contrast
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_AROUND = 0.5  # of the length: margin on each side
-_WEAK = 0.2  # share of the body's contrast: a weaker residual is ground
-_NEAR = 1.5  # widths from a tip: a nearer residual may belong to the body
-_AWAY = 1.2  # widths from the body: a shadow stays nearer
+_MARGIN_LENGTHS = 0.5  # of the length: margin on each side
+_WEAK_LEVEL = 0.2  # share of the body's contrast: a weaker residual is ground
+_NEAR_WIDTHS = 1.5  # widths from a tip: a nearer residual may belong to the body
+_AWAY_WIDTHS = 1.2  # widths from the body: a shadow stays nearer
 _PART = 0.02  # of the body's summed contrast: a larger residual beyond a tip is a part of it
 _GHOST = 0.05  # the same for objects that only the background shows
 _GHOST_WEAK = 0.3  # of the body's contrast
@@ -40,7 +40,7 @@ def check_residual(
 
     """
     wide = 2.0 * max(float(np.median(skeleton.radius_px)), 0.5)
-    around = round(_AROUND * skeleton.length_px)
+    around = round(_MARGIN_LENGTHS * skeleton.length_px)
     rows, columns = silhouette.level.shape
     left, top = (int(v) for v in silhouette.origin_px)
     low_x, low_y = max(0, left - around), max(0, top - around)
@@ -52,7 +52,7 @@ def check_residual(
     same = _soft(contrast(window_image, ground, polarity))
     level = 2.0 * silhouette.threshold
     mass = float(same[body].sum())
-    least = max(silhouette.noise_level, _WEAK * level)
+    least = max(silhouette.noise_level, _WEAK_LEVEL * level)
     tips = skeleton.points_px[[0, -1]] - [low_x, low_y]
     if _beyond_tips(same, body, tips, wide, least) > _PART * mass:
         return FrameStatus.PART
@@ -103,8 +103,8 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
     part = label[rest]
     near = np.zeros(count, dtype=bool)
     for tip in tips:
-        near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR * wide + 2.0]] = True
-    away = rest & (distance_px > _AWAY * wide)
+        near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR_WIDTHS * wide + 2.0]] = True
+    away = rest & (distance_px > _AWAY_WIDTHS * wide)
     return float(same[away & near[label]].sum())
 
 

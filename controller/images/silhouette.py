@@ -14,7 +14,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _MARGIN = 4
 _WIDE_MARGIN = 20
 _CLEAR = 6.0  # standard deviations of the noise: contrast of an animal's pixel
-_LEAST_PX = 12
+_LEAST_AREA_PX = 12
 _RIVAL = 0.4  # of the largest body's size: a larger object is a second animal, not dirt
 _CANDIDATES = 4  # number of parts that may be the animal
 _SHARE = 0.4  # quantile, weighted by squared contrast: the contrast of a part
@@ -174,11 +174,11 @@ def _no_silhouette() -> Silhouette:
 def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
     """Labels and statistics of the connected parts; None if all are tiny."""
     left, top, wide, high = cv2.boundingRect(mask)
-    if wide * high < _LEAST_PX:
+    if wide * high < _LEAST_AREA_PX:
         return None
     window = (slice(top, top + high), slice(left, left + wide))
     count, inner, stats, _ = cv2.connectedComponentsWithStats(mask[window], connectivity=8)
-    if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_PX:
+    if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_AREA_PX:
         return None
     label = np.zeros(mask.shape, dtype=np.int32)
     label[window] = inner

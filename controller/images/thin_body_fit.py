@@ -20,9 +20,9 @@ _CONTROLS = 9
 _STATIONS = 5
 _ROUNDS = 12
 _STIFF = 0.02  # weight of second differences of the controls
-_EVEN = 0.3  # weight of differences in thickness
+_EVEN_SIGMA = 0.3  # weight of differences in thickness
 _LEAST_WIDTH = 0.5  # px, of a spot
-_FAR = 5.5  # standard deviations: limit of a spot
+_FAR_SPOTS = 5.5  # standard deviations: limit of a spot
 _TAPER = 0.02  # share of the length at each end that tapers and is too faint for the fit
 _MISFIT = 0.25  # of the picture's own strength: a larger residual rejects the fit
 
@@ -34,8 +34,8 @@ def _basis(count: int) -> Floats:
     return np.asarray(BSpline.design_matrix(places, knots, 3).toarray(), dtype=float)
 
 
-_ALONG = _basis(_SPOTS)
-_FINE = _basis(401)
+_SPOT_BASIS = _basis(_SPOTS)
+_FINE_BASIS = _basis(401)
 _HATS = np.stack(
     [
         np.interp(np.linspace(0.0, 1.0, _SPOTS), np.linspace(0.0, 1.0, _STATIONS), row)
@@ -45,7 +45,7 @@ _HATS = np.stack(
 )
 _BY_VALUES = np.zeros((3, 2 * _CONTROLS + _STATIONS, _SPOTS))
 """Slopes of the places and weights of the spots by all values but the last."""
-_BY_VALUES[0, :_CONTROLS] = _BY_VALUES[1, _CONTROLS : 2 * _CONTROLS] = _ALONG.T
+_BY_VALUES[0, :_CONTROLS] = _BY_VALUES[1, _CONTROLS : 2 * _CONTROLS] = _SPOT_BASIS.T
 _BY_VALUES[2, 2 * _CONTROLS :] = _HATS.T
 _BEND = np.diff(np.eye(_CONTROLS), 2, axis=0)
 
@@ -66,7 +66,7 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
     start = np.stack(
         [np.interp(np.linspace(0, 1, 401), np.linspace(0, 1, len(line)), v) for v in line.T]
     )
-    controls = np.linalg.lstsq(_FINE, start.T, rcond=None)[0]
+    controls = np.linalg.lstsq(_FINE_BASIS, start.T, rcond=None)[0]
     length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     spot = max(0.4 * width, 1.0)
     weights = np.full(_STATIONS, picture.sum() / _SPOTS)
@@ -79,7 +79,7 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
     stiff = strong * block_diag(
         _STIFF * _BEND,
         _STIFF * _BEND,
-        _EVEN / weights[0] * np.diff(np.eye(_STATIONS), axis=0),
+        _EVEN_SIGMA / weights[0] * np.diff(np.eye(_STATIONS), axis=0),
         np.zeros((1, 1)),
     )
     normal = np.eye(len(values))
@@ -105,7 +105,7 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
         step = np.linalg.solve(normal + damp * np.diag(np.diag(normal) + 1e-9), push)
         values = kept + np.clip(step, -1.0, 1.0) * scale
         values[-1] = max(values[-1], _LEAST_WIDTH)
-    curve = _FINE @ kept[: 2 * _CONTROLS].reshape(2, -1).T
+    curve = _FINE_BASIS @ kept[: 2 * _CONTROLS].reshape(2, -1).T
     shown, _ = _picture(kept, picture.shape)
     left = float(np.linalg.norm(picture - shown) / max(float(np.linalg.norm(picture)), 1e-9))
     grown = float(np.hypot(*np.diff(curve, axis=0).T).sum()) / length
@@ -120,7 +120,7 @@ def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floa
 
 
 def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    x, y = _ALONG @ values[:_CONTROLS], _ALONG @ values[_CONTROLS : 2 * _CONTROLS]
+    x, y = _SPOT_BASIS @ values[:_CONTROLS], _SPOT_BASIS @ values[_CONTROLS : 2 * _CONTROLS]
     weights = _HATS @ values[2 * _CONTROLS : -1]
     spot = float(values[-1])
     shown = np.zeros(shape)
@@ -131,12 +131,13 @@ def _picture(values: Floats, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
     return shown, by.reshape(len(values), -1).T
 
 
-_EACH = "float64[::1]"
-_BY = "float64[:, ::1]"
+_VECTOR = "float64[::1]"
+_MATRIX = "float64[:, ::1]"
 
 
 @compiled(
-    f"void({_EACH}, {_EACH}, {_EACH}, {_BY}, {_BY}, {_BY}, float64, {_BY}, float64[:, :, ::1])"
+    f"void({_VECTOR}, {_VECTOR}, {_VECTOR}, {_MATRIX}, {_MATRIX}, {_MATRIX}, float64, {_MATRIX},"
+    " float64[:, :, ::1])"
 )
 def draw_spots(
     x: Floats,
@@ -169,10 +170,10 @@ def draw_spots(
     moved = np.empty(wide)
     spread = np.empty(wide)
     for k in range(len(x)):
-        left = max(0, int(np.ceil(x[k] - _FAR * spot)))
-        right = min(wide, int(np.floor(x[k] + _FAR * spot)) + 1)
-        top = max(0, int(np.ceil(y[k] - _FAR * spot)))
-        bottom = min(high, int(np.floor(y[k] + _FAR * spot)) + 1)
+        left = max(0, int(np.ceil(x[k] - _FAR_SPOTS * spot)))
+        right = min(wide, int(np.floor(x[k] + _FAR_SPOTS * spot)) + 1)
+        top = max(0, int(np.ceil(y[k] - _FAR_SPOTS * spot)))
+        bottom = min(high, int(np.floor(y[k] + _FAR_SPOTS * spot)) + 1)
         for u in range(left, right):
             off = (u - x[k]) / spot
             across[u] = share * np.exp(-0.5 * off * off)

@@ -72,8 +72,8 @@ ASSUMED_HZ = 30.0
 _DEEP_RANGE = (16.0, 240.0)
 """Grey levels between which the values of deep images are put."""
 _DEEP_SAMPLE = 9
-_EVEN = 0.1  # of a frame: larger deviations mean an uneven rate
-_ALIKE = 0.005  # share of the rate by which the times and the stated rate may differ
+_EVEN_STEP = 0.1  # of a frame: larger deviations mean an uneven rate
+_SAME_RATE = 0.005  # share of the rate by which the times and the stated rate may differ
 _MISSING = 0.02  # of the declared frames may be absent: some codecs count wrongly
 
 
@@ -153,8 +153,8 @@ class Footage:
 
         """
         if self.deep is None:
-            return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR, page)))
-        decoded = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page)
+            return in_8_bits(_one_channel(_decoded_page(file, cv2.IMREAD_ANYCOLOR, page)))
+        decoded = _decoded_page(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH, page)
         if decoded.dtype != np.uint16:
             return _one_channel(decoded)
         return _one_channel((decoded.astype(np.float32) - self.deep.black) * self.deep.gain)
@@ -164,7 +164,7 @@ class Footage:
         shots = (
             _av_frames(self.path, every, first)
             if self.decoded_by_av
-            else self._grabbed(every, first)
+            else self._grabbed_frames(every, first)
         )
         for frame, at_s in shots:
             if frame is not None:
@@ -176,7 +176,7 @@ class Footage:
                 "codec is damaged; copy it again, or cut it there and give the part"
             )
 
-    def _grabbed(self, every: int, first: int) -> Iterator[tuple[Image | None, float]]:
+    def _grabbed_frames(self, every: int, first: int) -> Iterator[tuple[Image | None, float]]:
         """Frames by OpenCV with their times; None for skipped frames."""
         film = cv2.VideoCapture(str(self.path))
         number = 0
@@ -305,9 +305,9 @@ def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, floa
         return number / rate_hz, rate_hz
     time_s -= time_s[0]
     step_s = float(time_s[-1]) / (len(time_s) - 1)
-    if float(np.abs(time_s - step_s * number).max()) > _EVEN * step_s:
+    if float(np.abs(time_s - step_s * number).max()) > _EVEN_STEP * step_s:
         return time_s, 1.0 / float(np.median(np.diff(time_s)))
-    own_hz = rate_hz if abs(step_s * rate_hz - 1.0) < _ALIKE else 1.0 / step_s
+    own_hz = rate_hz if abs(step_s * rate_hz - 1.0) < _SAME_RATE else 1.0 / step_s
     return number / own_hz, own_hz
 
 
@@ -325,7 +325,7 @@ def _scale_of_deep(files: Sequence[Path]) -> GreyScale | None:
     """
     low, high = float("inf"), -float("inf")
     for file in files:
-        decoded = _decoded(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
+        decoded = _decoded_page(file, cv2.IMREAD_ANYCOLOR | cv2.IMREAD_ANYDEPTH)
         if decoded.dtype != np.uint16:
             return None
         calm = cv2.medianBlur(decoded, 3)  # removes broken pixels
@@ -343,10 +343,12 @@ def read_image(file: Path) -> Image:
         InputError: no image in this file.
 
     """
-    return in_8_bits(_one_channel(_decoded(file, cv2.IMREAD_ANYCOLOR)))
+    return in_8_bits(_one_channel(_decoded_page(file, cv2.IMREAD_ANYCOLOR)))
 
 
-def _decoded(file: Path, how: int, page: int = 0) -> NDArray[np.uint8 | np.uint16 | np.float32]:
+def _decoded_page(
+    file: Path, how: int, page: int = 0
+) -> NDArray[np.uint8 | np.uint16 | np.float32]:
     if page:
         done, mats = cv2.imreadmulti(str(file), page, 1, flags=how)
         if not done:

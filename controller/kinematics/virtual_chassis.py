@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.frame import Frame
 
-_FLAT = 0.02
+_EQUAL_SPREADS = 0.02
 """Spreads that differ by less than this share of the body's are taken for equal: no axis there."""
 
 
@@ -30,7 +30,7 @@ def virtual_chassis(link_m: Floats, up: Floats, last: Frame | None = None) -> Fr
     guide = link_m[0] - link_m[-1] if last is None else last.rotation[:, 0]
     forward = forward if forward @ guide >= 0.0 else -forward
     guide = up if last is None else last.rotation[:, 2]
-    if spread[1] - spread[2] < _FLAT * spread[0]:
+    if spread[1] - spread[2] < _EQUAL_SPREADS * spread[0]:
         thin = guide - (guide @ forward) * forward
         thin = thin / np.linalg.norm(thin)
     thin = thin if thin @ guide >= 0.0 else -thin

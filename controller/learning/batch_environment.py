@@ -158,7 +158,7 @@ class _RowEnvironment(SnakeEnvironment):
     def prepared(self) -> Any:
         return self._prepared
 
-    def _open(self, initial: InitialPose) -> SimulatedRobot:
+    def _open_robot(self, initial: InitialPose) -> SimulatedRobot:
         assert self.batch is not None
         prepared = self._prepared
         row = self.batch.start(self._row, prepared.robot, prepared.world, initial)

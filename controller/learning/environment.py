@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from snakewalk.sim.rendering.chase_view import ChaseView, ChaseWindow
 
 _FLOATS: Final = readonly_array()
-_SPEED_RAD_S: Final = 20.0
-_SPEED_M_S: Final = 3.0
+_LARGEST_SPEED_RAD_S: Final = 20.0
+_LARGEST_SPEED_M_S: Final = 3.0
 _CURRENT_A: Final = 10.0
 """Ends of the observation space (ours): far beyond what a body of such servos does."""
 
@@ -153,9 +153,9 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.limit_rad: Floats = np.array(body.limit_rad)
         """(J,) what an action of 1 means."""
         self.action_space = spaces.Box(-1.0, 1.0, (body.joint_count,), dtype=np.float32)
-        ends = np.repeat([np.pi, _SPEED_RAD_S, _CURRENT_A], body.joint_count)
+        ends = np.repeat([np.pi, _LARGEST_SPEED_RAD_S, _CURRENT_A], body.joint_count)
         self._end = np.concatenate(
-            [ends, self.limit_rad, np.ones(5), np.full(2, _SPEED_M_S)]
+            [ends, self.limit_rad, np.ones(5), np.full(2, _LARGEST_SPEED_M_S)]
         ).astype("f4")
         self.observation_space = spaces.Box(-self._end, self._end, dtype=np.float32)
         self.observation_names = _names(body)
@@ -209,7 +209,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         robot = self._prepared.robot
         start_rad = self.np_random.uniform(-joints, joints, robot.joint_count)
         initial = pose_with(robot, float(self.np_random.uniform(-heading, heading)), start_rad)
-        backend = self._open(initial)
+        backend = self._open_robot(initial)
         link = SafeLink(backend.chain, self._limits, backend.clock)
         state = link.enable()
         self._backend = backend
@@ -236,7 +236,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._backend.clock.sleep_until_s(self._due_s)
         return self._result()
 
-    def _open(self, initial: InitialPose) -> SimulatedRobot:
+    def _open_robot(self, initial: InitialPose) -> SimulatedRobot:
         prepared = self._prepared
         return simulated(prepared.run, prepared.robot, prepared.world, prepared.ground, initial)
 

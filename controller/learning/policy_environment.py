@@ -24,7 +24,7 @@ WAVE_NAMES = tuple(
     for number in range(1, np.size(value) + 1)
 )
 """Names of an action's P numbers."""
-_UNTRAINED = Policy(
+_UNTRAINED_POLICY = Policy(
     name="untrained",
     robot="any",
     origin=Origin(method="none", seed=0, steps=0, world="none", software="none"),
@@ -50,7 +50,7 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
 
     metadata: dict[str, Any] = METADATA
 
-    def __init__(self, policy: Policy = _UNTRAINED, **options: Any) -> None:
+    def __init__(self, policy: Policy = _UNTRAINED_POLICY, **options: Any) -> None:
         self._snake = SnakeEnvironment(**options)
         self.render_mode = self._snake.render_mode
         self._policy = policy.model_copy(update={"network": (), "observation": ()})

@@ -80,13 +80,15 @@ def policy_trials(
 
 def measure_trial(trial: PolicyTrial) -> PolicyTrialResult:
     """Run a trial, and return its numbers."""
-    return _measured(run_robot(RunRequest(_prepare(trial), stoppable=False)), trial.seconds)
+    return _measured_trial(run_robot(RunRequest(_prepare(trial), stoppable=False)), trial.seconds)
 
 
 def _prepare(trial: PolicyTrial) -> SourceRun | GaitRun:
     rng = np.random.default_rng(trial.seed)
     heading_rad = float(rng.uniform(-HEADING_SPREAD_RAD, HEADING_SPREAD_RAD))
-    prepare = prepare_gait if is_gait(trial.motion) or _is_set(trial.motion) else prepare_policy
+    prepare = (
+        prepare_gait if is_gait(trial.motion) or _is_parameter_set(trial.motion) else prepare_policy
+    )
     prepared: SourceRun | GaitRun = prepare(
         trial.motion,
         world=trial.world,
@@ -97,7 +99,7 @@ def _prepare(trial: PolicyTrial) -> SourceRun | GaitRun:
     return varied(prepared, rng)
 
 
-def _is_set(motion: str) -> bool:
+def _is_parameter_set(motion: str) -> bool:
     """Whether a file is a set of a gait's parameters; any other one is read as a policy."""
     path = Path(motion)
     if path.suffix != ".toml" or motion in shipped("policies") or not path.is_file():
@@ -106,7 +108,7 @@ def _is_set(motion: str) -> bool:
     return any(line.partition("=")[0].strip() == "gait" for line in lines)
 
 
-def _measured(result: RunResult, seconds: float) -> PolicyTrialResult:
+def _measured_trial(result: RunResult, seconds: float) -> PolicyTrialResult:
     record = result.record
     source = result.source
     outcome = result.outcome

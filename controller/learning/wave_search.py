@@ -107,7 +107,7 @@ def search_wave(
                 rewards = progress.rewards_m[generation]
                 strategy.tell(genes, [-reward_m for reward_m in rewards])
                 continue
-            work = partial(_earned, world=world, start=seed + generation, steps=steps)
+            work = partial(_earned_reward, world=world, start=seed + generation, steps=steps)
             rewards = tuple(rate(work, [policy(gene, 0) for gene in genes]))
             strategy.tell(genes, [-reward_m for reward_m in rewards])
             rewards_m = (*progress.rewards_m, rewards)
@@ -130,7 +130,7 @@ def episode_reward_m(snake: SnakeEnvironment, policy: Policy, *, seed: int, step
     return earned_m
 
 
-def _earned(policy: Policy, *, world: str, start: int, steps: int) -> float:
+def _earned_reward(policy: Policy, *, world: str, start: int, steps: int) -> float:
     snake = _environment(policy.robot, world)
     return episode_reward_m(snake, policy, seed=start, steps=steps)
 

@@ -16,7 +16,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 _BLOCK_PX: Final = 3
-_SMALL: Final = {1: (12, 48), 3: (24, 96)}
+_SMALL_PENALTIES: Final = {1: (12, 48), 3: (24, 96)}
 """Penalties, by channels, of a step of one pixel and of more, per pixel of a block (ours)."""
 _SPECKLE_PX: Final = 60
 """Islands of fewer pixels are dropped (ours)."""
@@ -62,8 +62,8 @@ def match(left: Image, right: Image, count: int, least: int = 0, fill_px: int = 
         raise InputError(
             f"stereo: {count} disparities from {least} on leave pictures {left.shape[1]} px wide"
         )
-    there = _one_way(left, right, count, least)
-    back = _one_way(_mirrored(right), _mirrored(left), count, least)[:, ::-1]
+    there = _match_one_way(left, right, count, least)
+    back = _match_one_way(_mirrored_picture(right), _mirrored_picture(left), count, least)[:, ::-1]
     column = np.arange(left.shape[1])[None]
     other_column = np.rint(column - np.nan_to_num(there)).astype(np.intp)
     other = np.take_along_axis(back, np.clip(other_column, 0, None), axis=1)
@@ -71,13 +71,13 @@ def match(left: Image, right: Image, count: int, least: int = 0, fill_px: int = 
         agree = (np.abs(there - other) <= _AGREE_PX) & (other_column >= 0)
     checked = np.where(agree, there, np.nan)
     for _ in range(_STEPS):
-        checked = _aligned(left, right, checked)
+        checked = _aligned_windows(left, right, checked)
     smooth = np.empty_like(checked)
     _on_planes(checked, smooth, _RADIUS_PX, _TOUCH_PX, _LEAST_SHARE)
-    return _filled(_without_specks(smooth, least), fill_px)
+    return _filled_gaps(_without_specks(smooth, least), fill_px)
 
 
-def _filled(disparity: Floats, most_px: int) -> Floats:
+def _filled_gaps(disparity: Floats, most_px: int) -> Floats:
     """Fill short gaps of each row: between ends that agree in a straight line.
 
     Otherwise the gap is hidden from one camera, so it belongs to the farther side (Hirschmueller
@@ -102,9 +102,9 @@ def _filled(disparity: Floats, most_px: int) -> Floats:
     return out
 
 
-def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
+def _match_one_way(left: Image, right: Image, count: int, least: int) -> Floats:
     channels = 1 if left.ndim == 2 else left.shape[2]
-    small, large = (value * _BLOCK_PX**2 for value in _SMALL[channels])
+    small, large = (value * _BLOCK_PX**2 for value in _SMALL_PENALTIES[channels])
     matcher = cv2.StereoSGBM.create(
         minDisparity=least,
         numDisparities=count,
@@ -125,7 +125,7 @@ def _one_way(left: Image, right: Image, count: int, least: int) -> Floats:
     return disparity
 
 
-def _aligned(left: Image, right: Image, disparity: Floats) -> Floats:
+def _aligned_windows(left: Image, right: Image, disparity: Floats) -> Floats:
     """Shift each pixel's window by least squares of the grey levels.
 
     Semi-global matching finds fractions from three costs, which biases them to whole pixels. This
@@ -157,7 +157,7 @@ def _box(values: NDArray[np.floating]) -> NDArray[np.float32]:
     return np.asarray(cv2.blur(values, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 
-def _mirrored(picture: Image) -> Image:
+def _mirrored_picture(picture: Image) -> Image:
     return np.ascontiguousarray(picture[:, ::-1])
 
 

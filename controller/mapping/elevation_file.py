@@ -30,10 +30,10 @@ LOWEST_M: Final = -430.0
 """Height of the lowest dry land: the shore of the Dead Sea, which sinks by a metre a year."""
 HIGHEST_M: Final = 8850.0
 """Height of the highest land: Mount Everest, 8848.86 m (China and Nepal, 2020)."""
-_MOST_M: Final = 1e6
+_HIGHEST_M: Final = 1e6
 _GAP_M: Final = 50.0
 """Step to all other heights, wider than their relief, that is suspicious (ours)."""
-_MANY: Final = 3
+_MANY_EQUAL_CELLS: Final = 3
 """Number of cells of one value that counts as a missing height (ours)."""
 
 
@@ -52,8 +52,8 @@ def check_heights(z_m: Floats, per_value_m: float, assumed: Assumptions) -> None
     finite = z_m[np.isfinite(z_m)]
     if not len(finite):
         return
-    lowest_m = assumed.given("lowest_m", -_MOST_M, _MOST_M)
-    highest_m = assumed.given("highest_m", -_MOST_M, _MOST_M)
+    lowest_m = assumed.given("lowest_m", -_HIGHEST_M, _HIGHEST_M)
+    highest_m = assumed.given("highest_m", -_HIGHEST_M, _HIGHEST_M)
     low, high = float(finite.min()), float(finite.max())
     if low < (LOWEST_M if lowest_m is None else lowest_m):
         raise InputError(
@@ -75,7 +75,7 @@ def _check_gap(values: Floats, low: float, per_value_m: float) -> None:
     """Reject one value in many cells, far below all others (for negated values: above)."""
     count = int((values == low).sum())
     others = values[values > low]
-    if count < _MANY or not len(others):
+    if count < _MANY_EQUAL_CELLS or not len(others):
         return
     gap = float(others.min()) - low
     relief = float(np.ptp(others))
@@ -294,7 +294,7 @@ def _of_points(
     if faces is None and options.classes is None:
         points_m = _without_outliers(file, points_m, options.assumed, notes)
     _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
-    placed, low, high = _cropped(file, points_m, options.crop, is_mesh=faces is not None)
+    placed, low, high = _cropped_points(file, points_m, options.crop, is_mesh=faces is not None)
     size = high - low
     kind = "points" if faces is None else "triangles"
     spacing_m = options.spacing_m
@@ -357,7 +357,7 @@ def _without_outliers(
     for key, sign, side in (("highest_m", 1.0, "above"), ("lowest_m", -1.0, "below")):
         heights_m = np.sort(sign * z_m)
         last_m = heights_m[int((1.0 - _FEW_SHARE) * len(z_m)) :]
-        stated_m = assumed.given(key, -_MOST_M, _MOST_M)
+        stated_m = assumed.given(key, -_HIGHEST_M, _HIGHEST_M)
         if stated_m is not None:
             is_ground &= sign * z_m <= sign * stated_m
         elif len(last_m) > 1:
@@ -376,7 +376,7 @@ def _without_outliers(
     return points_m[is_ground]
 
 
-def _cropped(
+def _cropped_points(
     file: Path,
     points_m: Floats,
     crop: tuple[float, float, float, float] | None,

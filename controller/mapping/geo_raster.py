@@ -33,7 +33,7 @@ from snakewalk.controller.mapping.raster_file import (
 
 MOST_STRIPPED_CELLS: Final = 1_000_000_000
 """Most cells of a raster that is read in strips (ours)."""
-_MOST_PLAIN: Final = 4 * MOST_SAMPLES
+_MOST_CELLS: Final = 4 * MOST_SAMPLES
 """Cells that are read at once: a finer spacing than two cells makes too many samples of more."""
 _STRIP_CELLS: Final = 2_000_000
 """Read at once (ours)."""
@@ -138,10 +138,10 @@ def _read(
         )
         dx_m, dy_m = spacing_m, spacing_m
     else:
-        if strips.cells > _MOST_PLAIN:
+        if strips.cells > _MOST_CELLS:
             raise InputError(
                 f"{file}: {columns.stop - columns.start} by {rows.stop - rows.start} cells are "
-                f"over {_MOST_PLAIN}: give a --spacing of {_COARSER:g} cells or more, or --crop a "
+                f"over {_MOST_CELLS}: give a --spacing of {_COARSER:g} cells or more, or --crop a "
                 f"part of its {opened.width * all_cells.dx_m:.6g} m by "
                 f"{opened.height * all_cells.dy_m:.6g} m"
             )

@@ -42,7 +42,7 @@ _SPELLINGS: Final = {
 }
 VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
 WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
-_TRUE: Final = 0.005
+_TRUE_SCALE_TOLERANCE: Final = 0.005
 """Share by which a map's lengths may be off before true lengths are used (ours): UTM is within."""
 _MOST_VARIATION: Final = 0.1
 """Change of a map's scale over a file that is accepted (ours)."""
@@ -137,7 +137,10 @@ def ground_lengths(
 
     """
     middle = true_scale(crs, places[0], step)
-    if math.isnan(middle[0]) or max(abs(length / per_unit_m - 1.0) for length in middle) <= _TRUE:
+    if (
+        math.isnan(middle[0])
+        or max(abs(length / per_unit_m - 1.0) for length in middle) <= _TRUE_SCALE_TOLERANCE
+    ):
         return per_unit_m, per_unit_m, []
     notes = [
         f"the projection has no true lengths: 1 m of it is {middle[0] / per_unit_m:.4g} m west to "

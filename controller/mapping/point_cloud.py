@@ -95,10 +95,10 @@ def _pcd(file: Path, data: bytes) -> Floats:
         return np.stack([points[axis][:, 0].astype(float) for axis in "xyz"], axis=-1)
     if encoding != "binary_compressed":
         raise ValueError(f"DATA {encoding} is not one of ascii, binary, binary_compressed")
-    return _compressed(body, row, total)
+    return _decompressed_points(body, row, total)
 
 
-def _compressed(body: bytes, row: np.dtype[Any], total: int) -> Floats:
+def _decompressed_points(body: bytes, row: np.dtype[Any], total: int) -> Floats:
     """Points (N, 3) of compressed data, which hold one field after another."""
     packed, unpacked = struct.unpack("<II", body[:8])
     if unpacked != total * row.itemsize or packed > len(body) - 8:

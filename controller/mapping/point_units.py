@@ -16,7 +16,7 @@ _LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
 _LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
 _MOST_DEGREES: Final = 1.0
 """Larger ground is not a ground for a robot (ours)."""
-_FAR: Final = 20.0
+_FAR_EXTENTS: Final = 20.0
 """Points that are this many times their extent from the origin may be places on earth (ours)."""
 
 
@@ -83,7 +83,7 @@ def _ask(file: Path, points: Floats) -> None:
         return
     extent = np.ptp(finite[:, :2], axis=0)
     distance = np.abs(finite[:, :2].mean(axis=0)).max()
-    if extent.max() > _MOST_DEGREES or distance < _FAR * extent.max():
+    if extent.max() > _MOST_DEGREES or distance < _FAR_EXTENTS * extent.max():
         return
     east_m, north_m = degree_cell_m(float(extent[0]), float(extent[1]), _latitude(finite))
     raise InputError(

@@ -91,7 +91,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
         raise InputError(f"{file}: is too large for a calibration")
     ending = file.suffix.lower()
     if ending == ".txt":
-        return _checked(file, _middlebury(file), 1.0)
+        return _checked_calibration(file, _middlebury(file), 1.0)
     if ending in (".yml", ".yaml", ".xml", ".json"):
         storage = _storage(file)
     elif ending == ".npz":
@@ -110,7 +110,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
             )
             raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
         matrices[key] = np.zeros(5) if name is None else storage[name]
-    return _checked(file, matrices, unit_m)
+    return _checked_calibration(file, matrices, unit_m)
 
 
 def _storage(file: Path) -> dict[str, Any]:
@@ -183,7 +183,9 @@ def _numbers(file: Path, matrices: Mapping[str, Any], unit_m: float) -> dict[str
     return values
 
 
-def _checked(file: Path, matrices: Mapping[str, Any], unit_m: float) -> StereoCalibration:
+def _checked_calibration(
+    file: Path, matrices: Mapping[str, Any], unit_m: float
+) -> StereoCalibration:
     values = _numbers(file, matrices, unit_m)
     rotation = values["rotation"]
     translation = values["translation"]

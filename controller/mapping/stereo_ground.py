@@ -22,7 +22,7 @@ MOST_ROLL_DEG: Final = 3.0
 _TRIALS: Final = 300
 _SAMPLE: Final = 20_000
 """Points that a plane is searched in."""
-_LEVEL_ENOUGH: Final = np.cos(np.radians(70.0))
+_LEAST_UP_COSINE: Final = np.cos(np.radians(70.0))
 """A ground's normal leans from the camera's up by at most 70 degrees (ours)."""
 _LEAST_POINTS: Final = 2
 """Least number of points in a known cell (ours)."""
@@ -179,7 +179,7 @@ def fit_ground(points_m: Floats, error_m: Floats) -> CameraStand:
         if size < 1e-12:
             continue
         normal = normal / size * (-1.0 if normal[1] > 0.0 else 1.0)  # up: y points down
-        if -normal[1] < _LEVEL_ENOUGH or normal @ a >= 0.0:
+        if -normal[1] < _LEAST_UP_COSINE or normal @ a >= 0.0:
             continue
         points_near = int((np.abs(points @ normal - normal @ a) <= reach).sum())
         if points_near > most:

@@ -67,7 +67,7 @@ class StereoHead:
         self._qpos = qpos
         self._map = ground_map
         self._random = np.random.default_rng([run.seed, 1])
-        self._coming: deque[_Seen] = deque()
+        self._coming: deque[_SeenGround] = deque()
         self._next_s = -np.inf
         self._before: tuple[float, Floats] | None = None
         """Time and qpos (7 + J,) of the last call."""
@@ -81,8 +81,10 @@ class StereoHead:
         if now_s >= self._next_s - 1e-9:
             self._next_s = now_s + self._mapping.period_s
             body = body_in_world(self._robot, pose, joint_rad)
-            points_m, error_m = self._look(now_s, qpos, body)
-            self._coming.append(_Seen(now_s + self._mapping.latency_s, now_s, points_m, error_m))
+            points_m, error_m = self._measure_ground(now_s, qpos, body)
+            self._coming.append(
+                _SeenGround(now_s + self._mapping.latency_s, now_s, points_m, error_m)
+            )
         self._before = now_s, qpos
         self.fuse(now_s)
 
@@ -96,10 +98,10 @@ class StereoHead:
         """Free the frame buffer."""
         self._view.close()
 
-    def _look(self, now_s: float, qpos: Floats, body: BodyView) -> tuple[Floats, Floats]:
+    def _measure_ground(self, now_s: float, qpos: Floats, body: BodyView) -> tuple[Floats, Floats]:
         """(n, 3) ground points in the estimated world frame, and their errors."""
         config = self._config
-        left, right = self._view.taken(self._exposed(now_s, qpos), qpos)
+        left, right = self._view.taken(self._exposed_frames(now_s, qpos), qpos)
         matrix = self._view.camera_matrix
         pair = RectifiedPair(
             left,
@@ -134,7 +136,7 @@ class StereoHead:
         at_m = body.link_m[config.link] + carrier @ mount_m
         return CameraFrame(at_m, tilted(config.tilt_rad, carrier))
 
-    def _exposed(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
+    def _exposed_frames(self, now_s: float, qpos: Floats) -> list[CameraFrame]:
         frame = self._true_frame(qpos)
         if self._before is None or now_s <= self._before[0]:
             return [frame]
@@ -174,7 +176,7 @@ class StereoHead:
         return np.asarray(near)
 
 
-class _Seen(NamedTuple):
+class _SeenGround(NamedTuple):
     arrives_s: float
     taken_s: float
     points_m: Floats

@@ -20,7 +20,7 @@ from snakewalk.controller.mechanics.link_table import (
 )
 from snakewalk.drivers.compiling import callable_in_loops, compiled, inlined, readonly_array
 
-_STILL_M_S = 1e-4  # smooths the kink of |v| at rest
+_STILL_SPEED_M_S = 1e-4  # smooths the kink of |v| at rest
 _WHEEL_M_S = 1e-3
 """Speed that smooths the two kinks of a wheel at rest. A step of the simulator creeps faster."""
 _SLIDES_M_S = 1e4
@@ -292,15 +292,17 @@ def balance_forces(
         _least_power(table, rows, links, grip, 30.0 * _WHEEL_M_S, close, *loads)
         is_held = _least_power(table, rows, links, grip, _WHEEL_M_S, 1e4 * close, *loads)
     elif law == SCALES:
-        is_held = _least_missing(table, rows, links, grip, _STILL_M_S, close, *loads)
+        is_held = _least_missing(table, rows, links, grip, _STILL_SPEED_M_S, close, *loads)
         if not is_held:  # the ellipse, which has one balance, is a better start
             start = grip[0], grip[1], grip[2], float(ELLIPSE)
             w[0], w[1], w[2] = w0, w1, w2
-            _least_power(table, rows, links, start, _STILL_M_S, close, *loads)
+            _least_power(table, rows, links, start, _STILL_SPEED_M_S, close, *loads)
             for wide in (1000.0, 100.0, 10.0, 1.0):
-                is_held = _least_missing(table, rows, links, grip, wide * _STILL_M_S, close, *loads)
+                is_held = _least_missing(
+                    table, rows, links, grip, wide * _STILL_SPEED_M_S, close, *loads
+                )
     else:
-        is_held = _least_power(table, rows, links, grip, _STILL_M_S, close, *loads)
+        is_held = _least_power(table, rows, links, grip, _STILL_SPEED_M_S, close, *loads)
     if not is_held:
         w[0], w[1], w[2] = w0, w1, w2
     return is_held

@@ -22,13 +22,13 @@ _STRAY = 0.1
 accurate, however far the body slid."""
 STEP = 0.1
 """Step of the logarithms, between the hypotheses (ours)."""
-_MOST = 0.3
+_LARGEST_CHANGE = 0.3
 """Largest change of an estimate by a span (ours)."""
 _BOUND = math.log(4.0)
 DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
 out: 99 % and 95 % of chi square with two degrees of freedom."""
-_ESTIMATED = 0.8
+_ESTIMATED_VARIANCE = 0.8
 """Variance over that of the prior below which a value is estimated (ours)."""
 _TRUST = 1.39
 """Squared distance of the file from the estimate below which the file holds again: 50 %."""
@@ -197,8 +197,8 @@ class FrictionFilter:
         cov = self._covariance
         to_span = span.inverse
         u, v = cov.times(*to_span.times(u, v))
-        self._u += min(max(u, -_MOST), _MOST)
-        self._v += min(max(v, -_MOST), _MOST)
+        self._u += min(max(u, -_LARGEST_CHANGE), _LARGEST_CHANGE)
+        self._v += min(max(v, -_LARGEST_CHANGE), _LARGEST_CHANGE)
         less = span.plus(about, -1.0)
         first, second = (to_span.times(*row) for row in ((cov.uu, cov.uv), (cov.uv, cov.vv)))
         both = less.times(*second)
@@ -225,7 +225,7 @@ class FrictionFilter:
             (mean.along / along, mean.along * along),
             (mean.across / across, mean.across * across),
             self._differs,
-            mid - abs(uv) < _ESTIMATED * self._prior.uu,
+            mid - abs(uv) < _ESTIMATED_VARIANCE * self._prior.uu,
         )
 
     def _friction(self, u: float, v: float) -> FrictionConfig:

@@ -6,7 +6,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.friction_law import gauges
 from snakewalk.config.world import FrictionConfig
 
-_STILL_M_S = 1e-4
+_STILL_SPEED_M_S = 1e-4
 
 
 def friction_n(
@@ -27,7 +27,7 @@ def friction_n(
     mu_forward, mu_across, mu_back, law = friction.grip
     mu_along = np.where(along >= 0.0, mu_forward, mu_back)
     share_a, share_c, gauge_a, gauge_c = gauges(int(law), mu_along, mu_across, along, across)
-    still = share_c * _STILL_M_S
+    still = share_c * _STILL_SPEED_M_S
     ahead = -mu_along * share_a * along / np.hypot(gauge_a, still)
     left = -mu_across * share_c * across / np.hypot(gauge_c, still)
     return np.asarray(weight_n * np.stack([cos * ahead - sin * left, sin * ahead + cos * left], 1))

@@ -35,11 +35,11 @@ from snakewalk.controller.mechanics.link_table import (
 )
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_STILL_M_S = 1e-4  # smooths the kink of |v| at rest
+_STILL_SPEED_M_S = 1e-4  # smooths the kink of |v| at rest
 _STEPS = 50
-_CLOSE = 1e-8
+_POWER_TOLERANCE = 1e-8
 """Share of the power from which on what Newton's next step leaves is beyond notice: it squares."""
-_NONE = np.zeros((3, 3))
+_NO_QUADRATIC = np.zeros((3, 3))
 
 _SLIDES = 9 * LANES
 """Where the rows of ``_power`` begin: 14 that it reads, 11 that it writes."""
@@ -138,7 +138,7 @@ def _minimise(
     step_s: float | None = None,
 ) -> bool:
     """``balance`` of a whole table; with a step, of a body with inertia."""
-    quadratic = _NONE
+    quadratic = _NO_QUADRATIC
     if step_s is not None:
         quadratic = np.empty((3, 3))
         add_inertia(table, OTHERS, links, step_s, linear, quadratic)
@@ -196,7 +196,7 @@ def _wrench(points_m: Floats, force: Floats) -> Floats:
 
 
 @compiled("void(float64[::1], int64, float64, float64)", makes_arrays=False)
-def _set_up(table: Floats, rows: int, along: float, across: float) -> None:
+def _write_weighted_rows(table: Floats, rows: int, along: float, across: float) -> None:
     """Write the rows that ``_power`` reads, weighted by load and friction.
 
     They contain the derivatives of each link's velocity along and across itself by (vx, vy, omega)
@@ -248,10 +248,10 @@ def _power(
     the processor.
 
     Args:
-        table: from ``_set_up``.
+        table: from ``_write_weighted_rows``.
         rows: of the table.
         links: number of links.
-        still: ``_STILL_M_S``, weighted.
+        still: ``_STILL_SPEED_M_S``, weighted.
         linear: as in ``balance``.
         quadratic: as in ``balance``.
         w: (3,) velocity.
@@ -345,8 +345,8 @@ def balance(  # noqa: C901  a compiled loop
     along, across, back, law = grip
     if law != ELLIPSE or back != along:
         return balance_forces(table, rows, links, grip, linear, quadratic, w, work)
-    _set_up(table, rows, along, across)
-    still = _STILL_M_S * across
+    _write_weighted_rows(table, rows, along, across)
+    still = _STILL_SPEED_M_S * across
     gradient = work[0]
     step = work[1]
     trial = work[2]
@@ -361,7 +361,7 @@ def balance(  # noqa: C901  a compiled loop
             hessian[i, i] += 1e-9
         _solve(hessian, gradient, step)
         fall = gradient[0] * step[0] + gradient[1] * step[1] + gradient[2] * step[2]
-        if fall < _CLOSE * abs(best):
+        if fall < _POWER_TOLERANCE * abs(best):
             for i in range(3):
                 w[i] -= step[i]
             break

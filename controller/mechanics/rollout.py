@@ -39,7 +39,7 @@ from snakewalk.controller.mechanics.rollout_kernel import (
 STEP_SEGMENTS = 4.0
 """Segments per step (ours): ends lie 1 cm along the path and 3 to 5 mm aside of those by steps of
 0.5."""
-_BEYOND_M = 4.0
+_EXTENSION_M = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class TabulatedPath:
         """Extend points (n, 2), ``PATH_STEP_M`` apart, along the last direction."""
         step = points_m[-1] - points_m[-2]
         step = step / np.hypot(step[0], step[1]) * PATH_STEP_M
-        count = np.arange(1, round(_BEYOND_M / PATH_STEP_M) + 1)
+        count = np.arange(1, round(_EXTENSION_M / PATH_STEP_M) + 1)
         return cls(
             np.ascontiguousarray(np.vstack([points_m, points_m[-1] + count[:, None] * step])),
             np.zeros(2) if waypoint_m is None else waypoint_m,

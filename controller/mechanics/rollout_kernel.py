@@ -20,10 +20,10 @@ from snakewalk.controller.mechanics.link_table import (
 from snakewalk.controller.mechanics.rigid_motion import add_inertia, balance
 from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
-_BACK = 5
-_FORTH = 40
+_POINTS_BACK = 5
+_POINTS_AHEAD = 40
 """Points of the path among which a place is looked for after a step."""
-_AHEAD = 30
+_DIRECTION_POINTS = 30
 """Points of the path from the centre to where its direction is compared."""
 STATE = 11
 """Numbers of a body between two steps."""
@@ -40,12 +40,12 @@ PATH_STEP_M = 0.01
 
 
 @compiled("UniTuple(float64, 2)(float64[:, ::1], int64, float64, float64)", makes_arrays=False)
-def _nearest(path: Floats, start_index: int, x: float, y: float) -> tuple[float, float]:
+def _nearest_index(path: Floats, start_index: int, x: float, y: float) -> tuple[float, float]:
     """Index on the path near ``start_index``, and the signed distance, positive to its left."""
     last = len(path) - 2
     best = start_index
     least = np.inf
-    for k in range(max(start_index - _BACK, 0), min(start_index + _FORTH, last) + 1):
+    for k in range(max(start_index - _POINTS_BACK, 0), min(start_index + _POINTS_AHEAD, last) + 1):
         dx, dy = x - path[k, 0], y - path[k, 1]
         square = dx * dx + dy * dy
         if square < least:
@@ -66,7 +66,7 @@ def note_place(
 ) -> None:
     """Record in a state (11,) that its body is at (x, y) after ``dt``."""
     state[0], state[1] = x, y
-    state[3], state[4] = _nearest(path, int(state[3]), x, y)
+    state[3], state[4] = _nearest_index(path, int(state[3]), x, y)
     state[5] += state[4] * state[4]
     state[6] += dt
     dx, dy = x - waypoint[0], y - waypoint[1]
@@ -161,7 +161,7 @@ def _lay(
 
 
 @compiled("void(float64[::1], float64[::1], boolean)", makes_arrays=False)
-def _keep(table: Floats, moving: Floats, out: bool) -> None:
+def _store_state(table: Floats, moving: Floats, out: bool) -> None:
     for g in range(len(table) // ROWS):
         link = table[g * ROWS : (g + 1) * ROWS]
         kept = moving[2 * g * LANES :]
@@ -184,7 +184,7 @@ def _stand_there(table: Floats) -> None:
 @compiled(
     "float64(float64[::1], int64, float64, float64)", divides_by_zero=True, makes_arrays=False
 )
-def _turned(table: Floats, links: int, offset_rad: float, step_s: float) -> float:
+def _write_turned_body(table: Floats, links: int, offset_rad: float, step_s: float) -> float:
     """Write the body between two steps, and its links' velocities; return its mean heading."""
     s, c = _sine_cosine(offset_rad)
     for g in range(len(table) // ROWS):
@@ -303,21 +303,21 @@ def write_result(
     y = state[1]
     phi = state[2]
     place = state[3]
-    k = min(int(place) + _AHEAD, len(path) - 2)
+    k = min(int(place) + _DIRECTION_POINTS, len(path) - 2)
     error = phi + heading
     error -= np.arctan2(path[k + 1, 1] - path[k, 1], path[k + 1, 0] - path[k, 0])
     c, s = np.cos(phi), np.sin(phi)
     head_x, head_y = x + c * head_x - s * head_y, y + s * head_x + c * head_y
     row[0], row[1], row[2] = x, y, phi
     row[OFF_PATH], row[END_OFF] = np.sqrt(state[5] / steps), state[4]
-    row[HEAD_OFF] = _nearest(path, k, head_x, head_y)[1]
+    row[HEAD_OFF] = _nearest_index(path, k, head_x, head_y)[1]
     row[HEADING] = error - 2.0 * np.pi * np.floor(error / (2.0 * np.pi) + 0.5)
     row[PASSED] = np.sqrt(state[10]) if place >= waypoint_at else 0.0
     row[ALONG], row[TIME] = PATH_STEP_M * (place - path_at), state[6]
 
 
 @compiled("UniTuple(int64, 2)(float64[:, ::1], int64)", makes_arrays=False)
-def _alike(pieces: Floats, piece: int) -> tuple[int, int]:
+def _longest_common_piece(pieces: Floats, piece: int) -> tuple[int, int]:
     """Return the earlier piece with the longest equal beginning (or -1), and its samples.
 
     If lengths are equal, the first is returned, because its common part is known.
@@ -417,7 +417,7 @@ def roll_pieces(
             total[k + 1] = total[k] + track[k]
         first_step = head
         begin = 0
-        like, same = _alike(pieces, c)
+        like, same = _longest_common_piece(pieces, c)
         if like < 0:
             states[c, 0, :3], states[c, 0, 3], states[c, 0, 4:] = start, path_at, 0.0
             states[c, 0, 10] = np.inf
@@ -432,14 +432,14 @@ def roll_pieces(
         y = state[1]
         phi = state[2]
         velocity[:] = state[7:10]
-        _keep(table, movings[c, begin], False)
+        _store_state(table, movings[c, begin], False)
         _lay(total, track, first_step, edges, group, here_g, table)
         _stand_there(table)
         for n in range(begin, steps):
             first_step += step
             _lay(total, track, first_step, edges, group, next_g, table)
             dt = step / _pulse_rate(here_g, next_g, step, cruise, body[4])
-            mean = _turned(table, links, phi, dt)
+            mean = _write_turned_body(table, links, phi, dt)
             linear[:] = 0.0
             if not level:
                 _pull(z_m, x0, y0, spacing, x, y, table, links, linear)
@@ -452,7 +452,7 @@ def roll_pieces(
             here_g, next_g = next_g, here_g
             _stand_there(table)
             states[c, n + 1] = state
-            _keep(table, movings[c, n + 1], True)
+            _store_state(table, movings[c, n + 1], True)
             state = states[c, n + 1]
             note_place(state, path, waypoint, x, y, dt)
             state[2], state[7:10] = phi, velocity

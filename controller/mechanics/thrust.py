@@ -10,7 +10,7 @@ from snakewalk.controller.mechanics.body_slide import BodySlide
 
 _STEPS = 400
 """Most steps into which a motion is divided (ours): a wave of the body has 30 or more."""
-_STILL_M_S = 1e-6
+_STILL_SPEED_M_S = 1e-6
 
 
 def forward_speed_m_s(
@@ -38,7 +38,7 @@ def forward_speed_m_s(
     before = spine.in_world(level, joints[0])
     for row in joints[1:]:
         after = spine.in_world(level, row)
-        if slide.set_shapes(before, after, step_s) > _STILL_M_S:
+        if slide.set_shapes(before, after, step_s) > _STILL_SPEED_M_S:
             u, v, turn_rad_s = slide.velocity()
             place_m = before.link_m[:, :2]
             moved_m = after.link_m[:, :2] - place_m

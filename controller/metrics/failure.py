@@ -87,7 +87,7 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     predicted = pose.predicted_speed_m_s[rows].mean()
     share = advanced / predicted if predicted > 0.0 else 1.0
     if share < header.run.safety.advance_fraction:
-        up_rad, holds_rad = float(np.mean(_up_rad(pose.links_m[rows]))), _holds_rad(record)
+        up_rad, holds_rad = float(np.mean(_inclination_rad(pose.links_m[rows]))), _holds_rad(record)
         cause: Cause = "climb" if up_rad > holds_rad else "slip"
         words = f"{np.degrees(up_rad):.0f} deg uphill" if cause == "climb" else "no steep climb"
         return Failure(cause, f"advanced {share:.0%} of the prediction, {words}")
@@ -142,7 +142,7 @@ def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
     return slid_m, float(np.arctan(np.mean(fall_m) / (2.0 * half_m)))
 
 
-def _up_rad(links_m: Floats) -> Floats:
+def _inclination_rad(links_m: Floats) -> Floats:
     """Inclination (n,) of the line from tail to head of links (n, L, 3); positive uphill."""
     x, y, z = np.moveaxis(links_m[:, 0] - links_m[:, -1], -1, 0)
     return np.asarray(np.arctan2(z, np.hypot(x, y)))

@@ -8,7 +8,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.topics import CycleTable
 
-_LONGEST_S: Final = 0.6
+_LONGEST_LAG_S: Final = 0.6
 _CYCLES: Final = 50_000
 """Cycles at the end of a run from which the lag is computed (ours): 17 minutes at 50 Hz."""
 
@@ -43,7 +43,7 @@ def lag_s(cycle: CycleTable, period_s: float) -> float:
     grid = np.arange(time[0], time[-1] + 0.5 * period_s, period_s)
     sent = _on_grid(grid, time, sent_rad[is_complete])
     measured = _on_grid(grid, time, measured_rad[is_complete])
-    most = round(_LONGEST_S / period_s)
+    most = round(_LONGEST_LAG_S / period_s)
     if len(grid) < 3 * most or np.ptp(sent, axis=0).max() < 1e-3:
         return float("nan")
     measured_window = measured[most:]

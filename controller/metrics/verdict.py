@@ -10,9 +10,9 @@ from snakewalk.controller.runlog.record import RunRecord
 
 NOT_MEASURED: Final = 3
 """Exit code of a run that ended as planned, but whose arrival nothing measured."""
-_MISSED: Final = 1
+_EXIT_MISSED: Final = 1
 """Exit code of a run that safety stopped, or that missed a waypoint."""
-_SIMULATED: Final = "sim"
+_SIMULATED_BACKEND: Final = "sim"
 _ADVICE: Final[dict[Cause, str]] = {
     "safety": "snakewalk log report {log}",
     "roll": "snakewalk plan {run}",
@@ -90,15 +90,15 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
     cause = None
     more = ""
     fault = None
-    if numbers.trip is not None or _reached(numbers) < numbers.waypoints:
-        exit_code = _MISSED
+    if numbers.trip is not None or _reached_count(numbers) < numbers.waypoints:
+        exit_code = _EXIT_MISSED
         if numbers.trip is None:
             fault = failure(record)
         else:
             fault = Failure("safety", f"stopped by safety: {numbers.trip}")
         cause = "a waypoint was missed" if fault is None else fault.text
         more = "" if fault is None else _ADVICE[fault.cause]
-        if numbers.trip is not None and numbers.backend != _SIMULATED:
+        if numbers.trip is not None and numbers.backend != _SIMULATED_BACKEND:
             more = "snakewalk doctor --port {port}"
     elif numbers.pose_evidence == Kind.UNCONFIRMED:
         exit_code = NOT_MEASURED
@@ -125,7 +125,7 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
     )
 
 
-def _reached(numbers: RunSummary) -> int:
+def _reached_count(numbers: RunSummary) -> int:
     measured = numbers.waypoints_reached
     return (numbers.dead_reckoned_waypoints_reached if measured is None else measured) or 0
 
@@ -138,7 +138,7 @@ def _sentence(numbers: RunSummary) -> str:
     parts = []
     if numbers.waypoints:
         noun = "waypoint" if numbers.waypoints == 1 else "waypoints"
-        parts.append(f"{_reached(numbers)} of {numbers.waypoints} {noun}")
+        parts.append(f"{_reached_count(numbers)} of {numbers.waypoints} {noun}")
         if error_m is not None:
             parts.append(f"{100.0 * error_m:.1f} cm from its path")
     elif travelled_m is not None:

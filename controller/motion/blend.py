@@ -68,7 +68,7 @@ def shortest_join_s(
     """
     brakes = (1.5 * np.abs(error_rad_s) / (BRAKE_SHARE * limit.acceleration_rad_s2)).max()
     brake_s = max(float(brakes), LEAST_BRAKE_S)
-    duration_s = _shortest(
+    duration_s = _shortest_duration(
         DURATIONS_S,
         _SHAPES,
         rate,
@@ -80,7 +80,7 @@ def shortest_join_s(
 
 
 @compiled("boolean(float64, float64[:, ::1], float64, float64, float64[:, ::1], float64[:, ::1])")
-def _within(
+def _keeps_limits(
     duration: float, shapes: Floats, rate: float, brake: float, joins: Floats, limits: Floats
 ) -> bool:
     """Whether the largest sum of target and error keeps the limits."""
@@ -109,11 +109,11 @@ def _within(
 @compiled(
     "float64(float64[::1], float64[:, ::1], float64, float64, float64[:, ::1], float64[:, ::1])"
 )
-def _shortest(
+def _shortest_duration(
     durations: Floats, shapes: Floats, rate: float, brake: float, joins: Floats, limits: Floats
 ) -> float:
     for duration in durations:
-        if _within(duration, shapes, rate, min(0.5 * duration, brake), joins, limits):
+        if _keeps_limits(duration, shapes, rate, min(0.5 * duration, brake), joins, limits):
             return float(duration)
     return float(np.nan)
 

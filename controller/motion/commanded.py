@@ -39,8 +39,8 @@ from snakewalk.controller.motion.trajectory import (
 from snakewalk.controller.motion.velocity_gait import VelocityGait
 
 _GAIN_PER_S: Final = 20.0
-_REACHED_RAD: Final = 1e-3
-_TRIED_S: Final = 0.02
+_REACHED_GOAL_RAD: Final = 1e-3
+_JOIN_STEP_S: Final = 0.02
 """Steps in which a join is tried before it begins."""
 
 
@@ -63,7 +63,7 @@ class _Follow:
 
     @property
     def arrived(self) -> bool:
-        return bool(np.abs(self.goal_rad - self._limiter.angle_rad).max() < _REACHED_RAD)
+        return bool(np.abs(self.goal_rad - self._limiter.angle_rad).max() < _REACHED_GOAL_RAD)
 
     def stop(self) -> None:
         """Come to rest as soon as the limits allow."""
@@ -151,16 +151,16 @@ class Commanded:
         """Execute new commands, then advance by ``dt_s``."""
         self._time_s += dt_s
         if self._first is not None:
-            self._take(StartGait(self._first))
+            self._accept_command(StartGait(self._first))
             self._first = None
         for command in self._commands():
-            self._take(command)
+            self._accept_command(command)
         self._refusals.step(self._time_s)
         if self._waiting is not None:
             self._join(self._waiting, view)
         self._mode.step(dt_s, view)
         mode = self._mode
-        if isinstance(mode, _Through) and mode.over:
+        if isinstance(mode, _SplineMotion) and mode.over:
             self._follow()
             self._on_event("command", "the trajectory is done")
         elif isinstance(mode, _Follow) and mode.left_s is not None:
@@ -182,13 +182,13 @@ class Commanded:
             text = f"no velocity for {self._timeout_s:g} s: the body comes to rest"
             self._on_event("stale", text)
 
-    def _take(self, command: Command) -> None:
+    def _accept_command(self, command: Command) -> None:
         try:
             if isinstance(command, JointGoals):
                 self._go_to(command)
             elif isinstance(command, JointTrajectory):
                 spline, end_s = spline_through(command, self._mode.now(), self._limits)
-                self._mode = _Through(spline, end_s)
+                self._mode = _SplineMotion(spline, end_s)
                 self._waiting = None
                 self._driven = None
                 points = len(command.time_s)
@@ -264,9 +264,9 @@ class Commanded:
         tried = self._blend(make())
         most_rad = self._limits.angle_rad
         first_rad = tried.target.goal_rad()
-        within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_RAD).all()
+        within = (np.abs(tried.goal_rad()) <= most_rad + _REACHED_GOAL_RAD).all()
         while within and not tried.over:
-            within = (np.abs(tried.step(_TRIED_S, view)) <= most_rad + _REACHED_RAD).all()
+            within = (np.abs(tried.step(_JOIN_STEP_S, view)) <= most_rad + _REACHED_GOAL_RAD).all()
         if within:
             blend = self._blend(make())
             self._mode = _BySource(blend)
@@ -294,7 +294,7 @@ class _Mode(Protocol):
         ...
 
 
-class _Through:
+class _SplineMotion:
     """Joints follow a spline in time."""
 
     def __init__(self, spline: PPoly, end_s: float) -> None:

@@ -14,7 +14,7 @@ from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.types import JointState
 
-_STRAIGHT_RAD = 0.1
+_STRAIGHT_WINDOW_RAD = 0.1
 """Windows whose bends are smaller, root of the sum of squares, hardly scale (ours)."""
 
 
@@ -43,12 +43,12 @@ class Compliance:
         inside.
         """
         config = self._config
-        excess_a = _beyond(state.current_a, config.deadband_a)
+        excess_a = _current_beyond(state.current_a, config.deadband_a)
         load_a = np.where(self._yields, -excess_a, 0.0)
         if len(self._scale):
-            wanted_rad = self._scaled(goal_rad, load_a, state.valid, dt_s)
+            wanted_rad = self._scaled_yield(goal_rad, load_a, state.valid, dt_s)
         else:
-            keep = self._keep(dt_s)
+            keep = self._remaining_share(dt_s)
             rest_rad = load_a / config.stiffness_a_rad
             wanted_rad = keep * self._yield_rad + (1.0 - keep) * rest_rad
         wanted_rad = np.clip(wanted_rad, -config.yield_limit_rad, config.yield_limit_rad)
@@ -63,11 +63,11 @@ class Compliance:
         self._yield_rad = self._yield_rad + np.where(state.valid, change_rad, 0.0)
         return np.asarray(goal_rad + self._yield_rad)
 
-    def _keep(self, dt_s: float) -> float:
+    def _remaining_share(self, dt_s: float) -> float:
         """Share of a yield that remains after ``dt_s`` without load."""
         return float(np.exp(-dt_s * self._config.stiffness_a_rad / self._config.damping_a_s_rad))
 
-    def _scaled(self, goal_rad: Floats, load_a: Floats, valid: Bools, dt_s: float) -> Floats:
+    def _scaled_yield(self, goal_rad: Floats, load_a: Floats, valid: Bools, dt_s: float) -> Floats:
         """(J,) yield of scaled windows: the joint admittance, projected on the bends in each.
 
         With ``x = P beta`` the law ``b x' + k x = load`` becomes ``P^T P (b beta' + k beta) = P^T
@@ -76,8 +76,8 @@ class Compliance:
         bends_rad = np.where(self._yields & valid, goal_rad, 0.0)
         windows = len(self._scale)
         push = np.bincount(self._window, bends_rad * load_a, windows)
-        square = np.bincount(self._window, bends_rad * bends_rad, windows) + _STRAIGHT_RAD**2
-        keep = self._keep(dt_s)
+        square = np.bincount(self._window, bends_rad * bends_rad, windows) + _STRAIGHT_WINDOW_RAD**2
+        keep = self._remaining_share(dt_s)
         rest = push / (square * self._config.stiffness_a_rad)
         self._scale = np.clip(keep * self._scale + (1.0 - keep) * rest, -1.0, 1.0)
         return np.where(self._yields, goal_rad * self._scale[self._window], 0.0)
@@ -112,5 +112,5 @@ def _chosen(config: ComplianceConfig, robot: RobotConfig) -> Bools:
     return np.isin(np.arange(robot.joint_count), list(chosen))
 
 
-def _beyond(current_a: Floats, deadband_a: float) -> Floats:
+def _current_beyond(current_a: Floats, deadband_a: float) -> Floats:
     return np.asarray(np.sign(current_a) * np.maximum(np.abs(current_a) - deadband_a, 0.0))

@@ -23,8 +23,8 @@ MOST_CELLS: Final = 20_000_000
 """Angles of a motion (ours): an hour of 50 joints at 100 Hz."""
 REST: Final = "rest"
 """Name that keeps a joint of the robot at 0."""
-_STILL_RAD: Final = 1e-6
-_NUMBERED: Final = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
+_STILL_JOINT_RAD: Final = 1e-6
+_NUMBERED_NAME: Final = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
 """Name of a joint with a number near its end."""
 _STEPS_S: Final = (0.0005, 0.5)
 """Steps between rows of a motion, s (ours)."""
@@ -175,7 +175,7 @@ def _by_stem(names: Sequence[str]) -> dict[str, list[str]]:
 
     Names of which one has no number have no stems: the result is empty.
     """
-    parts = [(_NUMBERED.match(name), name) for name in names]
+    parts = [(_NUMBERED_NAME.match(name), name) for name in names]
     if any(part is None for part, _ in parts):
         return {}
     numbered = sorted((int(part[2]), part[1], name) for part, name in parts if part is not None)
@@ -265,7 +265,7 @@ def onto_robot(
     unused = [name for name in names if name not in pairs.values()]
     if unused:
         highest, lowest = (pick.reduce(motion.joint_rad) for pick in (np.fmax, np.fmin))
-        moved = highest - lowest > _STILL_RAD
+        moved = highest - lowest > _STILL_JOINT_RAD
         moving = [name for name in unused if moved[names.index(name)]]
         lines.append(
             f"{len(unused)} joints of the file are not used, {len(moving)} of them move: "

@@ -122,7 +122,7 @@ class Operator(MotionWrapper):
         elif key in {"left", "right"}:
             self._nudge(self.selected, 1.0 if key == "right" else -1.0)
         elif key in {"n", "p"}:
-            self._other(1 if key == "n" else -1)
+            self._select_other_gait(1 if key == "n" else -1)
         elif key == "m":
             self._change(mirror=not self.motion.gait.params.mirror)
         elif key == "d":
@@ -147,15 +147,15 @@ class Operator(MotionWrapper):
             span = self._ranges()[name]
             if not span.low <= value <= span.high:
                 self._report(f"{name} = {text} is outside {span.low:g} to {span.high:g}")
-            self._set(name, value)
+            self._set_parameter(name, value)
         else:
             self._refuse(f"{name}={text}: no number for a parameter of this gait")
 
     def _nudge(self, name: str, sign: float) -> None:
         step = sign * self._ranges()[name].step
-        self._set(name, getattr(self.motion.gait.params, name) + step)
+        self._set_parameter(name, getattr(self.motion.gait.params, name) + step)
 
-    def _set(self, name: str, value: float) -> None:
+    def _set_parameter(self, name: str, value: float) -> None:
         span = self._ranges()[name]
         value = min(max(value, span.low), span.high)
         self._change(**{name: span.kind(round(value, 6))})
@@ -168,7 +168,7 @@ class Operator(MotionWrapper):
         else:
             self._report(", ".join(f"{name} = {value}" for name, value in values.items()))
 
-    def _other(self, step: int) -> None:
+    def _select_other_gait(self, step: int) -> None:
         names = list(GAITS)
         index = names.index(self.motion.gait.name) if self.motion.gait.name in names else 0
         for away in range(1, len(names)):

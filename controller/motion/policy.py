@@ -67,7 +67,7 @@ class PolicyWave(Strict):
         fields = {}
         for key, value in cls().model_dump().items():
             size = np.size(value)
-            part = [_rounded(part_value) for part_value in clipped[start : start + size]]
+            part = [_rounded_value(part_value) for part_value in clipped[start : start + size]]
             fields[key] = part if isinstance(value, tuple) else part[0]
             start += size
         return cls.model_validate(fields)
@@ -149,8 +149,10 @@ class Policy(Strict):
             lines += ["", f"[{key}]"]
             lines += [f"{name} = {json.dumps(value)}" for name, value in tables[key].items()]
         for layer in tables["network"]:
-            rows = ",\n  ".join(json.dumps([_rounded(v) for v in row]) for row in layer["weights"])
-            bias = json.dumps([_rounded(value) for value in layer["bias"]])
+            rows = ",\n  ".join(
+                json.dumps([_rounded_value(v) for v in row]) for row in layer["weights"]
+            )
+            bias = json.dumps([_rounded_value(value) for value in layer["bias"]])
             lines += ["", "[[network]]", f"bias = {bias}", f"weights = [\n  {rows},\n]"]
         return "\n".join(lines) + "\n"
 
@@ -177,5 +179,5 @@ def observation_names(robot: RobotConfig) -> tuple[str, ...]:
     return ("phase_cos", "phase_sin", "heading_cos", "heading_sin", *joints)
 
 
-def _rounded(value: float) -> float:
+def _rounded_value(value: float) -> float:
     return float(f"{float(value):.{DIGITS}g}")

@@ -82,11 +82,11 @@ class PolicyMotion:
 
     def goal_rad(self) -> Floats:
         """(J,) present joint targets."""
-        return self._of_all(self._limiter.angle_rad)
+        return self._values_of_all(self._limiter.angle_rad)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) their present speeds."""
-        return self._of_all(self._stop_profile.rate * self._limiter.speed_rad_s)
+        return self._values_of_all(self._stop_profile.rate * self._limiter.speed_rad_s)
 
     def pace(self) -> Pace:
         """The robot's limits times the headroom."""
@@ -148,7 +148,7 @@ class PolicyMotion:
         self._mean_heading_rad += (1.0 - np.exp(-cycles)) * off
         return float((self._mean_heading_rad + np.pi) % TURN - np.pi)
 
-    def _of_all(self, yaw: Floats) -> Floats:
+    def _values_of_all(self, yaw: Floats) -> Floats:
         joints = np.zeros(self._robot.joint_count)
         joints[self._yaw] = yaw
         return joints

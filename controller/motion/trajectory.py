@@ -20,7 +20,7 @@ START_RAD: Final = 0.05
 _SAMPLES: Final = 32
 """Points of each piece at which the limits are checked."""
 _SLACK: Final = 1.0 + 1e-6
-_AT_REST_RAD_S: Final = 1e-3
+_REST_SPEED_RAD_S: Final = 1e-3
 
 JointNumbers = NDArray[np.intp]
 
@@ -115,16 +115,16 @@ def spline_through(
 
     """
     joints = limits.numbers(trajectory.joints, "trajectory")
-    trajectory = _checked(trajectory)
+    trajectory = _checked_trajectory(trajectory)
     limits.check_angles(trajectory.position_rad, joints, "trajectory")
     if trajectory.time_s[0] <= 0.0:
-        trajectory = _without_first(trajectory, now.angle_rad[joints])
+        trajectory = _without_first_point(trajectory, now.angle_rad[joints])
     spline = _spline(trajectory, joints, now)
     _check_spline(spline, limits)
     return spline, float(trajectory.time_s[-1])
 
 
-def _checked(given: JointTrajectory) -> JointTrajectory:
+def _checked_trajectory(given: JointTrajectory) -> JointTrajectory:
     """Return it as arrays, if shapes agree, values are finite and times increase."""
     time_s = np.asarray(given.time_s, dtype=float)
     values = [None if v is None else np.asarray(v, dtype=float) for v in given[2:]]
@@ -144,12 +144,12 @@ def _checked(given: JointTrajectory) -> JointTrajectory:
             raise InputError("trajectory: a velocity or acceleration is not a number")
     if velocity is None and acceleration is not None:
         raise InputError("trajectory: has accelerations but no velocities; add velocities")
-    if velocity is not None and np.abs(velocity[-1]).max() > _AT_REST_RAD_S:
+    if velocity is not None and np.abs(velocity[-1]).max() > _REST_SPEED_RAD_S:
         raise InputError("trajectory: its last point is its end: the velocities there must be 0")
     return JointTrajectory(given.joints, time_s, *values)  # type: ignore[arg-type]
 
 
-def _without_first(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory:
+def _without_first_point(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory:
     """Drop a first point at 0 s, if the named joints (K,) are there."""
     if len(given.time_s) == 1:
         raise InputError("trajectory: its only point is at 0 s; say by when it is to be reached")
@@ -203,7 +203,7 @@ def _quintics(h_s: Floats, q: Floats, v: Floats, a: Floats) -> Floats:
     return np.array([coefficient / h_s ** (5 - power) for power, coefficient in enumerate(unit)])
 
 
-def _most(spline: PPoly, order: int) -> Floats:
+def _largest_derivative(spline: PPoly, order: int) -> Floats:
     """(J,) largest size of a derivative at ``_SAMPLES`` of each piece and at its end."""
     pieces = spline.derivative(order) if order else spline
     at_s = np.diff(spline.x)[:, None] * np.linspace(0.0, 1.0, _SAMPLES + 1)[:, None, None]
@@ -219,7 +219,7 @@ def _check_spline(spline: PPoly, limits: JointLimits) -> None:
         (1, limits.speed_rad_s, "moves at", "rad/s"),
         (2, limits.acceleration_rad_s2, "accelerates at", "rad/s2"),
     ):
-        reach = _most(spline, order)
+        reach = _largest_derivative(spline, order)
         over = reach / most
         worst = int(np.argmax(over))
         if over[worst] > _SLACK:

@@ -33,7 +33,7 @@ BEND_LIMIT_RAD: Final = 1.4
 _RATE_PER_S: Final = 0.7
 """Rate of change of the share of the full rate (ours): from full speed to rest in 1.5 s."""
 _RATE_PER_S2: Final = 4.0
-_AT_REST: Final = 1e-3
+_REST_RATE: Final = 1e-3
 _ROUNDING: Final = 1.0 + 1e-9
 _KEY: Final = "turn_rad"
 
@@ -84,7 +84,7 @@ class VelocityGait:
     @property
     def rests(self) -> bool:
         """Whether the body is at rest and will stay so."""
-        return self._share == 0.0 and abs(float(self._rate.angle_rad[0])) < _AT_REST
+        return self._share == 0.0 and abs(float(self._rate.angle_rad[0])) < _REST_RATE
 
     def follow(self, forward_m_s: float, turn_rad_s: float) -> None:
         """Move along the body at a speed, and turn at a rate, positive to the left.

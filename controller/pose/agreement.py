@@ -150,27 +150,27 @@ class Agreement:
         columns = (np.array(column) for column in zip(*self._rows, strict=True))
         times, measured_m, measured_rad, reckoned_m, reckoned_rad = columns
         line = np.column_stack([np.ones(len(times)), times - times.mean()])
-        expected = _detrended(np.unwrap(reckoned_rad), line)
-        turns = _detrended(np.unwrap(measured_rad), line)
+        expected = _detrended_values(np.unwrap(reckoned_rad), line)
+        turns = _detrended_values(np.unwrap(measured_rad), line)
         if float(np.sqrt(np.mean(expected**2))) < LEAST_TURN_RAD:
             return
         share = float(turns @ expected / (expected @ expected))
-        related = _related(expected, turns)
+        related = _correlation(expected, turns)
         off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(reckoned_rad))
-        slow_rad = off_rad - _detrended(off_rad, line)
+        slow_rad = off_rad - _detrended_values(off_rad, line)
         steps = np.diff(reckoned_m) * np.exp(1j * slow_rad[:-1])
         way_m = np.concatenate([[0.0], np.cumsum(steps)])
-        swing = _detrended(way_m, line)
+        swing = _detrended_values(way_m, line)
         if self._is_level and times[-1] - self._summed_s >= WINDOW_S:
             self._summed_s = times[-1]
             ahead_m = _travel(way_m)
             off = (_travel(measured_m) - ahead_m) / (ahead_m or 1.0)
             self._aside_m += 1j * off.imag * ahead_m
-        shape = _detrended(measured_m, line)
-        named = _mirrored(related, shape, swing)
+        shape = _detrended_values(measured_m, line)
+        named = _mirrored_swing(related, shape, swing)
         swings = related > SHARE and float(np.sqrt(np.mean(np.abs(swing) ** 2))) >= LEAST_SWING_M
         if swings and named is None:
-            named = self._off(shape, swing, times[-1])
+            named = self._swing_fault(shape, swing, times[-1])
         is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
         if named is None and not is_alike and (self._named or not self.has_agreed):
             named = self._named  # a window without a swing clears nothing
@@ -181,7 +181,7 @@ class Agreement:
         self._doubt_s = 0.0 if agrees else self._doubt_s + JUDGE_S
         self.has_agreed |= agrees
 
-    def _off(self, shape: Floats, swing: Floats, time_s: float) -> str | None:
+    def _swing_fault(self, shape: Floats, swing: Floats, time_s: float) -> str | None:
         """Return what is wrong with direction or size of a measured swing; None if nothing is."""
         if abs(np.vdot(swing, shape)) < SHARE * _size(swing, shape):
             return None
@@ -219,7 +219,7 @@ class _Row(NamedTuple):
     reckoned_rad: float
 
 
-def _mirrored(related: float, shape: Floats, swing: Floats) -> str | None:
+def _mirrored_swing(related: float, shape: Floats, swing: Floats) -> str | None:
     if related < -SHARE:
         return (
             "mirrored axes: the head turns the other way than its joints say; send a "
@@ -244,11 +244,11 @@ def _size(a: Floats, b: Floats) -> float:
     return float(np.linalg.norm(a) * np.linalg.norm(b)) or 1.0
 
 
-def _detrended(values: Floats, line: Floats) -> Floats:
+def _detrended_values(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
     fit = np.linalg.lstsq(line, values, rcond=None)[0]
     return values - line @ fit
 
 
-def _related(a: Floats, b: Floats) -> float:
+def _correlation(a: Floats, b: Floats) -> float:
     return float(a @ b) / _size(a, b)

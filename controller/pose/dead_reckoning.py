@@ -15,10 +15,10 @@ from snakewalk.controller.mechanics.body_slide import BodySlide
 from snakewalk.drivers.attitude import rotation_by
 from snakewalk.drivers.types import BodyPose, JointState
 
-_NOWHERE = np.zeros(3)
-_LEVEL = np.eye(3)
-_UP = np.array([0.0, 0.0, 1.0])
-_STILL_M_S = 1e-6
+_ORIGIN = np.zeros(3)
+_LEVEL_ROTATION = np.eye(3)
+_UP_AXIS = np.array([0.0, 0.0, 1.0])
+_STILL_SPEED_M_S = 1e-6
 """Speed of a link up to which the shape counts as unchanged (ours)."""
 
 
@@ -50,7 +50,7 @@ class DeadReckoning:
         self._heading_rad = heading_rad
         self._imu_link = robot.imu.link if imu and robot.imu is not None else None
         self._zero_rad: float | None = None
-        self._tilt = _LEVEL
+        self._tilt = _LEVEL_ROTATION
         self._last: tuple[float, BodyView] | None = None
 
     def __call__(self, state: JointState) -> BodyPose:
@@ -59,10 +59,10 @@ class DeadReckoning:
         time_s = state.time_s
         last = self._last
         if last is None:
-            level = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)
+            level = self._spine.in_world(BodyPose(0.0, _ORIGIN, _LEVEL_ROTATION), joints)
             self._heading_rad -= level.heading_rad
         turned_rad = self._take_attitude(state, joints)
-        body = self._spine.in_world(BodyPose(0.0, _NOWHERE, self._tilt), joints)
+        body = self._spine.in_world(BodyPose(0.0, _ORIGIN, self._tilt), joints)
         if last is not None and time_s > last[0]:
             rate_rad_s = self._integrate(time_s - last[0], last[1], body)
             if turned_rad is None:
@@ -72,7 +72,7 @@ class DeadReckoning:
         self._last = (time_s, body)
         c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
         rotation = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
-        if self._tilt is not _LEVEL:
+        if self._tilt is not _LEVEL_ROTATION:
             rotation = rotation @ self._tilt
         x_m, y_m = self._head_m
         return BodyPose(time_s, np.array((x_m, y_m, 0.0)), rotation)
@@ -81,10 +81,10 @@ class DeadReckoning:
         """Set the head's tilt from the IMU; return its heading, None without a reading."""
         if self._imu_link is None or state.imu is None:
             return None
-        behind = self._spine.in_world(BodyPose(0.0, _NOWHERE, _LEVEL), joints)
-        head = BodyPose(0.0, _NOWHERE, state.imu.rotation @ behind.rotation[self._imu_link].T)
+        behind = self._spine.in_world(BodyPose(0.0, _ORIGIN, _LEVEL_ROTATION), joints)
+        head = BodyPose(0.0, _ORIGIN, state.imu.rotation @ behind.rotation[self._imu_link].T)
         heading_rad = head.heading_rad
-        self._tilt = rotation_by(-heading_rad * _UP) @ head.rotation
+        self._tilt = rotation_by(-heading_rad * _UP_AXIS) @ head.rotation
         if self._zero_rad is None:  # the device's north is any: at first its heading is what it was
             self._zero_rad = self._heading_rad - heading_rad
         return heading_rad + self._zero_rad
@@ -92,7 +92,7 @@ class DeadReckoning:
     def _integrate(self, step_s: float, before: BodyView, after: BodyView) -> float:
         """Move the head as the shape change does; returns the rate at which the body turns."""
         slide = self._slide
-        if slide.set_shapes(before, after, step_s) < _STILL_M_S:
+        if slide.set_shapes(before, after, step_s) < _STILL_SPEED_M_S:
             return 0.0
         u, v, rate_rad_s = slide.velocity().tolist()
         c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)

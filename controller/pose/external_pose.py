@@ -104,7 +104,7 @@ RESTART_S: Final = 1.0
 FROZEN: Final = 10
 FROZEN_M: Final = 0.03
 """This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
-_MOST_KEPT: Final = 1000
+_MOST_KEPT_POSES: Final = 1000
 """Measurements that are kept for ``take_measured``."""
 
 
@@ -171,7 +171,7 @@ class ExternalPose:
         self._newest: ArrivedPose | None = None
         self._early: list[ArrivedPose] = []
         self._equal: tuple[int, np.ndarray, np.ndarray] = (0, np.zeros(12), np.zeros(2))
-        self._measured: deque[TimedHead] = deque(maxlen=_MOST_KEPT)
+        self._measured: deque[TimedHead] = deque(maxlen=_MOST_KEPT_POSES)
         self._now_s = self._used_s = -np.inf
         self._used: PoseSample | None = None
         self._reason = ""
@@ -276,7 +276,7 @@ class ExternalPose:
         if isinstance(sample, UnusablePoseError):
             self._reject("damaged", str(sample))
             return
-        if not self._is_of_first_sender(arrived) or not self._is_next(sample, arrived):
+        if not self._is_of_first_sender(arrived) or not self._follows_newest(sample, arrived):
             return
         if self._frame is None:
             self._frame = sample.frame
@@ -305,12 +305,12 @@ class ExternalPose:
             self._reject("contradiction", self._check.fault)
             return
         off = self._filter.innovation(measured, then)
-        placed = _placed(measured, then, self._filter.turn_rad(measured, then))
+        placed = _placed_pose(measured, then, self._filter.turn_rad(measured, then))
         if not self._filter.is_placed:
             self._compare_start(placed)
         if not self._filter.is_placed or not off.is_jump:
             self._filter.update(measured, then, off)
-        elif not self._has_relocated(placed):
+        elif not self._body_has_relocated(placed):
             if self._check.has_agreed and self._relocation.is_followed:
                 self._check.forget()  # a body that slides does not move as its joints do
             self._reject(
@@ -349,7 +349,7 @@ class ExternalPose:
             "pose.start_deg)"
         )
 
-    def _has_relocated(self, placed: PlacedPose) -> bool:
+    def _body_has_relocated(self, placed: PlacedPose) -> bool:
         """Whether the body truly moved without its joints, and now lies where the poses say."""
         relocated = self._relocation.add(placed)
         self._has_slid |= self._relocation.is_followed
@@ -383,7 +383,7 @@ class ExternalPose:
         )
         return False
 
-    def _is_next(self, sample: PoseSample, arrived: ArrivedPose) -> bool:
+    def _follows_newest(self, sample: PoseSample, arrived: ArrivedPose) -> bool:
         """Whether a pose follows the newest one; a sender that starts again is reported."""
         newest = self._newest
         before = None
@@ -427,7 +427,7 @@ class ExternalPose:
             self._on_event(f"{text}; the pose is left out")
 
 
-def _placed(measured: HeadMeasurement, then: Moment, turn_rad: float) -> PlacedPose:
+def _placed_pose(measured: HeadMeasurement, then: Moment, turn_rad: float) -> PlacedPose:
     return PlacedPose(
         then.time_s,
         measured.position_m,

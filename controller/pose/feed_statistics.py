@@ -89,12 +89,12 @@ class FeedStatistics:
         position_m, axes = self._in_world(self._poses[-1][2])
         return facts | {
             "rate_hz": round((len(self._poses) - 1) / span_s, 1) if span_s > 0.0 else None,
-            "longest_gap_s": _rounded(np.diff(arrival_s).max(initial=0.0)),
-            "jitter_mean_s": _rounded(late_s.mean()),
-            "jitter_max_s": _rounded(late_s.max()),
+            "longest_gap_s": _rounded_value(np.diff(arrival_s).max(initial=0.0)),
+            "jitter_mean_s": _rounded_value(late_s.mean()),
+            "jitter_max_s": _rounded_value(late_s.max()),
             "noise_m": self._noise_m(),
             "noise_deg": self._noise_deg(),
-            "position_m": [_rounded(value) for value in position_m],
+            "position_m": [_rounded_value(value) for value in position_m],
             "heading_deg": round(float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))), 1),
             "up": [round(float(value), 3) for value in axes[:, 2]],
         }
@@ -112,7 +112,7 @@ class FeedStatistics:
         positions = np.array([sample.position_m for sample in self.samples])
         if len(positions) < 10:
             return None
-        return _rounded(np.sqrt(np.mean(np.diff(positions, 2, axis=0) ** 2) / 6.0))
+        return _rounded_value(np.sqrt(np.mean(np.diff(positions, 2, axis=0) ** 2) / 6.0))
 
     def _noise_deg(self) -> float | None:
         """Standard deviation of an angle; slow motion does not count."""
@@ -123,5 +123,5 @@ class FeedStatistics:
         return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
 
 
-def _rounded(value: float) -> float:
+def _rounded_value(value: float) -> float:
     return round(float(value), 4)

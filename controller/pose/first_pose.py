@@ -57,7 +57,7 @@ def await_first_pose(
             fault = judge(arrival.sample)
             if fault is not None:
                 raise InputError(f"pose {source}: {fault}")
-            return _watched(source, feed, clock, arrived)
+            return _watched_poses(source, feed, clock, arrived)
         clock.sleep_until_s(clock.now_s() + LOOK_S)
     raise InputError(
         f"pose {source}: no usable pose within {WAIT_S:g} s: "
@@ -65,7 +65,7 @@ def await_first_pose(
     )
 
 
-def _watched(
+def _watched_poses(
     source: str, feed: PoseFeed, clock: Clock, arrived: list[ArrivedPose]
 ) -> list[ArrivedPose]:
     """Receive the poses of a robot at rest, whose source should not drift.

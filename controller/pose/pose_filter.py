@@ -158,7 +158,7 @@ class PoseFilter:
     def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
         """Return the turn from the frame of dead reckoning to the world by a measurement alone."""
         measured_frame = measured.rotation @ self._mean_frame(then)
-        return _wrapped(
+        return _wrapped_rad(
             float(np.arctan2(measured_frame[1, 0], measured_frame[0, 0])) - self._body_heading(then)
         )
 
@@ -170,11 +170,11 @@ class PoseFilter:
     def update(self, measured: HeadMeasurement, then: Moment, off: Innovation) -> None:
         """Correct the pose by a measurement and its innovation; the first one places the body."""
         if self.is_placed:
-            gain, self.position_covariance = _corrected(
+            gain, self.position_covariance = _gain_and_covariance(
                 self.position_covariance, measured.position_covariance
             )
             self.head_m += gain @ off.position_m
-            gain, self.turn_covariance = _corrected(
+            gain, self.turn_covariance = _gain_and_covariance(
                 self.turn_covariance, measured.rotation_covariance
             )
             self._body = rotation_by(gain @ off.turn_rad) @ self._body
@@ -192,13 +192,13 @@ class PoseFilter:
         turn = self._body_heading(after) - self._body_heading(before)
         c, s = np.cos(self._frame_rad), np.sin(self._frame_rad)
         x, y = after.place[:2] - before.place[:2]
-        return _wrapped(turn), np.array([c * x - s * y, s * x + c * y])
+        return _wrapped_rad(turn), np.array([c * x - s * y, s * x + c * y])
 
     def _align(self) -> None:
         """Turn the frame of dead reckoning so that the body has its heading."""
         assert self._last is not None
         heading = float(np.arctan2(self._body[1, 0], self._body[0, 0]))
-        self._frame_rad = _wrapped(heading - self._body_heading(self._last))
+        self._frame_rad = _wrapped_rad(heading - self._body_heading(self._last))
 
     def _body_heading(self, moment: Moment) -> float:
         frame = self._mean_frame(moment)
@@ -240,7 +240,7 @@ def rotation_vector(rotation: Floats) -> Floats:
     return np.asarray(np.pi * along / np.linalg.norm(along))
 
 
-def _wrapped(angle_rad: float) -> float:
+def _wrapped_rad(angle_rad: float) -> float:
     return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
 
 
@@ -258,7 +258,7 @@ def _deviations(error: Floats, covariance: Floats) -> float:
     return float(np.sqrt(error @ np.linalg.solve(covariance, error)))
 
 
-def _corrected(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
+def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Return the gain (3, 3) of a measurement, and the covariance after it."""
     gain = prior @ np.linalg.inv(prior + noise)
     keep = np.eye(3) - gain

@@ -109,7 +109,7 @@ def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
     """Whether a body may have moved from one pose to the next, in at most ``most_s``."""
     gap_s = min(pose.time_s - last.time_s, most_s)
     off_m = float(np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad)))
-    off_rad = abs(_wrapped(pose.turn_rad - last.turn_rad))
+    off_rad = abs(_wrapped_rad(pose.turn_rad - last.turn_rad))
     noise_m = STEP_SD * np.hypot(last.position_sd_m, pose.position_sd_m)
     noise_rad = STEP_SD * np.hypot(last.turn_sd_rad, pose.turn_sd_rad)
     return bool(
@@ -122,7 +122,7 @@ def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
 def _agree(poses: list[PlacedPose]) -> bool:
     """Whether poses differ by the motion of the joints and by noise only."""
     newest = poses[-1]
-    turns = newest.turn_rad + np.array([_wrapped(p.turn_rad - newest.turn_rad) for p in poses])
+    turns = newest.turn_rad + np.array([_wrapped_rad(p.turn_rad - newest.turn_rad) for p in poses])
     turn_rad = float(turns.mean())
     places_m = np.array([pose.moved_to(newest, turn_rad) for pose in poses])
     off_m = np.linalg.norm(places_m - places_m.mean(axis=0), axis=1)
@@ -132,5 +132,5 @@ def _agree(poses: list[PlacedPose]) -> bool:
     return bool(np.all(off_m <= most_m) and np.all(off_rad <= most_rad))
 
 
-def _wrapped(angle_rad: float) -> float:
+def _wrapped_rad(angle_rad: float) -> float:
     return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))

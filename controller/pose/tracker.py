@@ -17,7 +17,7 @@ from snakewalk.drivers.types import BodyPose
 FRAME = "world"
 
 
-_KEPT_S = 1.0
+_DATAGRAM_AGE_S = 1.0
 """Longest time for which a datagram waits for its reader (ours)."""
 
 
@@ -73,7 +73,7 @@ class SimulatedTracker:
             FRAME,
             self._covariance(),
         )
-        while self._outgoing and self._outgoing[0].due_s < now_s - _KEPT_S:
+        while self._outgoing and self._outgoing[0].due_s < now_s - _DATAGRAM_AGE_S:
             self._outgoing.popleft()  # nothing asks for them
         self._outgoing.append(Sent(now_s + delay_s, encode_pose(sample)))
         return sequence, now_s + delay_s

@@ -15,7 +15,7 @@ from snakewalk.drivers.clock import Clock
 LOCAL: Final = "127.0.0.1"
 MOST_WAITING: Final = 2000
 """Poses that wait to be read; older ones are dropped (ours)."""
-_LOOK_S: Final = 0.2
+_POLL_S: Final = 0.2
 
 
 def parse_address(text: str, option: str = "--pose udp") -> tuple[str, int]:
@@ -77,7 +77,7 @@ class UdpFeed(PoseQueue):
                 f"pose udp:{host}:{port}: cannot be bound ({error.strerror or error}); end the "
                 "program that uses the port, or choose another one"
             ) from None
-        self._socket.settimeout(_LOOK_S)
+        self._socket.settimeout(_POLL_S)
         self.port: int = self._socket.getsockname()[1]
         """Number of the bound port."""
         self._ended = threading.Event()

@@ -103,9 +103,9 @@ def judge(
         verdict=verdict(record, numbers).with_cause,
         tripped=numbers.trip,
         path_error_mean_m=_mean(off_path_m),
-        path_error_max_m=_largest(off_path_m),
+        path_error_max_m=_largest_value(off_path_m),
         pose_error_rms_m=_rms(head_m),
-        pose_error_max_m=_largest(head_m),
+        pose_error_max_m=_largest_value(head_m),
         heading_error_rms_deg=_rms(np.degrees(heading_rad)),
         travelled_m=round(float(np.hypot(*np.diff(steps_m, axis=0).T).sum()), 3),
     )
@@ -187,7 +187,7 @@ def _mean(values: Floats) -> float | None:
     return round(float(values.mean()), 4) if values.size else None
 
 
-def _largest(values: Floats) -> float | None:
+def _largest_value(values: Floats) -> float | None:
     return round(float(values.max()), 4) if values.size else None
 
 

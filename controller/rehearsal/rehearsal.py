@@ -240,7 +240,7 @@ def rehearse(case: RehearsalCase, changes: Mapping[str, Any] | None = None) -> d
 
     """
     with TemporaryDirectory() as folder:
-        return {**described(case), **_judged(case, changes or {}, Path(folder))}
+        return {**described(case), **_judged_case(case, changes or {}, Path(folder))}
 
 
 def described(case: RehearsalCase) -> dict[str, Any]:
@@ -280,7 +280,7 @@ def moved(start: Place, rng: np.random.Generator) -> Place:
     )
 
 
-def _judged(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def _judged_case(case: RehearsalCase, changes: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     try:
         prepared = prepare_job(case.run, seed=case.seed, pose="udp:9870", **changes)
         rng = generator(case.seed)

@@ -130,7 +130,7 @@ def run_task(item: TaskRun) -> TaskResult:
     about = (item.task, item.controller, item.seed)
     try:
         if task.is_rehearsed:
-            return _rehearsed(task, item)
+            return _rehearsed_task(task, item)
         prepared = _prepare(task, item.controller, item.seed)
         result = run_robot(RunRequest(prepared, stoppable=False))
     except InputError as error:
@@ -151,14 +151,14 @@ def share(task: ControllerTask, result: RunResult) -> float:
     """Share of a task that a body truly did."""
     record = result.record
     if task.run is None:
-        return min(max(_moved_m(record, task.axis) / task.distance_m, 0.0), 1.0)
+        return min(max(_moved_distance_m(record, task.axis) / task.distance_m, 0.0), 1.0)
     run = load_run(task.run)
     way_m = np.asarray(record.pose.head_m[:, :2])
     reached, _ = true_arrivals(way_m, np.array(run.waypoints_m), run.waypoint_radius_m)
     return reached / len(run.waypoints_m)
 
 
-def _moved_m(record: RunRecord, axis: str) -> float:
+def _moved_distance_m(record: RunRecord, axis: str) -> float:
     centre_m = record.pose.centre_m
     time_s = record.pose.time_s
     ends: list[Floats] = [
@@ -208,7 +208,7 @@ def _is_policy(controller: str) -> bool:
     return controller in shipped("policies") or controller.endswith(".toml")
 
 
-def _rehearsed(task: ControllerTask, item: TaskRun) -> TaskResult:
+def _rehearsed_task(task: ControllerTask, item: TaskRun) -> TaskResult:
     if item.controller in OPEN_LOOP or _is_policy(item.controller):
         raise InputError(f"{item.controller} does not use a pose, and the rehearsal is about it")
     case = RehearsalCase(str(task.run), item.seed, has_errors=True, tracker=TRACKER)

@@ -16,7 +16,7 @@ _HEAD = ("robot", "joint_axes", "world", "length_m", "law")
 NO_LAW = "not stated"
 """Text for files without the law of friction."""
 _ARRAYS = ("turn", "move_m", "link_m", "link_rotation", "goal_rad", "joint_rad")
-_PLAIN = tuple(f.name for f in fields(Segment) if f.name not in _ARRAYS)
+_PLAIN_FIELDS = tuple(f.name for f in fields(Segment) if f.name not in _ARRAYS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Repertoire:
         about = {
             "format": FORMAT,
             **{key: getattr(self, key) for key in _HEAD},
-            "segments": [{key: getattr(s, key) for key in _PLAIN} for s in self.segments],
+            "segments": [{key: getattr(s, key) for key in _PLAIN_FIELDS} for s in self.segments],
         }
         arrays = {
             f"{k}/{name}": getattr(segment, name)

@@ -93,18 +93,18 @@ def search(
     if reached >= len(goals):
         return Route((), begin, reached, 0.0, 0)
     after = np.append(np.cumsum(np.hypot(*np.diff(goals, axis=0).T)[::-1])[::-1], 0.0)
-    level = _Level(
+    level = _SequenceLevel(
         begin, np.array([reached]), np.zeros(1), None, np.zeros(1, int), np.zeros(1, int)
     )
-    best: tuple[_Level, int] | None = None
+    best: tuple[_SequenceLevel, int] | None = None
     candidates = 0
     for _ in range(depth):
-        ends, count, spent = _expanded(primitives, level, goals, radius_m)
+        ends, count, spent = _expanded_sequences(primitives, level, goals, radius_m)
         candidates += len(ends)
         cost = spent + _remaining_s(primitives, ends, count, goals, after, radius_m)
         order = np.argsort(cost, kind="stable")[:beam]
         parent, action = np.divmod(order, len(primitives.tried))
-        level = _Level(
+        level = _SequenceLevel(
             ends[order], count[order], spent[order], level, parent, primitives.tried[action]
         )
         done = level.passed >= len(goals)
@@ -118,11 +118,11 @@ def search(
         if not going.any():
             break
         level = level.only(np.flatnonzero(going))
-    return _backtracked(*(best or (level, 0)), candidates)
+    return _backtracked_route(*(best or (level, 0)), candidates)
 
 
 @dataclass(frozen=True, slots=True)
-class _Level:
+class _SequenceLevel:
     """Sequences of one length, and the level that they go on from."""
 
     pose: Floats
@@ -131,14 +131,14 @@ class _Level:
     """(n,) waypoints."""
     time_s: Floats
     """(n,) durations of the sequences, s."""
-    before: "_Level | None"
+    before: "_SequenceLevel | None"
     parent: Ints
     """(n,) in ``before``."""
     action: Ints
     """(n,) that led here."""
 
-    def only(self, which: Ints) -> "_Level":
-        return _Level(
+    def only(self, which: Ints) -> "_SequenceLevel":
+        return _SequenceLevel(
             self.pose[which],
             self.passed[which],
             self.time_s[which],
@@ -148,8 +148,8 @@ class _Level:
         )
 
 
-def _expanded(
-    primitives: MotionPrimitives, level: _Level, goals: Floats, radius_m: float
+def _expanded_sequences(
+    primitives: MotionPrimitives, level: _SequenceLevel, goals: Floats, radius_m: float
 ) -> tuple[Floats, Ints, Floats]:
     """Every action after each sequence: (nB, 3) poses, (nB,) waypoints passed, (nB,) time."""
     c, s = np.cos(level.pose[:, 2]), np.sin(level.pose[:, 2])
@@ -169,12 +169,12 @@ def _expanded(
     return ends.reshape(-1, 3), count.ravel(), spent.ravel()
 
 
-def _backtracked(level: _Level, level_index: int, candidates: int) -> Route:
+def _backtracked_route(level: _SequenceLevel, level_index: int, candidates: int) -> Route:
     reached = int(level.passed[level_index])
     time_s = float(level.time_s[level_index])
     poses = [level.pose[level_index]]
     actions = []
-    before: _Level | None = level
+    before: _SequenceLevel | None = level
     while before is not None and before.before is not None:
         actions.append(int(before.action[level_index]))
         level_index = int(before.parent[level_index])

@@ -48,7 +48,7 @@ class SeparatedCrowd:
         crowd.step()
         self.blocker[:] = NONE
         while True:
-            stopped = self._stopped(before[-1])
+            stopped = self._bodies_to_return(before[-1])
             if not len(stopped):
                 break
             crowd.restore(before, stopped)
@@ -79,7 +79,7 @@ class SeparatedCrowd:
         count = _find_pairs(self._crowd.points_m, self._crowd.scale, self._radius_m, pairs)
         return pairs[:count]
 
-    def _stopped(self, old_m: Singles) -> Ints:
+    def _bodies_to_return(self, old_m: Singles) -> Ints:
         """Mark further bodies that have to return to links ``old_m``, and return them."""
         blocker_before = self.blocker.copy()
         points = self._crowd.points_m
@@ -155,7 +155,7 @@ def _boxes(points: Singles, scale: Floats, radius: Floats) -> Floats:
 
 
 @callable_in_loops
-def _apart(box: Floats, i: int, j: int) -> bool:
+def _boxes_are_apart(box: Floats, i: int, j: int) -> bool:
     across = box[i, 0] > box[j, 1] or box[j, 0] > box[i, 1]
     return bool(across or box[i, 2] > box[j, 3] or box[j, 2] > box[i, 3])
 
@@ -178,7 +178,9 @@ def _stop(
     last = len(radius) - 1.0
     for i in range(len(points)):
         for j in range(i):
-            if (blocker_before[i] != NONE and blocker_before[j] != NONE) or _apart(box, i, j):
+            if (blocker_before[i] != NONE and blocker_before[j] != NONE) or _boxes_are_apart(
+                box, i, j
+            ):
                 continue
             at_i, at_j = _meeting(points[i], scale[i], points[j], scale[j], radius)
             if at_i == NONE:
@@ -199,7 +201,7 @@ def _stop(
 def _is_clear(points: Singles, scale: Floats, radius: Floats, i: int) -> bool:
     box = _boxes(points, scale, radius)
     for j in range(len(points)):
-        if j == i or _apart(box, i, j):
+        if j == i or _boxes_are_apart(box, i, j):
             continue
         if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
             return False
@@ -215,7 +217,7 @@ def _find_pairs(points: Singles, scale: Floats, radius: Floats, pairs: Ints) -> 
         for j in range(i):
             if count == len(pairs):
                 return count
-            if _apart(box, i, j):
+            if _boxes_are_apart(box, i, j):
                 continue
             if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
                 pairs[count, 0], pairs[count, 1] = i, j

@@ -66,7 +66,7 @@ def curves_html(record: RunRecord) -> str:
         f"the time of the film or trip.{which}{constant}"
         "</figcaption></figure>"
         f"<script id='plotly' type='text/plain'>{_library()}</script>"
-        f"<script id='curves-data' type='text/plain'>{_zipped(spec)}</script></section>"
+        f"<script id='curves-data' type='text/plain'>{_zipped_text(spec)}</script></section>"
     )
 
 
@@ -115,7 +115,7 @@ def _figure(
         for curve in curves
     ]
     every = [
-        [_packed(curve.values[:, k]) for _, curves in joint for curve in curves]
+        [_packed_values(curve.values[:, k]) for _, curves in joint for curve in curves]
         for k in range(record.cycle.asked_rad.shape[1])
     ]
     titles = [_title(record, title) for title, _ in (*panels, *joint)]
@@ -239,8 +239,8 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
         "type": "scatter",
         "mode": "lines",
         "name": name,
-        "x": _packed(time_s),
-        "y": _packed(values),
+        "x": _packed_values(time_s),
+        "y": _packed_values(values),
         "xaxis": "x",
         "yaxis": "y" if row == 1 else f"y{row}",
         "legend": "legend" if row == 1 else f"legend{row}",
@@ -252,10 +252,10 @@ def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> 
 @cache
 def _library() -> str:
     """Plotly, compressed once however many pages a process makes."""
-    return _zipped(get_plotlyjs())
+    return _zipped_text(get_plotlyjs())
 
 
-def _zipped(text: str) -> str:
+def _zipped_text(text: str) -> str:
     """Base64, which holds no markup, of the compressed text; the page's script unpacks it."""
     return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
 
@@ -264,7 +264,7 @@ def _step(rows: int) -> int:
     return max(1, -(-rows // _ROWS))
 
 
-def _packed(values: Floats) -> dict[str, str]:
+def _packed_values(values: Floats) -> dict[str, str]:
     """An array as Plotly's base64 of 4-byte numbers; NaN is a gap."""
     thinned = np.asarray(values[:: _step(len(values))], dtype="<f4")
     return {"dtype": "f4", "bdata": base64.b64encode(thinned.tobytes()).decode()}

@@ -23,7 +23,7 @@ FPS = 15
 FINE_FPS = 25
 SIZE = (800, 450)
 FINE_SIZE = (1280, 720)
-_LONGEST_S: Final = 27.0
+_LONGEST_FILM_S: Final = 27.0
 """Longest film: a longer run is shown faster."""
 _ROWS: Final = 20_000
 """Least rows that are left of a longer run (ours): 30 for each frame of a film."""
@@ -126,7 +126,7 @@ def film_times(record: RunRecord) -> tuple[float, float]:
 
 def speed_up(duration_s: float) -> float:
     """How many times faster than its run a film is: whole, and 1 for a short run."""
-    return float(max(1, np.ceil(duration_s / _LONGEST_S)))
+    return float(max(1, np.ceil(duration_s / _LONGEST_FILM_S)))
 
 
 def _ground(header: Header) -> HeightField | None:

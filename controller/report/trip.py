@@ -67,13 +67,15 @@ def _limited_values(record: RunRecord, joint: int) -> tuple[LimitedValue, ...]:
         most_rad = float(limits.limit_rad[joint]) + limits.limit_slack_rad
         away_rad = float(limits.following_limit_rad[joint])
         values += [
-            _at_most("current", current_a, limits.current_limit_a, "A", limits.current_time_s),
-            _at_most("angle from zero", abs(angle_rad), most_rad, "rad"),
-            _at_most("distance from goal", error_rad, away_rad, "rad", limits.following_time_s),
+            _upper_limit("current", current_a, limits.current_limit_a, "A", limits.current_time_s),
+            _upper_limit("angle from zero", abs(angle_rad), most_rad, "rad"),
+            _upper_limit("distance from goal", error_rad, away_rad, "rad", limits.following_time_s),
         ]
     warm = slow.temperature_c[np.isfinite(slow.temperature_c[:, joint]), joint]
     if len(warm):
-        values.append(_at_most("temperature", float(warm[-1]), limits.temperature_limit_c, "°C"))
+        values.append(
+            _upper_limit("temperature", float(warm[-1]), limits.temperature_limit_c, "°C")
+        )
     volts = slow.voltage_v[np.isfinite(slow.voltage_v[:, joint]), joint]
     if len(volts):
         supply_v, least_v, most_v = float(volts[-1]), limits.voltage_min_v, limits.voltage_max_v
@@ -88,7 +90,7 @@ def _limited_values(record: RunRecord, joint: int) -> tuple[LimitedValue, ...]:
     return tuple(values)
 
 
-def _at_most(
+def _upper_limit(
     name: str, value: float, limit: float, unit: str, for_s: float | None = None
 ) -> LimitedValue:
     """A value with an upper limit that counts at once, or after ``for_s`` seconds."""

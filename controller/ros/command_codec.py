@@ -30,7 +30,7 @@ from snakewalk.controller.motion.command import (
 
 LATE_S: Final = 0.5
 """A command that waited longer for the run is rejected (ours): nothing stale moves a joint."""
-_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S: Final = 0.1
 """A command with a later time is rejected (ours): both processes read the same clock."""
 _NAMES: Final = {
     "goals": "joint goals",
@@ -52,7 +52,9 @@ def encode_command(command: Command) -> str:
         row = {"kind": "goals", "joints": list(command.joints), "position_rad": positions}
     elif isinstance(command, JointTrajectory):
         row = {"kind": "trajectory", "joints": list(command.joints)}
-        row |= {key: _packed(value) for key, value in command._asdict().items() if key != "joints"}
+        row |= {
+            key: _packed_array(value) for key, value in command._asdict().items() if key != "joints"
+        }
     elif isinstance(command, StartGait):
         gait = command.gait
         row = {"kind": "gait", "name": gait.name, "parameters": gait.params.model_dump()}
@@ -86,7 +88,7 @@ def decode_command(
         kind = row["kind"]
         age_s = now_s() - float(row["sent_s"])
         if kind in _NAMES:
-            if not age_s >= -_AHEAD_S:  # NaN, too
+            if not age_s >= -_MOST_AHEAD_S:  # NaN, too
                 return Refused(f"{kind}: its time is {-age_s:.1f} s ahead of this machine's clock")
             if age_s > late_s:
                 return Refused(f"{kind}: waited {age_s:.1f} s for the run")
@@ -106,16 +108,16 @@ def _command(kind: str, row: dict[str, Any]) -> Command:
     if kind == "goals":
         return JointGoals(_texts(row["joints"]), [float(value) for value in row["position_rad"]])
     if kind == "trajectory":
-        time_s = _unpacked(row["time_s"], 1)
-        position_rad = _unpacked(row["position_rad"], 2)
+        time_s = _unpacked_array(row["time_s"], 1)
+        position_rad = _unpacked_array(row["position_rad"], 2)
         if time_s is None or position_rad is None:
             raise ValueError("a trajectory needs times and positions")
         return JointTrajectory(
             _texts(row["joints"]),
             time_s,
             position_rad,
-            _unpacked(row["velocity_rad_s"], 2),
-            _unpacked(row["acceleration_rad_s2"], 2),
+            _unpacked_array(row["velocity_rad_s"], 2),
+            _unpacked_array(row["acceleration_rad_s2"], 2),
         )
     if kind == "gait":
         from snakewalk.controller.gaits.registry import make_gait  # noqa: PLC0415  the node has none
@@ -140,7 +142,7 @@ def _texts(values: Sequence[Any]) -> list[str]:
     return values
 
 
-def _packed(values: Floats | None) -> list[Any] | None:
+def _packed_array(values: Floats | None) -> list[Any] | None:
     """Shape and base64 of float64."""
     if values is None:
         return None
@@ -148,7 +150,7 @@ def _packed(values: Floats | None) -> list[Any] | None:
     return [array.shape, base64.b64encode(array.tobytes()).decode()]
 
 
-def _unpacked(row: list[Any] | None, dimensions: int) -> Floats | None:
+def _unpacked_array(row: list[Any] | None, dimensions: int) -> Floats | None:
     if row is None:
         return None
     shape, text = row

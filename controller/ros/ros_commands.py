@@ -101,10 +101,12 @@ class CommandTopics:
             self.pending.append(Refused(f"ROS: {why}"))
 
     def _subscribe(self, kind: str, topic: str, take: Callable[[Any], None]) -> None:
-        callback = self._guarded(topic, take)
+        callback = self._guarded_callback(topic, take)
         self._node.create_subscription(message_type(kind), topic, callback, QUEUE)
 
-    def _guarded(self, topic: str, take: Callable[[Any], None]) -> Callable[[Any, Any], None]:
+    def _guarded_callback(
+        self, topic: str, take: Callable[[Any], None]
+    ) -> Callable[[Any, Any], None]:
         """Return a callback that rejects a message on which ``take`` fails."""
         delays = Delays()
 

@@ -35,7 +35,7 @@ class RosLink(ObserverProcess):
 
     def commands(self) -> list[Command]:
         """Return the commands since the last call; never waits."""
-        return [_decoded(line) for line in self._end.commands()]
+        return [_decoded_command(line) for line in self._end.commands()]
 
     def waypoint_commands(self) -> list[str | Refused]:
         """Return the goal poses since the last call as commands of a ``LiveCourse``."""
@@ -62,7 +62,7 @@ def open_node(argument: str) -> AbstractContextManager[RosLink]:
     return open_ros(RosOptions(goals=argument == GOALS))
 
 
-def _decoded(line: str) -> Command:
+def _decoded_command(line: str) -> Command:
     try:
         return decode_command(line)
     except InputError as error:

@@ -58,20 +58,20 @@ from snakewalk.drivers.safety.stop_button import PressedButton
 
 NAME: Final = "snakewalk"
 _CYCLE: Final = CycleTable.topic.name
-_SLOW: Final = SlowTable.topic.name
+_SLOW_TOPIC: Final = SlowTable.topic.name
 _POSE_SOURCE: Final = PoseSourceTable.topic.name
-_WAIT_S: Final = 0.05
+_STEP_S: Final = 0.05
 _DIAGNOSTICS_S: Final = 1.0
 _OFFSET_SPAN_S: Final = 2.0
 _STOP_S: Final = 1.0
 """Longest wait of the stop service for the run to confirm that torque is off."""
-_LOOK_S: Final = 1e-3
-_LAST_S: Final = 0.2
+_POLL_S: Final = 1e-3
+_LAST_MESSAGES_S: Final = 0.2
 """Time for the last messages to leave."""
 _RUN: Final = "run"
 _LEVELS: Final = {0: OK, NOT_MEASURED: WARNING}
 """Diagnostic level of a run by its exit code."""
-_LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _TOPICS: Final = {
     JOINT_STATES: ("robot_joint_states", QUEUE),
     JOINT_GOALS: ("robot_joint_goals", QUEUE),
@@ -79,7 +79,7 @@ _TOPICS: Final = {
     ODOMETRY: ("odom", QUEUE),
     FRAMES: (FRAMES, QUEUE),
     IMU: ("imu", QUEUE),
-    PATH: ("path", _LATCHED),
+    PATH: ("path", _LATCHED_QOS),
     DIAGNOSTICS: (DIAGNOSTICS, QUEUE),
 }
 """Topic of a bag to name and quality of service of a node's; all nodes share the absolute names."""
@@ -103,7 +103,7 @@ def serve(line: socket.socket, options: RosOptions) -> None:
         with suppress(EOFError):
             while True:
                 try:
-                    robot.step(_WAIT_S)
+                    robot.step(_STEP_S)
                 except EOFError:
                     raise
                 except Exception as fault:  # the stop service stays
@@ -197,7 +197,7 @@ class RobotNode:
     def step(self, wait_s: float) -> None:
         """Read the rows that have come, publish them, and pass the commands to the run."""
         for topic, row in self._end.rows(wait_s):
-            self._take(topic, row)
+            self._store_row(topic, row)
             if topic == PoseTable.topic.name:
                 self._publish_cycle()
                 self._send()
@@ -211,9 +211,9 @@ class RobotNode:
             self._said[_RUN] = OK, "it has come to its end"
         self._told_s = -_DIAGNOSTICS_S
         self._publish_diagnostics()
-        self._clock.sleep_until_s(self._clock.now_s() + _LAST_S)
+        self._clock.sleep_until_s(self._clock.now_s() + _LAST_MESSAGES_S)
 
-    def _take(self, topic: str, row: Mapping[str, Any]) -> None:
+    def _store_row(self, topic: str, row: Mapping[str, Any]) -> None:
         if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
         elif topic == ConfigTable.topic.name:
@@ -244,7 +244,10 @@ class RobotNode:
             self._publish(self._messages.paths(record))
 
     def _publish_cycle(self) -> None:
-        rows, self._newest = self._newest, {k: v for k, v in self._newest.items() if k == _SLOW}
+        rows, self._newest = (
+            self._newest,
+            {k: v for k, v in self._newest.items() if k == _SLOW_TOPIC},
+        )
         if self._header is None or _CYCLE not in rows:
             return
         self.commands.has_begun = True
@@ -296,8 +299,10 @@ class RobotNode:
             for values in (self._verdict if name == _RUN else {},)
         ]
         status.append(self._messages.pose_status(self._header))
-        if _SLOW in self._newest:
-            status += self._messages.servos(self._record({_SLOW: [self._newest[_SLOW]]}), 0)
+        if _SLOW_TOPIC in self._newest:
+            status += self._messages.servos(
+                self._record({_SLOW_TOPIC: [self._newest[_SLOW_TOPIC]]}), 0
+            )
         self._publisher(DIAGNOSTICS).publish(self._messages.diagnostics(run_s, status).message)
 
     def _log_event(self, row: Mapping[str, Any]) -> None:
@@ -337,7 +342,7 @@ class RobotNode:
         began_s = self._clock.now_s()
         button.press(f"ROS service {self._node.get_fully_qualified_name()}/stop")
         while button.end is None and self._clock.now_s() < began_s + _STOP_S:
-            self._clock.sleep_until_s(self._clock.now_s() + _LOOK_S)
+            self._clock.sleep_until_s(self._clock.now_s() + _POLL_S)
         after_ms = 1e3 * (self._clock.now_s() - began_s)
         said = button.end
         response.success = said is not None and "torque off failed" not in said

@@ -34,7 +34,7 @@ _EVENT = struct.Struct("<IhBB")
 _BUTTON = 1
 _AXIS = 2
 _AT_START = 0x80
-_HALF = 16384
+_HALF_DEFLECTION = 16384
 _EVENTS_MAX = 8
 """Reads of 64 events in a call (ours): a device that never ends must not hold a cycle up."""
 BUTTONS = {0: "n", 1: "m", 2: "p", 3: "d", 6: "space", 7: "q", 8: "space", 9: "q", 10: "t"}
@@ -70,7 +70,7 @@ class Pad:
             elif kind == _BUTTON and value and number in BUTTONS:
                 pressed.append(BUTTONS[number])
             elif kind & ~_AT_START == _AXIS and number in AXES:
-                side = int(value > _HALF) - int(value < -_HALF)
+                side = int(value > _HALF_DEFLECTION) - int(value < -_HALF_DEFLECTION)
                 if side and side != self._out.get(number, 0) and not kind & _AT_START:
                     pressed.append(AXES[number][side > 0])
                 self._out[number] = side
@@ -283,23 +283,25 @@ class Hands:
 
         self._motion = motion
         tell_page()
-        return Operator(motion, robot, self._take, on_change, self._held)
+        return Operator(motion, robot, self._take_keys, on_change, self._is_enabled_by_hand)
 
-    def _take(self) -> list[str | Refused]:
+    def _take_keys(self) -> list[str | Refused]:
         """Return the keys; late ones, other than for the end, as a reason why they are dropped."""
         taken = self._waiting
         self._waiting = []
         now_s = self._now_s()
         return [
-            key if now_s - since_s <= LATE_S or key in _ENDS else _late(key, now_s - since_s)
+            key
+            if now_s - since_s <= LATE_S or key in _ENDS
+            else _late_refusal(key, now_s - since_s)
             for since_s, key in taken
         ]
 
-    def _held(self) -> bool:
+    def _is_enabled_by_hand(self) -> bool:
         return all(device.is_enabled for device in self._devices)
 
 
-def _late(key: str | Refused, age_s: float) -> Refused:
+def _late_refusal(key: str | Refused, age_s: float) -> Refused:
     if isinstance(key, Refused):
         return key
     return Refused(

@@ -78,16 +78,16 @@ class MapProvider:
     """Way of the head so far, in plan."""
     head_over_unknown_m: float = 0.0
     """Part of it over ground that was unmapped when the head arrived."""
-    _last_m: Floats | None = None
+    _last_place_m: Floats | None = None
 
     def follow(self, head_m: Floats) -> None:
         """Note where the head (3,) is now."""
-        if self.ground_map is not None and self._last_m is not None:
-            step_m = float(np.hypot(*(head_m - self._last_m)[:2]))
+        if self.ground_map is not None and self._last_place_m is not None:
+            step_m = float(np.hypot(*(head_m - self._last_place_m)[:2]))
             self.head_m += step_m
             if not self.ground_map.is_known(float(head_m[0]), float(head_m[1])):
                 self.head_over_unknown_m += step_m
-        self._last_m = np.array(head_m)
+        self._last_place_m = np.array(head_m)
 
     def facts(self) -> dict[str, float | int]:
         """Numbers for log and answer; none without a map."""

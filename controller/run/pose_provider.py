@@ -156,7 +156,7 @@ class PoseComparison:
     true: Callable[[], BodyPose]
     _head_m: list[float] = field(default_factory=list)
     _heading_rad: list[float] = field(default_factory=list)
-    _reached: int = 0
+    _reached_count: int = 0
 
     def __call__(self, state: JointState) -> BodyPose:
         """Return the estimated pose."""
@@ -166,15 +166,15 @@ class PoseComparison:
         turn = pose.heading_rad - true.heading_rad
         self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
         run = self.prepared.run
-        if self._reached < len(run.waypoints_m):
+        if self._reached_count < len(run.waypoints_m):
             centre = body_in_world(self.prepared.robot, true, state.position_rad).centre_m[:2]
-            away = np.hypot(*(centre - run.waypoints_m[self._reached]))
-            self._reached += int(away <= run.waypoint_radius_m)
+            away = np.hypot(*(centre - run.waypoints_m[self._reached_count]))
+            self._reached_count += int(away <= run.waypoint_radius_m)
         return pose
 
     def error(self) -> PoseError:
         """Return the errors so far."""
-        return PoseError(np.array(self._head_m), np.array(self._heading_rad), self._reached)
+        return PoseError(np.array(self._head_m), np.array(self._heading_rad), self._reached_count)
 
 
 @contextmanager
@@ -224,7 +224,7 @@ def pose_provider(
         on_event("pose", ", ".join(f"{key} {value}" for key, value in facts.items()))
 
 
-class _Reckoned:
+class _DeadReckonedPose:
     source = "joints"
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:
@@ -241,12 +241,12 @@ class _Reckoned:
 
 
 @plugin("pose", "joints")
-class JointsPose(_Reckoned):
+class JointsPose(_DeadReckonedPose):
     """Dead reckoning from the joint angles alone."""
 
 
 @plugin("pose", "imu")
-class ImuPose(_Reckoned):
+class ImuPose(_DeadReckonedPose):
     """Dead reckoning from the joints and the heading of the robot's IMU."""
 
     source = "imu"
@@ -261,7 +261,7 @@ class ImuPose(_Reckoned):
 
 
 @plugin("pose", "simulator")
-class SimulatorPose(_Reckoned):
+class SimulatorPose(_DeadReckonedPose):
     """The true pose of the simulated body."""
 
     def evidence(self, run: RunConfig, robot: RobotConfig) -> PoseEvidence:

@@ -88,7 +88,7 @@ class Artifacts:
         }
 
 
-def _what_made_it(folders: bool) -> str:
+def _origin_text(folders: bool) -> str:
     given = sys.argv[1:] if folders else [without_folders(word) for word in sys.argv[1:]]
     words = shlex.join(["snakewalk", *given])
     when = datetime.now().astimezone().isoformat(" ", "seconds")
@@ -113,7 +113,7 @@ def write_artifacts(
         InputError: another run uses the folder.
 
     """
-    what = _what_made_it(folders)
+    what = _origin_text(folders)
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
         artifacts: Artifacts = require("results", "report", "--film").load()(

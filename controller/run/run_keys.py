@@ -52,7 +52,7 @@ def checked_keys(
     for key in keys or {}:
         file, dot, rest = key.partition(".")
         if file not in _FIELDS or not (dot and all(rest.split("."))):
-            faults.append(f"{key}: a key begins with run., robot. or world.{_meant(file, rest)}")
+            faults.append(f"{key}: a key begins with run., robot. or world.{_key_hint(file, rest)}")
         for refused_key, option in (refused or {}).items():
             if f"{key}.".startswith(f"{refused_key}.") or (
                 dot and refused_key.startswith(f"{key}.")
@@ -60,10 +60,10 @@ def checked_keys(
                 faults.append(f"{key}: is given by {option}")
     if faults:
         raise InputError(faults)
-    return dict(_in_rad(key, value) for key, value in (keys or {}).items())
+    return dict(_key_in_rad(key, value) for key, value in (keys or {}).items())
 
 
-def _meant(first: str, rest: str) -> str:
+def _key_hint(first: str, rest: str) -> str:
     """Hint on a key whose first word names no file."""
     files = get_close_matches(first, _FIELDS, 1, 0.7)
     if files and rest:
@@ -74,7 +74,7 @@ def _meant(first: str, rest: str) -> str:
     return ""
 
 
-def _in_rad(key: str, value: object) -> tuple[str, object]:
+def _key_in_rad(key: str, value: object) -> tuple[str, object]:
     if not key.endswith("_deg"):
         return key, value
     if isinstance(value, int | float) and not isinstance(value, bool):

@@ -234,7 +234,7 @@ def open_run(
         source = prepared.make_source(log_event)
         friction = _use_second_body(prepared, checked, source, backend, pose, stack)
         if request.waypoint_commands is not None:
-            source = _live(prepared, source, request.waypoint_commands, log_event)
+            source = _live_course(prepared, source, request.waypoint_commands, log_event)
         link = SafeLink(
             backend.chain,
             SafetyLimits.from_config(checked.robot, safety),
@@ -442,7 +442,7 @@ def _stop_output(
     return parse_stop_output(safety.stop_output)
 
 
-def _live(
+def _live_course(
     prepared: PreparedRun,
     source: MotionSource,
     commands: Callable[[], Iterable[str | Refused]],

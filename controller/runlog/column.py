@@ -240,7 +240,7 @@ def by_rows(function: Callable[..., Any], *columns: Any) -> Any:
 
 
 T = TypeVar("T", bound=Table)
-_registered: list[type[Table]] = []
+_registered_tables: list[type[Table]] = []
 
 
 @dataclass_transform(frozen_default=True)
@@ -259,7 +259,7 @@ def topic(
         hints = get_type_hints(table, include_extras=True)
         columns = {field.name: _column(hints[field.name]) for field in fields(table)}  # type: ignore[arg-type]
         table.topic = Topic(name, columns, is_fast, only_changes, is_optional, watched)
-        _registered.append(table)
+        _registered_tables.append(table)
         return table
 
     return register
@@ -267,7 +267,7 @@ def topic(
 
 def registered_tables() -> tuple[type[Table], ...]:
     """Return the table of each topic that is declared so far."""
-    return tuple(_registered)
+    return tuple(_registered_tables)
 
 
 def _column(hint: Any) -> Column:

@@ -30,17 +30,17 @@ class CurveValues(NamedTuple):
     def is_constant(self) -> bool:
         """Whether the known values stay within the span that the curve names as flat."""
         flat = self.curve.flat
-        return flat is not None and float(np.ptp(self._known)) <= flat
+        return flat is not None and float(np.ptp(self._known_steps)) <= flat
 
     @property
     def constant_text(self) -> str:
         """Words for a constant curve."""
         curve = self.curve
-        median = f"{curve.name} {np.median(self._known):.1f} {curve.panel.unit}".rstrip()
+        median = f"{curve.name} {np.median(self._known_steps):.1f} {curve.panel.unit}".rstrip()
         return curve.constant or median
 
     @property
-    def _known(self) -> Floats:
+    def _known_steps(self) -> Floats:
         return self.values[np.isfinite(self.values)]
 
 

@@ -34,8 +34,8 @@ _CHUNK_LENGTH: Final = 8  # after the packing's name, before the packed bytes
 _ZSTD_HEAD: Final = 18  # at most
 _NAME_BYTES: Final = 1000
 """Bytes of a chunk that hold its head and the name of its packing (ours)."""
-_PACKED: Final = ("zstd", "")
-_NAMED: Final = 8
+_COMPRESSIONS: Final = ("zstd", "")
+_MOST_NAMED_TOPICS: Final = 8
 """Topics that a message names at most (ours)."""
 _BROKEN = (McapError, ZstdError, ValueError, KeyError, RecursionError, struct.error)
 Rows = dict[str, list[dict[str, Any]]]
@@ -121,7 +121,7 @@ def _foreign(file: BinaryIO) -> str:
             profile = record.profile
         elif isinstance(record, Channel):
             topics.add(record.topic)
-    listed = ", ".join(sorted(topics)[:_NAMED]) + (", ..." if len(topics) > _NAMED else "")
+    listed = ", ".join(sorted(topics)[:_MOST_NAMED_TOPICS]) + (", ..." if len(topics) > _MOST_NAMED_TOPICS else "")
     with_topics = f"with topics {listed}" if topics else "without topics"
     return (
         f"is a complete MCAP of profile {profile!r} {with_topics}, but no log of snakewalk; "
@@ -201,7 +201,7 @@ def _topics(path: Path, file: BinaryIO) -> dict[int, str]:
                 topics[record.id] = record.topic
             if isinstance(record, Chunk):
                 chunks += 1
-                if chunks == 1 and record.compression not in _PACKED:
+                if chunks == 1 and record.compression not in _COMPRESSIONS:
                     raise LogError(
                         f"{path}: is packed with {record.compression!r}; a log is with zstd"
                     )
@@ -220,16 +220,16 @@ def _records(file: BinaryIO, lost: list[str]) -> Iterator[McapRecord]:
             yield record
             continue
         try:
-            if record.compression not in _PACKED:  # no CRC covers a chunk's head
+            if record.compression not in _COMPRESSIONS:  # no CRC covers a chunk's head
                 raise ValueError(f"packed with {record.compression!r}")
-            inner = list(breakup_chunk(_unpacked(record), validate_crc=True))
+            inner = list(breakup_chunk(_unpacked_chunk(record), validate_crc=True))
         except _BROKEN as error:
             lost.append(str(error))
             continue
         yield from inner
 
 
-def _unpacked(chunk: Chunk) -> Chunk:
+def _unpacked_chunk(chunk: Chunk) -> Chunk:
     """Unpack a chunk to as many bytes as it says, and its frame says, too, if it says any."""
     if not chunk.compression:
         return chunk

@@ -286,7 +286,7 @@ class RunRecord:
         for entry in fields(self):
             table = getattr(self, entry.name)
             if isinstance(table, Table):
-                moved[entry.name] = _earlier(table, start_s)
+                moved[entry.name] = _rows_before(table, start_s)
         plan = self.header.plan
         if plan.set_s is not None:
             plan = replace(plan, set_s=plan.set_s - start_s)
@@ -304,6 +304,6 @@ _TIMES: Final = ("time_s", "deadline_s", "arrival_s")
 """Fields of tables that are points in time."""
 
 
-def _earlier(table: Table, start_s: float) -> Table:
+def _rows_before(table: Table, start_s: float) -> Table:
     names = [name for name in _TIMES if hasattr(table, name)]
     return table.with_columns(**{name: getattr(table, name) - start_s for name in names})

@@ -81,7 +81,7 @@ class RunEnd:
         """Send what the observer can receive now; never waits."""
         try:
             self._receive()
-            while self._next():
+            while self._read_next():
                 self._out = self._out[self._line.send(self._out) :]
         except BlockingIOError:
             return
@@ -119,14 +119,14 @@ class RunEnd:
         """Send the last rows, for at most ``patience_s`` to a slow observer; then close."""
         self._ready = True
         self._line.settimeout(patience_s)
-        while self._next():
+        while self._read_next():
             try:
                 self._out = self._out[self._line.send(self._out) :]
             except OSError:
                 break
         self._line.close()
 
-    def _next(self) -> bool:
+    def _read_next(self) -> bool:
         if len(self._out):
             return True
         if self._kept:

@@ -33,7 +33,7 @@ class RowPrinter:
         self._arrays = [
             (index, (-1, 3) if column.shape == (LINK, 3) else (-1,))
             for index, column in enumerate(columns.values())
-            if _is_printed_together(column)
+            if _shares_line(column)
         ]
         """Places of the arrays of a fast topic that one call prints, and their shapes."""
         row_of_goals = _exact_row()
@@ -46,7 +46,7 @@ class RowPrinter:
         self._printers = [
             (index, _printer(column, row_of_goals))
             for index, column in enumerate(columns.values())
-            if index not in self._numbers and not _is_printed_together(column)
+            if index not in self._numbers and not _shares_line(column)
         ]
         self._templates: dict[tuple[int, ...], str] = {}
         """Templates of rows, by the places of the unknown numbers."""
@@ -143,7 +143,7 @@ def json_value(column: Column, value: Any) -> Any:
     return floats(value) if column.shape else number(value)
 
 
-def _is_printed_together(column: Column) -> bool:
+def _shares_line(column: Column) -> bool:
     return column.kind == "rounded" and bool(column.shape) and not column.is_printed_alone
 
 

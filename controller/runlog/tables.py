@@ -78,7 +78,7 @@ class RowPacker:
             parts.append(part)
             rows[topic] = []
             if len(parts) >= _PARTS:
-                parts[:] = [_joined(parts, self.folder)]
+                parts[:] = [_joined_table(parts, self.folder)]
 
 
 def _sizes(header: Header) -> dict[str, int]:
@@ -114,7 +114,7 @@ def record_of(
         parts = [*earlier.get(kind, ())]
         if last or not parts:
             parts.append(table_of(kind, last, sizes))
-        return cast(T, _joined(parts) if len(parts) > 1 else parts[0])
+        return cast(T, _joined_table(parts) if len(parts) > 1 else parts[0])
 
     paths = table(PathTable)
     changed = table(WaypointTable)
@@ -163,7 +163,7 @@ def table_of(kind: type[T], rows: Sequence[Row], sizes: Mapping[str, int]) -> T:
     )
 
 
-def _joined(parts: Sequence[T], folder: Path | None = None) -> T:
+def _joined_table(parts: Sequence[T], folder: Path | None = None) -> T:
     """Return the table of all parts; arrays go into files in ``folder``, if it is given."""
     columns = [part.stored_columns() for part in parts]
     cells: dict[str, Any] = {}

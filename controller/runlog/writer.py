@@ -183,7 +183,7 @@ class RunLog:
         if table not in self._channels:
             self._register(table)
         if table.topic.is_fast and self._on_row is None:
-            self._batch.append((table, time_s, _kept(row)))
+            self._batch.append((table, time_s, _stored_fields(row)))
         else:
             data = self._printers[table].row(row).encode()
             self._batch.append((table, time_s, data))
@@ -242,7 +242,7 @@ class RunLog:
             shutil.copyfileobj(self._file, copy)
 
 
-def _kept(row: Mapping[str, Any]) -> Mapping[str, Any]:
+def _stored_fields(row: Mapping[str, Any]) -> Mapping[str, Any]:
     return {
         name: value.copy() if isinstance(value, np.ndarray) and value.flags.writeable else value
         for name, value in row.items()

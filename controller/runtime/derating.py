@@ -120,7 +120,7 @@ def _lag_limits_rad(safety: SafetyConfig, robot: RobotConfig) -> Floats:
     f" {', '.join([readonly_array()] * 3)}, float64, float64, float64)",
     makes_arrays=False,
 )
-def _is_unlimited(
+def _needs_no_limit(
     mean_a: Floats,
     lag_rad: Floats,
     current_a: Floats,
@@ -194,7 +194,7 @@ class Derating:
         if len(self._current_a) != len(state.current_a):
             self._current_a = np.zeros(len(state.current_a))
             self._lag_rad = np.zeros(len(state.current_a))
-        unlimited = _is_unlimited(
+        unlimited = _needs_no_limit(
             self._current_a,
             self._lag_rad,
             state.current_a,

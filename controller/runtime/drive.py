@@ -51,7 +51,7 @@ SETTLE_S = 0.3
 """Time between the ramp and the motion."""
 BATTERY_S = 1.0
 """Time between two rows of the supply (ours)."""
-_LATCHED = suppress(SafetyTrippedError)
+_IGNORE_TRIP = suppress(SafetyTrippedError)
 
 
 class Progress(NamedTuple):
@@ -307,7 +307,7 @@ class Drive:
         if not self._run.waypoints_m:
             is_done = self._motion.done
             return "the motion came to its end" if is_done else "the motion was cut off"
-        if self._is_unconfirmed:
+        if self._goal_is_unconfirmed:
             return (
                 f"reached {reached} of {self._waypoints} by a pose that the joints did not confirm"
             )
@@ -318,7 +318,7 @@ class Drive:
         return f"{reached} waypoints reached"
 
     @property
-    def _is_unconfirmed(self) -> bool:
+    def _goal_is_unconfirmed(self) -> bool:
         hold = self._pose_hold
         return hold is not None and not hold.health.row().get("is_confirmed", True)
 
@@ -329,7 +329,7 @@ class Drive:
         if not isinstance(link, HoldingLink):
             return
         for tick in ticks(self._clock, period_s, lambda: math.inf if link.is_holding else -1.0):
-            with _LATCHED:
+            with _IGNORE_TRIP:
                 state = link.read()
                 log.cycle(
                     tick.deadline_s,
@@ -432,7 +432,7 @@ class Drive:
             log.add(WaypointTable, now_s, waypoints_m=self._waypoints_m)
         if path.reached > reached:
             text = f"waypoint {path.reached} reached"
-            if self._is_unconfirmed:
+            if self._goal_is_unconfirmed:
                 text += " by a pose that the joints have not confirmed"
             if self._believes:
                 text = f"believes it reached waypoint {path.reached} (dead reckoning)"
@@ -470,7 +470,7 @@ class Drive:
     ) -> None:
         before_s, sent_s = self._wire_s, self._clock.now_s()
         # a veto latches: torque is off, the loop ends, and the log gets this cycle all the same
-        with _LATCHED:
+        with _IGNORE_TRIP:
             self._link.write(JointCommand(sent_s, goal))
         self._wire_s = self._wire_busy_s()
         sent_rad = log_cycle(

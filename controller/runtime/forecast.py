@@ -197,7 +197,7 @@ class _PaperBody:
             + weight_n * tangential
         )
         if not balance:
-            self.slide = _worse(
+            self.slide = _worse_slide(
                 self.slide, points, headings, self._friction, tangential, normal, step_s
             )
             force_n -= self._robot.mean_link_mass_kg * share * (moving - was_m_s) / step_s
@@ -248,7 +248,7 @@ def _in_head_frame(robot: RobotConfig, joint_rad: Floats) -> BodyView:
     return body_in_world(robot, pose_at(np.zeros(2), 0.0), joint_rad)
 
 
-def _worse(
+def _worse_slide(
     slide: Slide | None,
     points_m: Floats,
     headings_rad: Floats,

@@ -23,10 +23,10 @@ from snakewalk.controller.walk.twin import Twin, seen_state
 SPAN_S = 1.5
 """Duration of motion that is replayed (ours): in a shorter span the initial speed counts too much,
 in a longer one bodies diverge."""
-_SETTLED = 4
+_SETTLED_SPANS = 4
 _RESTS = 3
-"""Spans that are skipped behind each replayed one, after ``_SETTLED`` spans in a row that confirm
-the file's friction (ours): a quarter of the cost, and up to 4.5 s until a change is visible."""
+"""Spans that are skipped behind each replayed one, after ``_SETTLED_SPANS`` spans in a row that
+confirm the file's friction (ours): a quarter of the cost; a change is visible up to 4.5 s later."""
 _STRIDE = 5
 """Cycles in a step on paper."""
 
@@ -178,7 +178,7 @@ class FrictionMonitor(FrictionEstimator):
         identified = next(self._replays, None)
         if identified is not None:
             self.accept(identified)
-            self._rests = _RESTS if self._confirmed >= _SETTLED else 0
+            self._rests = _RESTS if self._confirmed >= _SETTLED_SPANS else 0
         return identified
 
     def _judge(self, span: Span) -> Iterator[FoundFriction | None]:

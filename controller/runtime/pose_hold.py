@@ -34,25 +34,25 @@ class PoseHold:
     failure: str | None = None
     """Why the run must end; None while it may go on."""
     _rate: float = field(default=1.0, init=False)
-    _since_s: float | None = field(default=None, init=False)
+    _began_s: float | None = field(default=None, init=False)
 
     @property
     def is_held(self) -> bool:
         """Whether the motion rests."""
-        return self._since_s is not None and self._rate == 0.0
+        return self._began_s is not None and self._rate == 0.0
 
     def rate(self, now_s: float, period_s: float) -> float:
         """Return the rate of the motion, from 1 to 0 without a pose."""
         fault = self.health.fault()
-        if fault is not None and self._since_s is None:
-            self._since_s = now_s
+        if fault is not None and self._began_s is None:
+            self._began_s = now_s
             self.on_event(
                 "warning", f"{fault}; the motion pauses for up to {self.health.hold_s:g} s"
             )
-        elif fault is None and self._since_s is not None:
-            self.on_event("info", f"the pose is back after {now_s - self._since_s:.1f} s")
-            self._since_s = None
-        since_s = self._since_s
+        elif fault is None and self._began_s is not None:
+            self.on_event("info", f"the pose is back after {now_s - self._began_s:.1f} s")
+            self._began_s = None
+        since_s = self._began_s
         if since_s is not None and now_s - since_s >= self.health.hold_s:
             self.failure = f"pose: {fault}"
         step = period_s / SLOW_S

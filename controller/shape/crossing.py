@@ -41,7 +41,7 @@ def _side(x: Floats, y: Floats, segment: int, point: int) -> float:
 
 
 @compiled("boolean(float64[::1], float64[::1], int64, int64, float64)")
-def _is_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
+def _segments_are_near(x: Floats, y: Floats, i: int, j: int, width_m: float) -> bool:
     """Whether the segments are nearer than ``width_m`` or cross."""
     crosses = (
         _side(x, y, i, j) * _side(x, y, i, j + 1) < 0.0
@@ -62,7 +62,7 @@ def _touches(x: Floats, y: Floats, lag: int, width_m: float, piece_m: float) -> 
         while j < points:
             gap_x, gap_y = x[i] + x[i + 1] - x[j] - x[j + 1], y[i] + y[i + 1] - y[j] - y[j + 1]
             square = 0.25 * (gap_x * gap_x + gap_y * gap_y)
-            if square < reach_m * reach_m and _is_near(x, y, i, j, width_m):
+            if square < reach_m * reach_m and _segments_are_near(x, y, i, j, width_m):
                 return True
             # one step brings the middles nearer by at most a segment's length
             j += max(1, int((np.sqrt(square) - reach_m) / piece_m))

@@ -21,7 +21,7 @@ ShapeFilter = Callable[[Floats], Bools]
 _ROUNDS = 50
 _FACTORS = (1.0, 1.2, 1.4, 1.6, 1.8, 2.0)
 _DRAWN = 200
-_ENOUGH = 0.2
+_LEAST_SHARE = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def build_library(
     points = track_rad.shape[-1]
     states = to_states(track_rad, coefficients)
     if curvature is None:
-        curvature = _wide_enough(states, filters, points)
+        curvature = _half_lengths_m(states, filters, points)
     states = curvature * states
     rejected = dict.fromkeys(filters, 0)
     recorded = np.empty((0, points))
@@ -105,13 +105,13 @@ def build_library(
     return StateLibrary(shapes_rad, len(recorded), rejected, curvature, kept, frame)
 
 
-def _wide_enough(states: Complexes, filters: dict[str, ShapeFilter], points: int) -> float:
+def _half_lengths_m(states: Complexes, filters: dict[str, ShapeFilter], points: int) -> float:
     """(L,) half the length of each link."""
     shares = []
     for factor in _FACTORS:
         drawn = random_states(factor * states, _DRAWN, np.random.default_rng(0))
         shares.append(len(_passing(to_angles(drawn, points), filters, {})[0]) / _DRAWN)
-        if shares[-1] >= _ENOUGH:
+        if shares[-1] >= _LEAST_SHARE:
             return factor
     return _FACTORS[int(np.argmax(shares))]
 

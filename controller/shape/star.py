@@ -69,14 +69,14 @@ def star_order(M: Ints, F: Ints, heading_error_rad: Floats) -> Iterator[int]:
     """
     if len(M) == 0:
         raise ValueError("a star without leaves has no next state")
-    yield _best(M, F, heading_error_rad)
+    yield _best_state(M, F, heading_error_rad)
     group = np.where(M == 0, 0, np.where(F == 0, 1, 2))
     mantissa, exponent = np.frexp(M)  # M 2^F in two parts, because 2^F overflows
     order = np.lexsort((np.abs(heading_error_rad), mantissa, exponent + F, group))
     yield from order[1:].tolist()
 
 
-def _best(M: Ints, F: Ints, heading_error_rad: Floats) -> int:
+def _best_state(M: Ints, F: Ints, heading_error_rad: Floats) -> int:
     tied = np.flatnonzero(M == 0)
     if len(tied) == 0:
         tied = np.flatnonzero(F == 0)

@@ -148,7 +148,7 @@ class _WalkState:
         self.last[to] = self.step
 
     def snake(self, near: list[int]) -> int:
-        fresh = self._fresh(near)
+        fresh = self._unvisited_states(near)
         if fresh:  # W = deg
             return max(fresh, key=self.degree.__getitem__)
         best = near[0]
@@ -163,7 +163,7 @@ class _WalkState:
 
     def frontier(self, near: list[int]) -> int:
         """Warnsdorff's choice among the unvisited; without any, a step towards one elsewhere."""
-        fresh = self._fresh(near)
+        fresh = self._unvisited_states(near)
         if fresh:
             return min(fresh, key=lambda q: (self.unvisited_near[q], self.degree[q]))
         if not self.ahead:
@@ -200,7 +200,7 @@ class _WalkState:
 
     def stack_top(self, near: list[int]) -> int:
         """Depth first: the unvisited neighbour of highest degree, else backtrack."""
-        fresh = self._fresh(near)
+        fresh = self._unvisited_states(near)
         if fresh:
             self.branches.append(max(fresh, key=self.degree.__getitem__))
         else:
@@ -208,7 +208,7 @@ class _WalkState:
         return self.branches[-1]
 
     def free(self, near: list[int], rng: np.random.Generator) -> int:
-        pool = self._fresh(near) or near
+        pool = self._unvisited_states(near) or near
         return pool[int(rng.random() * len(pool))]
 
     def degree_over_visits(self, near: list[int]) -> int:
@@ -226,6 +226,6 @@ class _WalkState:
         for n in self.near[q]:
             self.unvisited_near[n] -= 1
 
-    def _fresh(self, near: list[int]) -> list[int]:
+    def _unvisited_states(self, near: list[int]) -> list[int]:
         selected = self.selected
         return [q for q in near if not selected[q]]

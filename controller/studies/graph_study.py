@@ -182,7 +182,7 @@ def graph_source(spec: str) -> Draw:
     if kind == "ws" and len(number) == 3:
         return _small_world(spec, *number)
     if track and len(number) == len(rest) < 2:
-        return _recorded(track, number[0] if number else None)
+        return _draw_from_recording(track, number[0] if number else None)
     raise InputError(f"graph {spec!r}: {_FORMS}")
 
 
@@ -216,7 +216,7 @@ def _small_world(spec: str, states: float, degree: float, rewired: float) -> Dra
     )
 
 
-def _recorded(track: str, threshold: float | None) -> Draw:
+def _draw_from_recording(track: str, threshold: float | None) -> Draw:
     graph = threshold_graph(to_states(load_track(track).angles_rad), threshold)
     return lambda _: graph
 

@@ -130,10 +130,10 @@ def differences(
         "measured_rad": tolerance_rad,
         "head_m": tolerance_m if measured else float("inf"),
     }
-    return compare(_known(original, valid), _known(again, valid), tolerances=limits)
+    return compare(_valid_record(original, valid), _valid_record(again, valid), tolerances=limits)
 
 
-def _known(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
+def _valid_record(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
     cycle = record.cycle
     rows = len(record.cycle.time_s)
     measured_cycle = replace(

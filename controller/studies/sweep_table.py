@@ -18,11 +18,11 @@ from snakewalk.controller.studies.sweep_measure import Measurement
 from snakewalk.controller.studies.sweep_points import Point
 
 _PLACE = ("gait", "robot", "world", "keys", "number", "seed", "seconds")
-_MEASURED = tuple(field.name for field in fields(Measurement))
+_MEASURED_COLUMNS = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
-COLUMNS = (*_PLACE, *_MEASURED, *_PARAMETERS)
+COLUMNS = (*_PLACE, *_MEASURED_COLUMNS, *_PARAMETERS)
 """A cell is empty if the gait lacks the parameter, or the value is unknown."""
-_ADDED = ("backend",)
+_ADDED_COLUMNS = ("backend",)
 """Columns that tables of earlier versions lack; their new rows lack them, too."""
 _TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source", "backend")
 _INTEGER = ("number", "seed", "cycles")
@@ -58,7 +58,7 @@ def read_table(path: Path) -> list[dict[str, str]]:
 
 def table_rows(path: Path) -> Iterator[dict[str, str]]:
     """Yield the complete rows of a table; otherwise as ``read_table``."""
-    return read_csv_table(path, COLUMNS, "sweep", _ADDED)
+    return read_csv_table(path, COLUMNS, "sweep", _ADDED_COLUMNS)
 
 
 class SweepTable(CsvTable):
@@ -77,7 +77,7 @@ class SweepTable(CsvTable):
             place=_PLACE,
             command="gait sweep",
             keeps_rows=False,
-            optional=_ADDED,
+            optional=_ADDED_COLUMNS,
         )
 
     def missing(self, points: list[Point]) -> list[Point]:
@@ -140,11 +140,11 @@ class _Running:
         self.ran += 1
         if self.first is None and row["number"] == "0":
             self.first = row
-        self.most_bl = _most([self.most_bl, distance_bl(row)])
-        self.most_pace = _most([self.most_pace, pace(row)])
-        self.least_cost = -_most([-self.least_cost, -number(row, "cost_of_transport")])
-        self.torque_n_m = _most([self.torque_n_m, abs(number(row, "peak_torque_n_m"))])
-        self.celsius = _most([self.celsius, abs(number(row, "peak_temperature_c"))])
+        self.most_bl = _largest_value([self.most_bl, distance_bl(row)])
+        self.most_pace = _largest_value([self.most_pace, pace(row)])
+        self.least_cost = -_largest_value([-self.least_cost, -number(row, "cost_of_transport")])
+        self.torque_n_m = _largest_value([self.torque_n_m, abs(number(row, "peak_torque_n_m"))])
+        self.celsius = _largest_value([self.celsius, abs(number(row, "peak_temperature_c"))])
 
 
 def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
@@ -166,11 +166,11 @@ def digest(rows: Iterable[dict[str, str]]) -> list[GaitDigest]:
             default_pace=rounded(math.nan if some.first is None else pace(some.first), 3),
             most_pace=rounded(some.most_pace, 3),
             pace=UNITS[GAITS[gait].aim],
-            default_cost=rounded(_of(some.first, "cost_of_transport"), 2),
+            default_cost=rounded(_number_of(some.first, "cost_of_transport"), 2),
             least_cost=rounded(some.least_cost, 2),
             peak_torque_n_m=rounded(some.torque_n_m, 2),
             peak_c=rounded(some.celsius, 1),
-            default_slip=rounded(_of(some.first, "slip"), 2),
+            default_slip=rounded(_number_of(some.first, "slip"), 2),
         )
         for (gait, robot, keys), some in running_by_key.items()
     ]
@@ -189,10 +189,10 @@ def distance_bl(row: dict[str, str]) -> float:
     return math.hypot(number(row, "forward_bl_cycle"), number(row, "left_bl_cycle"))
 
 
-def _of(row: dict[str, str] | None, key: str) -> float:
+def _number_of(row: dict[str, str] | None, key: str) -> float:
     return math.nan if row is None else number(row, key)
 
 
-def _most(values: list[float]) -> float:
+def _largest_value(values: list[float]) -> float:
     finite_values = [value for value in values if math.isfinite(value)]
     return max(finite_values, default=math.nan)

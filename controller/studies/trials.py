@@ -119,7 +119,7 @@ def prepare_case(
         InputError: the run cannot be prepared, or the ground about its start is unsafe.
 
     """
-    prepared_run = _prepared(case, seed, changes)
+    prepared_run = _prepared_trial(case, seed, changes)
     prepared_run = changed(prepared_run, run=with_compliance(prepared_run.run, case.compliance))
     if case.relief != 1.0:
         prepared_run = changed(prepared_run, world=prepared_run.world.with_relief(case.relief))
@@ -139,7 +139,7 @@ def prepare_case(
     )
 
 
-def _prepared(case: Case, seed: int, changes: Mapping[str, object]) -> PreparedRun:
+def _prepared_trial(case: Case, seed: int, changes: Mapping[str, object]) -> PreparedRun:
     given = {"robot": case.robot, "world": case.world}
     options: dict[str, Any] = dict(changes) | {k: v for k, v in given.items() if v is not None}
     seconds = options.pop("seconds", None)
@@ -211,14 +211,14 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
         if isinstance(prepared, WalkRun):
             slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
             trial = replace(trial, slope_median_deg=float(np.degrees(slope_rad)))
-        return _measured(trial, prepared)
+        return _measured_trial(trial, prepared)
     except InputError as error:
         return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
     except Exception as error:  # the other runs go on
         return replace(trial, cause="error", why=f"{type(error).__name__}: {error}", exit_code=1)
 
 
-def _measured(trial: Trial, prepared: PreparedRun) -> Trial:
+def _measured_trial(trial: Trial, prepared: PreparedRun) -> Trial:
     result = run_robot(RunRequest(prepared, stoppable=False))
     stood = ground_contact(result.record, prepared.ground)
     numbers = result.summary
@@ -374,12 +374,12 @@ def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummar
                 passed_by=sum(t.missed for t in some),
                 duration_s=_mean([t.duration_s for t in some], 1),
                 path_error_m=_mean([t.path_error_m for t in some], 3),
-                path_error_max_m=_most([t.path_error_max_m for t in some], 2),
+                path_error_max_m=_largest_value([t.path_error_max_m for t in some], 2),
                 eta=_mean([t.eta for t in some], 2),
                 cost_of_transport=_mean([t.cost_of_transport for t in some], 2),
-                lead_max_rad=_most([t.lead_max_rad for t in some], 3),
-                current_max_a=_most([t.current_max_a for t in some], 2),
-                roll_max_deg=_most([t.roll_max_deg for t in some], 0),
+                lead_max_rad=_largest_value([t.lead_max_rad for t in some], 3),
+                current_max_a=_largest_value([t.current_max_a for t in some], 2),
+                roll_max_deg=_largest_value([t.roll_max_deg for t in some], 0),
                 in_air=_mean([t.in_air for t in some], 2),
                 alarms=sum(t.alarms for t in some),
                 causes=_counts([t.cause for t in some if not t.complete]),
@@ -449,6 +449,6 @@ def _deviation(values: list[float], digits: int) -> float | None:
     return round(float(np.std(finite_values, ddof=1)), digits) if len(finite_values) > 1 else None
 
 
-def _most(values: list[float], digits: int) -> float | None:
+def _largest_value(values: list[float], digits: int) -> float | None:
     finite_values = [v for v in values if np.isfinite(v)]
     return round(max(finite_values), digits) if finite_values else None

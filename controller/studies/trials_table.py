@@ -12,9 +12,9 @@ from snakewalk.controller.console.table import CsvTable
 from snakewalk.controller.studies.trials import Case, Trial
 
 _CASE = tuple(field.name for field in fields(Case))
-_MEASURED = tuple(f.name for f in fields(Trial) if f.name not in {"case", "seed"})
+_MEASURED_COLUMNS = tuple(f.name for f in fields(Trial) if f.name not in {"case", "seed"})
 _PLACE = ("config", "start_spread_m", "seed")
-COLUMNS = (*_CASE, *_PLACE, *_MEASURED)
+COLUMNS = (*_CASE, *_PLACE, *_MEASURED_COLUMNS)
 """``config`` is the digest of the three files; ``keys`` are written as ``KEY=VALUE KEY=VALUE``."""
 
 _NUMBERS = get_type_hints(Trial)
@@ -43,9 +43,9 @@ class TrialsTable(CsvTable):
         """The entries of ``planned`` that the table holds."""
         trials: list[Trial] = []
         for case, seed in planned:
-            row = self.held(self._where(case, seed))
+            row = self.held(self._place_of_case(case, seed))
             if row is not None:
-                values: dict[str, object] = {key: row[key] for key in _MEASURED}
+                values: dict[str, object] = {key: row[key] for key in _MEASURED_COLUMNS}
                 start_m = row["start_m"].split() or None
                 values |= {"case": case, "seed": seed, "start_m": start_m}
                 trials.append(_TRIAL.validate_python(values))
@@ -59,10 +59,10 @@ class TrialsTable(CsvTable):
         case["robot"], case["world"] = trial.case.robot or "", trial.case.world or ""
         case["compliance"] = {None: "", True: "on", False: "off"}[trial.case.compliance]
         measured["start_m"] = " ".join(map(str, trial.start_m or ()))
-        place = dict(zip(_PLACE, self._where(trial.case, trial.seed), strict=True))
-        self.append(case | place | {key: measured[key] for key in _MEASURED})
+        place = dict(zip(_PLACE, self._place_of_case(trial.case, trial.seed), strict=True))
+        self.append(case | place | {key: measured[key] for key in _MEASURED_COLUMNS})
 
-    def _where(self, case: Case, seed: int) -> tuple[str, ...]:
+    def _place_of_case(self, case: Case, seed: int) -> tuple[str, ...]:
         return (self._configs[case], self._spread, str(seed))
 
 

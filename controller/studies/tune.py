@@ -27,7 +27,7 @@ from snakewalk.controller.studies.sweep_points import Point, Space, robot_file
 Aim = Literal["speed", "efficiency"]
 LAGGARD = 0.5
 """Share of the defaults' speed from which a gait counts as moving, for efficiency."""
-_WORST = 1e3
+_WORST_SCORE = 1e3
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +59,11 @@ def loss(row: Measurement, task: Task) -> float:
     """Minimised quantity; a gait that trips, is derated, or hardly moves is rejected."""
     speed = pace(row, task)
     if speed <= 0.0 or _value(row.least_rate) < 1.0:
-        return _WORST
+        return _WORST_SCORE
     if task.aim == "speed":
         return -speed
     if speed < LAGGARD * task.least:
-        return _WORST * (1.0 - speed / max(task.least, 1e-9))
+        return _WORST_SCORE * (1.0 - speed / max(task.least, 1e-9))
     return cost(row, task)
 
 
@@ -176,10 +176,10 @@ def tune(
         dimensions = len(space.spans)
         people = max(5, _GENERATION)
         best = differential_evolution(
-            partial(_rated, start=start, task=task),
+            partial(_rated_pace, start=start, task=task),
             Bounds([0.0] * dimensions, [1.0] * dimensions),
             x0=space.unit(default),
-            init=_around(space.unit(default), people, np.random.default_rng(seed)),
+            init=_first_generation(space.unit(default), people, np.random.default_rng(seed)),
             maxiter=max(1, budget // people - 1),
             mutation=(0.4, 0.9),
             recombination=0.9,
@@ -192,26 +192,26 @@ def tune(
         values = space.values(best.x)
         tuned = replace(start, number=1, parameters=values)
         others = range(seed + 1, seed + 1 + seeds)
-        score_of = partial(_scored, task=task)
+        score_of = partial(_scored_point, task=task)
         before = tuple(pool.map(partial(score_of, start), others))
         after = tuple(pool.map(partial(score_of, tuned), others))
     return Tuned(gait, body.name, aim, values, done, before, after)
 
 
-def _around(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
+def _first_generation(centre: Floats, people: int, rng: np.random.Generator) -> Floats:
     """First generation: the defaults, half of the others near them, the rest anywhere."""
     near = np.clip(centre + 0.15 * rng.standard_normal((people // 2, len(centre))), 0.0, 1.0)
     far = rng.random((people - len(near), len(centre)))
     return np.vstack([near, far])
 
 
-def _rated(unit: Floats, *, start: Point, task: Task) -> float:
+def _rated_pace(unit: Floats, *, start: Point, task: Task) -> float:
     values = Space.of(type(make_gait(start.gait))).values(unit)
     row = measure(replace(start, parameters=values))
     return loss(row, task)
 
 
-def _scored(point: Point, vary: int, *, task: Task) -> float:
+def _scored_point(point: Point, vary: int, *, task: Task) -> float:
     row = measure(point, vary=vary)
     if task.aim == "speed":
         return pace(row, task)

@@ -49,7 +49,7 @@ def measure_together(points: Sequence[Point], device: str | None) -> Iterator[Re
         groups.setdefault(body, []).append((point, prepared))
     for group in groups.values():
         for first in range(0, len(group), BATCH):
-            yield from _together(group[first : first + BATCH], device)
+            yield from _run_together(group[first : first + BATCH], device)
     if others:
         LOGGER.warning(
             "%d of %d points run on the compiled simulator: %s",
@@ -61,7 +61,7 @@ def measure_together(points: Sequence[Point], device: str | None) -> Iterator[Re
         yield point, measure(point)
 
 
-def _together(part: Sequence[tuple[Point, GaitRun]], device: str | None) -> Iterator[Result]:
+def _run_together(part: Sequence[tuple[Point, GaitRun]], device: str | None) -> Iterator[Result]:
     with TemporaryDirectory() as folder:
         logs = [Path(folder) / f"{number}.mcap" for number in range(len(part))]
         outcomes = run_together(

@@ -11,7 +11,7 @@ from snakewalk.controller.terrain.path import SplinePath
 _CHORD_M = 0.05  # the path is tabulated every centimetre: a shorter arc has no curvature
 _WORTH = 1.1  # a change must widen the sharpest bend by this much
 _CHANGES = 8
-_NEAREST = 2
+_NEAREST_COUNT = 2
 _SPLINE_UNITS = 500
 """Work of a spline, of its bends, or of its check."""
 
@@ -32,7 +32,7 @@ def widen_in_steps(
         if radius >= radius_m:
             break
         best = None
-        for k in _near(points_m, free, at_m):
+        for k in _nearest_free(points_m, free, at_m):
             straight = points_m.copy()
             straight[k] = (points_m[k - 1] + 2.0 * points_m[k] + points_m[k + 1]) / 4.0
             dropped = np.delete(points_m, k, axis=0), np.delete(free, k)
@@ -66,7 +66,7 @@ def sharpest_bend(path: SplinePath) -> tuple[float, Floats]:
     return (_CHORD_M / float(turn[k]) if turn[k] > 1e-6 else float("inf")), b[k]
 
 
-def _near(points: Floats, free: Bools, at_m: Floats) -> list[int]:
+def _nearest_free(points: Floats, free: Bools, at_m: Floats) -> list[int]:
     which = np.flatnonzero(free)
     order = np.argsort(np.hypot(*(points[which] - at_m).T))
-    return [int(k) for k in which[order[:_NEAREST]]]
+    return [int(k) for k in which[order[:_NEAREST_COUNT]]]

@@ -25,9 +25,9 @@ from snakewalk.controller.terrain.safe_graph import SafeGraph
 _REACH_M: Final = 0.6
 """Longest distance from the head to the first node (ours): a mast's cameras do not see the ground
 at its foot."""
-_LEAST_M: Final = 0.4
+_SHORTEST_PATH_M: Final = 0.4
 """Shortest path worth walking, where there is a longer one (ours)."""
-_WITHIN_M: Final = (np.inf, 1.2, 0.7)
+_PATH_DISTANCES_M: Final = (np.inf, 1.2, 0.7)
 """Distances that a path may lead; the nearer ones where no smooth path leads farther (ours)."""
 _SURELY_UNSAFE: Final = 1.15
 """Largest risk of ground on a path in force: the next picture may show planned ground to be a
@@ -79,7 +79,7 @@ class MapPlanner:
             planner = TerrainPlanner(None, self._config)
             return (yield from planner.in_steps(points, heading_rad, avoid_m=avoid_m))
         faults: tuple[str, ...] = ()
-        for within_m in _WITHIN_M:
+        for within_m in _PATH_DISTANCES_M:
             yield 10000
             corners = knowledge.corners(points, within_m)
             plan = knowledge.cautious.in_steps(corners, heading_rad, avoid_m=avoid_m, number=number)
@@ -141,13 +141,15 @@ class _Knowledge:
             node = graph.nearest(point)
             if node is None or not np.isfinite(costs[node]) or not relief.safe(*point):
                 if np.isfinite(costs).any():
-                    reached.append(self._farthest(graph, costs, reached[-1], point))
+                    reached.append(self._farthest_safe_node(graph, costs, reached[-1], point))
                 break
             reached.append(point)
             reach_m = 0.0
         return np.array(reached) if len(reached) > 1 else points
 
-    def _farthest(self, graph: SafeGraph, costs: Floats, start: Floats, goal: Floats) -> Floats:
+    def _farthest_safe_node(
+        self, graph: SafeGraph, costs: Floats, start: Floats, goal: Floats
+    ) -> Floats:
         """(2,) node at which the best path to a goal leaves known safe ground."""
         to_go = _UNSEEN * graph.length_weight * np.hypot(*(graph.nodes_m - goal).T)
         target = self._open_graph.nearest(goal)
@@ -158,7 +160,7 @@ class _Knowledge:
                 to_go = open_to_go
         # Along the best path all sums are equal; choose the farthest of its nodes.
         total_cost = (1.0 - _TIES) * costs + to_go
-        far = np.hypot(*(graph.nodes_m - start).T) >= _LEAST_M
+        far = np.hypot(*(graph.nodes_m - start).T) >= _SHORTEST_PATH_M
         if np.isfinite(total_cost[far]).any():
             total_cost = np.where(far, total_cost, np.inf)
         return np.asarray(graph.nodes_m[int(np.argmin(total_cost))])

@@ -20,7 +20,7 @@ from snakewalk.controller.terrain.route_advice import route_advice
 from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 
-_APART_M = 0.01
+_TABLE_STEP_M = 0.01
 """Step of a path's table: a path passes a waypoint within this distance of the point before it."""
 _CHECK_STEP_M = 0.02  # spacing of the safety check of a spline
 _UNSAFE = 30.0  # cost of a metre of unsafe ground in a turn, as metres of level path
@@ -98,11 +98,11 @@ class TerrainPlanner:
         """Plan as a call does, in steps."""
         points = np.asarray(points_m, float)
         avoid = np.asarray(avoid_m, float).reshape(-1, 2)
-        kept = _apart(points)
+        kept = _distinct_points(points)
         self._numbers = [number - 1 + k for k in kept]
         if len(kept) < 2:
             raise InputError(
-                f"waypoints_m: no waypoint leads farther than {_APART_M * 100:g} cm from "
+                f"waypoints_m: no waypoint leads farther than {_TABLE_STEP_M * 100:g} cm from "
                 f"{self._name(0, points[0])}; move or add one"
             )
         points = points[kept]
@@ -111,7 +111,7 @@ class TerrainPlanner:
             path = yield from self._waypoint_turns.in_steps(base, points[1:], any_start=True)
             self._planned = points, path
             return path
-        path = yield from self._again(points, avoid)
+        path = yield from self._path_from_elsewhere(points, avoid)
         yield 300
         until_m = path.first_pass(points[1])
         turns = PathTurns(
@@ -129,9 +129,9 @@ class TerrainPlanner:
         faults = [f for k in range(1, len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
-        return (yield from self._through(points, graph, self.relief))
+        return (yield from self._path_through(points, graph, self.relief))
 
-    def _through(self, points: Floats, graph: SafeGraph, relief: Relief) -> Steps[SplinePath]:
+    def _path_through(self, points: Floats, graph: SafeGraph, relief: Relief) -> Steps[SplinePath]:
         """Path through safe points: by the graph's nodes, or else by all safe ground."""
         fault = ""
         try:
@@ -146,10 +146,10 @@ class TerrainPlanner:
             yield _EXACT_STEP
             leg = exact_route(relief, graph, points[k - 1], points[k])
             if leg is None:
-                raise InputError(self._blocked(k, points))
+                raise InputError(self._blocked_message(k, points))
             legs.append(leg)
         for shorten in (True, False):
-            shown = [_shortened(leg, graph) if shorten else leg for leg in legs]
+            shown = [_shortened_path(leg, graph) if shorten else leg for leg in legs]
             corners = np.vstack([shown[0], *(leg[1:] for leg in shown[1:])])
             free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
             path = rounded(corners, free, lambda places: relief.safe(*places.T))
@@ -157,7 +157,7 @@ class TerrainPlanner:
                 return path
         raise InputError(fault)
 
-    def _again(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
+    def _path_from_elsewhere(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path from elsewhere: a new leg to the next waypoint, then the previous plan.
 
         A moving body has no time for more: turns by waypoints need some 30 ms each.
@@ -183,7 +183,7 @@ class TerrainPlanner:
             return None
         until_next = planned[1 : len(planned) - len(points) + 2]
         passes = path.passes(until_next) or [0.0]  # the plan may have started at that point
-        if path.length_m - passes[-1] < _APART_M:
+        if path.length_m - passes[-1] < _TABLE_STEP_M:
             return None
         onward = path.piece_m(passes[-1], path.length_m)
         if self.relief is not None and len(avoid):
@@ -234,7 +234,7 @@ class TerrainPlanner:
                 None if nearest is None or there is None else graph.cheapest_path(nearest, there)
             )
             if nodes is None:
-                raise InputError(self._blocked(k, points))
+                raise InputError(self._blocked_message(k, points))
             nodes = np.vstack([points[k - 1], nodes, points[k]])
             corners = yield from straighten_in_steps(nodes, graph)
             pieces.append(corners[1:])
@@ -277,7 +277,7 @@ class TerrainPlanner:
             safe[: int(np.argmax(safe))] = True
         return s[~safe]
 
-    def _blocked(self, k: int, points: Floats) -> str:
+    def _blocked_message(self, k: int, points: Floats) -> str:
         assert self.relief is not None
         config = self.relief.config
         advice = route_advice(self.relief, points[k - 1 : k + 1])
@@ -309,20 +309,20 @@ class TerrainPlanner:
         return f"waypoint {self._numbers[k]} {where}"
 
 
-def _apart(points: Floats) -> list[int]:
+def _distinct_points(points: Floats) -> list[int]:
     """Indices of points (n, 2) that are apart: of close ones the first, or the end of the path."""
     kept = [0]
     last = len(points) - 1
     for k in range(1, last + 1):
-        while k == last and len(kept) > 1 and _is_close(points, kept[-1], k):
+        while k == last and len(kept) > 1 and _points_are_close(points, kept[-1], k):
             kept.pop()
-        if not _is_close(points, kept[-1], k):
+        if not _points_are_close(points, kept[-1], k):
             kept.append(k)
     return kept
 
 
-def _is_close(points: Floats, j: int, k: int) -> bool:
-    return bool(np.hypot(*(points[k] - points[j])) < _APART_M)
+def _points_are_close(points: Floats, j: int, k: int) -> bool:
+    return bool(np.hypot(*(points[k] - points[j])) < _TABLE_STEP_M)
 
 
 def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
@@ -369,7 +369,7 @@ _EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
 _CORNER_M = 1.0  # cost of a corner, as metres of path: few corners make wide bends
 
 
-def _shortened(corners_m: Floats, graph: SafeGraph) -> Floats:
+def _shortened_path(corners_m: Floats, graph: SafeGraph) -> Floats:
     while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
         corners_m = shorter
     return corners_m

@@ -66,16 +66,16 @@ class Relief:
 
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation variance within ``variance_window_m`` of each point."""
-        return self._at(self._variance, x_m, y_m)
+        return self._field_at(self._variance, x_m, y_m)
 
     def slope_rad(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Inclination of the plane fitted within ``slope_window_m`` of each point."""
-        return self._at(self._slope, x_m, y_m)
+        return self._field_at(self._slope, x_m, y_m)
 
     def risk(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Larger of variance and slope over their limits; infinite beyond the edge margin."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
-        return np.where(self.within(x, y), self._at(self._risk, x, y), np.inf)
+        return np.where(self.within(x, y), self._field_at(self._risk, x, y), np.inf)
 
     def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points keep both limits and the margin."""
@@ -83,7 +83,7 @@ class Relief:
 
     def known(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether the slope window around points is fully measured."""
-        return np.asarray(self._at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK)
+        return np.asarray(self._field_at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK)
 
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field, ``edge_margin_m`` or more from its border."""
@@ -95,7 +95,7 @@ class Relief:
         inside &= np.minimum(y - ground.y0_m, ground.y0_m + h - y) >= margin
         return np.asarray(inside)
 
-    def _at(self, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+    def _field_at(self, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         return interpolated(self.ground, field, x_m, y_m)
 
 
@@ -145,7 +145,7 @@ def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
 def windowed_mean(ground: HeightField, values: Floats, radius_m: float) -> Floats:
     """(rows, columns) mean of values in a disc around each sample, cut at the border."""
     _, _, disc = _disc(ground, radius_m)
-    return np.asarray(_summed(values, disc) / _summed(np.ones_like(values), disc))
+    return np.asarray(_window_sum(values, disc) / _window_sum(np.ones_like(values), disc))
 
 
 def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
@@ -158,14 +158,14 @@ def fitted_gradient(ground: HeightField, radius_m: float) -> tuple[Floats, Float
     dx, dy, disc = _disc(ground, radius_m)
     z = ground.z_m - ground.z_m.mean()
     ones = np.ones_like(z)
-    count = _summed(ones, disc)
-    x, y = _summed(ones, disc * dx) / count, _summed(ones, disc * dy) / count
-    xx = _summed(ones, disc * dx * dx) / count - x * x
-    yy = _summed(ones, disc * dy * dy) / count - y * y
-    xy = _summed(ones, disc * dx * dy) / count - x * y
-    mean = _summed(z, disc) / count
-    zx = _summed(z, disc * dx) / count - mean * x
-    zy = _summed(z, disc * dy) / count - mean * y
+    count = _window_sum(ones, disc)
+    x, y = _window_sum(ones, disc * dx) / count, _window_sum(ones, disc * dy) / count
+    xx = _window_sum(ones, disc * dx * dx) / count - x * x
+    yy = _window_sum(ones, disc * dy * dy) / count - y * y
+    xy = _window_sum(ones, disc * dx * dy) / count - x * y
+    mean = _window_sum(z, disc) / count
+    zx = _window_sum(z, disc * dx) / count - mean * x
+    zy = _window_sum(z, disc * dy) / count - mean * y
     determinant = xx * yy - xy * xy
     return (zx * yy - zy * xy) / determinant, (zy * xx - zx * xy) / determinant
 
@@ -182,7 +182,7 @@ def _disc(ground: HeightField, radius_m: float) -> tuple[Floats, Floats, Floats]
     return column * ground.spacing_m, row * ground.spacing_m, inside
 
 
-def _summed(values: Floats, weight: Floats) -> Floats:
+def _window_sum(values: Floats, weight: Floats) -> Floats:
     """Sum of ``values`` around each sample, weighted by offset; 0 beyond the border.
 
     Like ``scipy.signal.fftconvolve``, whose import costs more time than all the sums.

@@ -14,7 +14,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.terrain.path import SplinePath
 
 _STEP_M: Final = 0.01
-_MOST_M: Final = 1.0
+_LONGEST_SIDE_M: Final = 1.0
 """Longest part of a side that a bend uses (ours)."""
 _HALVINGS: Final = 10
 
@@ -37,7 +37,7 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
             continue
         back = -sides[k - 1] / length[k - 1]
         onward = sides[k] / length[k]
-        reach = min(0.5 * length[k - 1], 0.5 * length[k], _MOST_M)
+        reach = min(0.5 * length[k - 1], 0.5 * length[k], _LONGEST_SIDE_M)
         for _ in range(_HALVINGS):
             bend = _bend(corners_m[k], back * reach, onward * reach)
             if safe(bend).all():
@@ -45,7 +45,7 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
                 break
             reach *= 0.5
     pieces.append(corners_m[-1:])
-    return SplinePath.tabulated(_evenly(np.vstack(pieces)))
+    return SplinePath.tabulated(_with_even_points(np.vstack(pieces)))
 
 
 def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
@@ -55,7 +55,7 @@ def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
     return corner + (1.0 - t) ** 2 * back + t**2 * onward
 
 
-def _evenly(points: Floats) -> Floats:
+def _with_even_points(points: Floats) -> Floats:
     """Insert points into (n, 2) so that none are over a centimetre apart."""
     out = [points[:1]]
     for before, point in itertools.pairwise(points):

@@ -118,8 +118,8 @@ class SafeGraph:
         ground = relief.ground
         config = relief.config
         w, h = (size - 2.0 * config.edge_margin_m for size in ground.size_m)
-        x = _centred(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
-        y = _centred(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
+        x = _centred_grid(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
+        y = _centred_grid(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
         xx, yy = np.meshgrid(x, y)
         safe = relief.risk(xx, yy) <= RISK_LIMIT
         index = np.where(safe, np.cumsum(safe).reshape(safe.shape) - 1, -1)
@@ -131,7 +131,7 @@ class SafeGraph:
         """Safe nodes over all nodes inside the margin."""
         self._avoid_m = np.empty((0, 2))
         self._layers = np.concatenate([relief.layers, self.footprint.layers], axis=-1)
-        self._edges = self._joined(index)
+        self._edges = self._joined_costs(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 
     def avoiding_in_steps(self, places_m: Floats) -> Steps[Self]:
@@ -150,12 +150,12 @@ class SafeGraph:
             some = slice(k, k + _EDGES_IN_STEP)
             from_m, to_m = self.nodes_m[edges.indices[some]], self.nodes_m[rows[some]]
             length = np.hypot(*(to_m - from_m).T)
-            weights[some] += self.length_weight * length * graph._avoided(0.5 * (from_m + to_m))
+            weights[some] += self.length_weight * length * graph._detour_cost(0.5 * (from_m + to_m))
         yield 300
         graph._edges = csr_array((weights, edges.indices, edges.indptr), shape=edges.shape)
         return graph
 
-    def _avoided(self, points_m: Floats) -> Floats:
+    def _detour_cost(self, points_m: Floats) -> Floats:
         """Extra metres (...) per metre of path at points (..., 2) near avoided places."""
         total = np.zeros(points_m.shape[:-1])
         for place in self._avoid_m:
@@ -274,7 +274,7 @@ class SafeGraph:
             back,
             risk,
         )
-        more = self.length_weight * self._avoided(points_m) if len(self._avoid_m) else 0.0
+        more = self.length_weight * self._detour_cost(points_m) if len(self._avoid_m) else 0.0
         return there.reshape(shape) + more, back.reshape(shape) + more, risk.reshape(shape)
 
     def _tree(self, target: int) -> tuple[Floats, Indices]:
@@ -289,7 +289,7 @@ class SafeGraph:
             self._trees[target] = score[0], towards[0].astype(np.intp)
         return self._trees[target]
 
-    def _joined(self, index: Indices) -> csr_array:
+    def _joined_costs(self, index: Indices) -> csr_array:
         """Sparse costs: rows are targets, columns sources, as trees grow from the target."""
         height, width = index.shape
         pairs = []
@@ -306,7 +306,7 @@ class SafeGraph:
         return csr_array(coo_array((weight, ends), shape=(n, n)))
 
 
-def _centred(middle: float, extent: float, spacing: float) -> Floats:
+def _centred_grid(middle: float, extent: float, spacing: float) -> Floats:
     count = max(0, int(extent / spacing + 1e-9)) + 1 if extent >= 0.0 else 0
     return np.asarray(middle + (np.arange(count) - (count - 1) / 2) * spacing)
 

@@ -18,7 +18,7 @@ from snakewalk.controller.terrain.path import SplinePath
 
 _SHARP = 0.45
 """Share of the wanted radius (ours): larger bends are followed, at 0.2 m a corner of 90 degrees."""
-_TURNED_RAD = 2.0
+_TURNED_BACK_RAD = 2.0
 _SHARP_BACK = 0.75
 """Share of the wanted radius for a bend by which a path turns back, by at least this angle (ours):
 3 of 10 walks missed a waypoint at 0.19 m and 128 degrees."""
@@ -27,9 +27,9 @@ _RADII = 1.5, 1.0, 0.75, 0.5
 body of 1.2 m in an arc of 0.4 m lies 0.13 m inside of it, of 0.6 m 0.09 m."""
 _ALL_ROUND_RAD = np.arange(16) * 2.0 * np.pi / 16
 _STEP_M = 0.01
-_NEAR_M = 0.5
+_NEAR_WAYPOINT_M = 0.5
 """Way before and after a waypoint in which a bend counts as being there."""
-_SHORTEST_M = 0.02
+_SHORTEST_LEG_M = 0.02
 """Shortest leg: two steps, because the direction at its end needs two points after its first."""
 _JOIN_M = 0.1
 _JOINS = 16, 64
@@ -78,7 +78,7 @@ class WaypointTurns:
     ) -> Steps[SplinePath]:
         """Run a call in steps."""
         yield 500
-        if path.length_m < _SHORTEST_M:
+        if path.length_m < _SHORTEST_LEG_M:
             return path
         legs = _legs(path, np.asarray(waypoints_m, float))
         turned = False
@@ -87,7 +87,7 @@ class WaypointTurns:
             if self._is_sharp(legs, k):
                 to_m = legs[k - 1] if k > 0 else None
                 from_m = legs[k] if k < len(legs) else None
-                legs_now = yield from self._turned(
+                legs_now = yield from self._turning_legs(
                     to_m, from_m, _ALL_ROUND_RAD + np.pi, _ALL_ROUND_RAD
                 )
                 if legs_now is not None:
@@ -100,9 +100,9 @@ class WaypointTurns:
 
     def _is_sharp(self, legs: Sequence[Floats], k: int) -> bool:
         """Whether a body cannot follow the bend near the end of the k-th leg."""
-        near_m = _near_m(legs, k)
+        near_m = _points_near_m(legs, k)
         radius_m = sharpest_bend(SplinePath.tabulated(near_m))[0]
-        turned_back = _turned_rad(near_m) > _TURNED_RAD
+        turned_back = _turn_of_points_rad(near_m) > _TURNED_BACK_RAD
         return radius_m < (_SHARP_BACK if turned_back else _SHARP) * self._radius_m
 
     def arrive_in_steps(self, leg: SplinePath, onward_m: Floats) -> Steps[SplinePath | None]:
@@ -110,10 +110,10 @@ class WaypointTurns:
         back = np.arctan2(*(onward_m[0] - onward_m[1])[::-1])
         to_m = leg.piece_m(0.0, leg.length_m)
         backs = np.array([back])
-        legs = yield from self._turned(to_m, None, backs, backs - np.pi)
+        legs = yield from self._turning_legs(to_m, None, backs, backs - np.pi)
         return None if legs is None else SplinePath.tabulated(np.vstack([*legs, onward_m[1:]]))
 
-    def _turned(
+    def _turning_legs(
         self, to_m: Floats | None, from_m: Floats | None, backs_rad: Floats, headings_rad: Floats
     ) -> Steps[list[Floats] | None]:
         """Legs (n, 2) to and from a waypoint with a turn there; None without a safe turn.
@@ -175,20 +175,20 @@ def _legs(path: SplinePath, waypoints_m: Floats) -> list[Floats]:
     """Points (n, 2) of the path's legs between waypoints; a short leg is a part of the next."""
     marks = [0.0]
     for at_m in path.passes(waypoints_m[:-1]):
-        if min(at_m - marks[-1], path.length_m - at_m) >= _SHORTEST_M:
+        if min(at_m - marks[-1], path.length_m - at_m) >= _SHORTEST_LEG_M:
             marks.append(at_m)
     return [path.piece_m(begin, end) for begin, end in pairwise([*marks, path.length_m])]
 
 
-def _near_m(legs: Sequence[Floats], k: int) -> Floats:
+def _points_near_m(legs: Sequence[Floats], k: int) -> Floats:
     """Points (n, 2) of a path near the end of the k-th leg."""
-    near = round(_NEAR_M / _STEP_M)
+    near = round(_NEAR_WAYPOINT_M / _STEP_M)
     before = [leg[-near:] for leg in legs[max(k - 1, 0) : k]]
     after = [leg[1:near] for leg in legs[k : k + 1]]
     return np.vstack(before + after)
 
 
-def _turned_rad(points_m: Floats) -> float:
+def _turn_of_points_rad(points_m: Floats) -> float:
     """Angle between the first and the last direction of points (n, 2)."""
     (ax, ay), (bx, by) = points_m[1] - points_m[0], points_m[-1] - points_m[-2]
     return abs(float(np.arctan2(ax * by - ay * bx, ax * bx + ay * by)))

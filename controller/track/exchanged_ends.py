@@ -11,10 +11,12 @@ from snakewalk.config.arrays import Bools, Floats, Ints
 
 _SAMPLES = 16  # points along a body at which two frames are compared
 _CLEARLY = 0.5  # a body that runs the other way is nearer reversed, by this factor at least
-_STILL = 0.02  # of the body's length: as much may it move between frames that are compared
-_USUAL = 5.0  # times the median motion between frames, likewise
+_STILL_SHARE = 0.02  # of the body's length: as much may it move between frames that are compared
+_USUAL_MOTIONS = 5.0  # times the median motion between frames, likewise
 _GAP = 3  # missing frames after which the place says nothing
-_SHORTER = 0.7  # of its length, by which a polyline ends where labels of the ends are exchanged
+_SHORTER_SHARE = (
+    0.7  # of its length, by which a polyline ends where labels of the ends are exchanged
+)
 _UNSURE = 0.4  # share of exchanged frames from which the majority is not clear
 
 
@@ -60,7 +62,7 @@ def _exchanged_labels(points: Floats) -> Bools:
         np.hypot(*np.diff(labelled_points, axis=1).transpose(2, 0, 1)).sum(axis=1)
         for labelled_points in (points, _with_ends_exchanged(points))
     )
-    return np.asarray(other_length < _SHORTER * one_length)
+    return np.asarray(other_length < _SHORTER_SHARE * one_length)
 
 
 def _with_ends_exchanged(points: Floats) -> Floats:
@@ -72,12 +74,12 @@ def _exchanged_bodies(points: Floats, number: Ints) -> Bools:
     step = np.hypot(*np.diff(points, axis=1).transpose(2, 0, 1))
     length = float(np.median(step.sum(axis=1)))
     bodies = np.stack(
-        [_resampled(*body_and_step) for body_and_step in zip(points, step, strict=True)]
+        [_resampled_body(*body_and_step) for body_and_step in zip(points, step, strict=True)]
     )
     same = _distance(bodies[1:], bodies[:-1])
     reverse = _distance(bodies[1:, ::-1], bodies[:-1])
     moved = np.minimum(same, reverse)
-    near = reverse <= max(_USUAL * float(np.median(moved)), _STILL * length)
+    near = reverse <= max(_USUAL_MOTIONS * float(np.median(moved)), _STILL_SHARE * length)
     changes = np.concatenate([[False], near & (reverse < _CLEARLY * same)])
     against = np.cumsum(changes) % 2 == 1
     gaps = np.flatnonzero(np.diff(number) > _GAP) + 1
@@ -88,7 +90,7 @@ def _exchanged_bodies(points: Floats, number: Ints) -> Bools:
     return np.asarray(against)
 
 
-def _resampled(body: Floats, step: Floats) -> Floats:
+def _resampled_body(body: Floats, step: Floats) -> Floats:
     """``_SAMPLES`` points (S, 2) evenly along the polyline through (P, 2) with steps (P - 1,)."""
     along = np.concatenate([[0.0], np.cumsum(step)])
     station = np.linspace(0.0, along[-1], _SAMPLES)

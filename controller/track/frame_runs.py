@@ -7,7 +7,7 @@ from snakewalk.config.arrays import Floats, Ints
 LEAST_ROWS = 8
 """Rows from which a common step of frame numbers is a rule and not chance (ours)."""
 
-_MOSTLY = 0.8
+_REGULAR_SHARE = 0.8
 """Part of the steps that are alike in a table of every n-th frame with exceptions (ours)."""
 
 
@@ -34,7 +34,7 @@ def is_mostly_every_nth(number: Ints) -> bool:
         return False
     step = np.diff(number)
     usual = float(np.median(step))
-    return usual > 1.0 and float((step == usual).mean()) >= _MOSTLY
+    return usual > 1.0 and float((step == usual).mean()) >= _REGULAR_SHARE
 
 
 def bridged(number: Ints, values: Floats, most: int) -> list[tuple[Ints, Floats]]:

@@ -7,7 +7,7 @@ from snakewalk.config.arrays import Floats
 
 SEGMENTS = 100
 """Segments of a skeleton, [PT] 2.5."""
-_FINE = 8  # samples per segment to measure the spline's arc length
+_FINE_STEPS = 8  # samples per segment to measure the spline's arc length
 
 
 def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
@@ -26,7 +26,7 @@ def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
     kept = points[distinct]
     arc_px = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(kept, axis=0).T))])
     spline = scipy.interpolate.make_interp_spline(arc_px, kept)
-    fine = np.linspace(0.0, arc_px[-1], segments * _FINE + 1)
+    fine = np.linspace(0.0, arc_px[-1], segments * _FINE_STEPS + 1)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))])
     equal = np.interp(np.linspace(0.0, arc[-1], segments + 1), arc, fine)
     return np.asarray(spline(equal), dtype=float)

@@ -19,7 +19,7 @@ from snakewalk.controller.track.resample import equal_arc_length, tangent_angles
 MOST_FRAMES = 500_000
 """Frames of a track, gaps included (ours): 4.6 hours at 30 Hz."""
 _UNEVEN = 0.1  # of a frame: largest deviation of times from an even rate
-_JOINED = 2.5  # frames: bodies are not interpolated over larger gaps
+_LONGEST_STEP = 2.5  # frames: bodies are not interpolated over larger gaps
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +121,7 @@ def track_from_points(
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise InputError(f"{name}: the frame rate must be above 0 Hz, not {rate_hz}")
     number = np.arange(len(points)) if frame is None else frame
-    number, rate_hz, uneven = _timed(name, number, time_s, rate_hz)
+    number, rate_hz, uneven = _frame_times(name, number, time_s, rate_hz)
     is_complete = np.asarray(np.isfinite(points).all(axis=(1, 2)))
     is_complete[is_complete] = [_distinct(body) for body in points[is_complete]]
     every = 1 if uneven else common_step(number[is_complete])
@@ -139,7 +139,9 @@ def track_from_points(
     absent = _absent(number, time_s if uneven else None, rate_hz)
     dropped = int(len(points) - is_complete.sum())
     if time_s is not None and uneven:
-        points, number, nearest = _between(points, time_s - time_s[0], is_complete, rate_hz)
+        points, number, nearest = _bodies_at_even_rate(
+            points, time_s - time_s[0], is_complete, rate_hz
+        )
         status = [status[k] for k in nearest.tolist()] if status else ()
         is_complete = np.ones(len(points), dtype=bool)
     if int(is_complete.sum()) < 2:
@@ -147,7 +149,7 @@ def track_from_points(
             f"{name}: only {int(is_complete.sum())} of {len(points)} frames hold a midline"
         )
     kept = points[is_complete]
-    even, length = _evenly(kept)
+    even, length = _even_bodies(kept)
     return Track(
         name=name,
         angles_rad=_over_time(tangent_angles(even)),
@@ -164,13 +166,13 @@ def track_from_points(
     )
 
 
-def _evenly(bodies: Floats) -> tuple[Floats, float]:
+def _even_bodies(bodies: Floats) -> tuple[Floats, float]:
     """Bodies (T, 101, 2) at equal arc lengths, and the median of their lengths."""
     even = np.stack([equal_arc_length(body) for body in bodies])
     return even, float(np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1)))
 
 
-def _timed(
+def _frame_times(
     name: str, number: Ints, time_s: Floats | None, rate_hz: float
 ) -> tuple[Ints, float, bool]:
     """Frame numbers, rate, and whether the times (T,) are uneven and determine both."""
@@ -216,7 +218,7 @@ def _is_uneven(name: str, time_s: Floats, number: Ints) -> bool:
     return bool(np.abs(off_s).max() > _UNEVEN * step_s)
 
 
-def _between(
+def _bodies_at_even_rate(
     points: Floats, time_s: Floats, is_complete: Bools, rate_hz: float
 ) -> tuple[Floats, Ints, Ints]:
     """Bodies (T', P, 2) at an even rate, their frame numbers, and the nearest frame of each.
@@ -224,7 +226,7 @@ def _between(
     Times next to a frame without a body, or in long gaps, get no body.
     """
     first = np.flatnonzero(
-        is_complete[:-1] & is_complete[1:] & (np.diff(time_s) <= _JOINED / rate_hz)
+        is_complete[:-1] & is_complete[1:] & (np.diff(time_s) <= _LONGEST_STEP / rate_hz)
     )
     bodies = [points[:0]]
     numbers = [np.zeros(0, np.int64)]

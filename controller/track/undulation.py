@@ -46,13 +46,15 @@ def measure_undulation(track: Track, frequency_hz: float) -> Undulation:
     heading = track.angles_rad.mean(axis=1)
     cycle = track.rate_hz / max(frequency_hz, 1e-9)
     number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
-    slow = _slow(number, heading, cycle)
+    slow = _smoothed_over_cycle(number, heading, cycle)
     swing = track.angles_rad - slow[:, None]
     body = even_points(track)
     if body is None:
         body = body_points(track.angles_rad)
         body = body - body.mean(axis=1, keepdims=True)
-    centre = np.stack([_slow(number, column, cycle) for column in body.mean(axis=1).T], axis=-1)
+    centre = np.stack(
+        [_smoothed_over_cycle(number, column, cycle) for column in body.mean(axis=1).T], axis=-1
+    )
     across = np.stack([-np.sin(slow), np.cos(slow)], axis=-1)
     side = ((body - centre[:, None]) * across[:, None]).sum(axis=-1)
     return Undulation(np.sqrt(2.0) * swing.std(axis=0), np.sqrt(2.0) * side.std(axis=0))
@@ -101,7 +103,7 @@ def advance_of(body: Floats, number: Ints, step: int) -> Advance:
     )
 
 
-def _slow(number: Ints, values: Floats, cycle: float) -> Floats:
+def _smoothed_over_cycle(number: Ints, values: Floats, cycle: float) -> Floats:
     """Smooth a series over a cycle of this many frames.
 
     Parts between gaps are smoothed separately; those shorter than a cycle follow one line through

@@ -27,7 +27,7 @@ _LEAST_CYCLES = 1.0
 """Shorter runs are left out where a longer one exists (ours)."""
 _REACH = 0.3
 """Part of the first frequency within which the refined one lies (ours)."""
-_TRIED = 31
+_TRIED_FREQUENCIES = 31
 _ZOOMS = 3
 _COMPONENTS = 4
 
@@ -65,7 +65,7 @@ def gapped_wave(number: Ints, curvature: Floats) -> GappedWave:
         complex((phasor[1:] * phasor[:-1].conj()).sum())
         for phasor in (signal @ mode.conj() for signal in signals)
     )
-    turns = _refined(number, [run for run, _ in used], components, first)
+    turns = _refined_frequency(number, [run for run, _ in used], components, first)
     return GappedWave(
         float(np.copysign(turns, np.angle(sense))),
         np.asarray(mode),
@@ -89,19 +89,19 @@ def _first_turns(number: Ints, components: Floats) -> float:
     return float(np.angle((phasor[joined + 1] * phasor[joined].conj()).sum())) / (2.0 * np.pi)
 
 
-def _refined(number: Ints, spans: list[Ints], components: Floats, first: float) -> float:
+def _refined_frequency(number: Ints, spans: list[Ints], components: Floats, first: float) -> float:
     """Frequency near ``first``, turns per frame, with the least residual over the spans."""
     spanned = [np.flatnonzero((number >= span[0]) & (number <= span[-1])) for span in spans]
     best = first
     reach = _REACH
     for _ in range(_ZOOMS):
-        tried = np.clip(best * np.linspace(1.0 - reach, 1.0 + reach, _TRIED), 1e-6, 0.5)
+        tried = np.clip(best * np.linspace(1.0 - reach, 1.0 + reach, _TRIED_FREQUENCIES), 1e-6, 0.5)
         left = [
             sum(_squares_left(number[run], components[run], turns) for run in spanned)
             for turns in tried
         ]
         best = float(tried[int(np.argmin(left))])
-        reach = 2.0 * reach / (_TRIED - 1)
+        reach = 2.0 * reach / (_TRIED_FREQUENCIES - 1)
     return best
 
 

@@ -36,7 +36,7 @@ _CYCLE_HZ: Final = 100.0
 """Goals per second: steps of 20 ms would shake a stiff body, and water resists by the square."""
 _PENDULUM_S: Final = 6.0
 """Duration of BAM's trajectories."""
-_SETTLED_S: Final = 1.0
+_SETTLING_S: Final = 1.0
 _LAG_STEP_S: Final = 2.5e-3
 _MOST_LAG_S: Final = 0.4
 """Lags are searched in these steps and up to this limit, as in ``feetech-bench-figures``."""
@@ -66,11 +66,11 @@ class SineWave:
 
     def goal_rad(self) -> Floats:
         """(J,) present angles."""
-        return self._at(self._time_s)
+        return self._values_at(self._time_s)
 
     def velocity_rad_s(self) -> Floats:
         """(J,) their present speeds, from a short difference."""
-        return (self._at(self._time_s + 1e-4) - self._at(self._time_s)) / 1e-4
+        return (self._values_at(self._time_s + 1e-4) - self._values_at(self._time_s)) / 1e-4
 
     def pace(self) -> Pace:
         """Largest speeds and accelerations of the complete wave."""
@@ -82,7 +82,7 @@ class SineWave:
         self._time_s += dt_s
         return self.goal_rad()
 
-    def _at(self, time_s: float) -> Floats:
+    def _values_at(self, time_s: float) -> Floats:
         share = min(time_s / RISE_S, 1.0)
         rise = share * share * (3.0 - 2.0 * share)
         wave = np.sin(self._rate_rad_s * time_s + self._phase_rad)
@@ -128,10 +128,10 @@ def _body(conditions: Conditions, motion: WaveMotion | ShippedGait) -> dict[str,
     late = (pose.time_s >= motion.after_s) & (pose.time_s <= motion.seconds)
     time_s = pose.time_s[late]
     links_m = pose.links_m[late][..., :2]
-    speed = _speed(time_s, links_m.mean(axis=1))
+    speed = _fitted_speed(time_s, links_m.mean(axis=1))
     return {
-        "head_speed_m_s": _speed(time_s, links_m[:, 0]),
-        "tail_speed_m_s": _speed(time_s, links_m[:, -1]),
+        "head_speed_m_s": _fitted_speed(time_s, links_m[:, 0]),
+        "tail_speed_m_s": _fitted_speed(time_s, links_m[:, -1]),
         "speed_m_s": speed,
         "lengths_per_cycle": speed / motion.frequency_hz / robot.length_m,
     }
@@ -150,7 +150,7 @@ def _source(robot: RobotConfig, motion: WaveMotion | ShippedGait) -> MotionSourc
     return running
 
 
-def _speed(time_s: Floats, place_m: Floats) -> float:
+def _fitted_speed(time_s: Floats, place_m: Floats) -> float:
     """Slope of a place (T, 2) over time, by least squares."""
     moved_s = time_s - time_s.mean()
     slope = (moved_s[:, None] * (place_m - place_m.mean(axis=0))).sum(axis=0) / (moved_s**2).sum()
@@ -176,7 +176,7 @@ def _pendulum(robot: RobotConfig, motion: PendulumMotion) -> dict[str, float]:
         plant.advance(now_s, drive)
         angle_rad[k] = plant.position_rad[0]
         drive.goal_rad[:] = trajectory(np.maximum(time_s[k : k + 1] - motion.delay_s, 0.0))
-    settled = time_s >= _SETTLED_S
+    settled = time_s >= _SETTLING_S
     late_s = np.arange(0.0, _MOST_LAG_S + 1e-9, _LAG_STEP_S)
     errors = [_rms(angle_rad[settled] - trajectory(time_s[settled] - lag)) for lag in late_s]
     return {"lag_s": float(late_s[np.argmin(errors)]), "rms_error_rad": errors[0]}

@@ -110,11 +110,11 @@ class _Results:
         try:
             conditions = self._measurement.conditions(row, self._name)
             travels = conditions.travels
-            simulated = self._simulated(row)
+            simulated = self._simulated_value(row)
             if row.over is not None:
                 other = self._measurement.row(row.over)
                 measured /= other.value
-                simulated /= self._simulated(other)
+                simulated /= self._simulated_value(other)
         except InputError as error:
             cause = str(error)
             simulated = None
@@ -133,7 +133,7 @@ class _Results:
             cause=cause,
         )
 
-    def _simulated(self, row: MeasuredRow) -> float:
+    def _simulated_value(self, row: MeasuredRow) -> float:
         conditions = self._measurement.conditions(row, self._name)
         same = conditions.model_dump_json()
         if same not in self._played:

@@ -191,11 +191,11 @@ class Conditions(Strict):
 
 
 def _table(given: str | dict[str, Any], read: Any) -> dict[str, Any]:
-    return dict(read(given).model_dump()) if isinstance(given, str) else _copied(given)
+    return dict(read(given).model_dump()) if isinstance(given, str) else _copied_table(given)
 
 
-def _copied(table: Mapping[str, Any]) -> dict[str, Any]:
-    return {k: _copied(v) if isinstance(v, dict) else v for k, v in table.items()}
+def _copied_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: _copied_table(v) if isinstance(v, dict) else v for k, v in table.items()}
 
 
 def _replace(table: dict[str, Any], path: list[str], value: object) -> None:

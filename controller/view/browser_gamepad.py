@@ -32,7 +32,7 @@ DEAD_MAN: Final = (4, 5)
 """Buttons of the dead man's switch: the shoulder buttons, left and right."""
 STOP: Final = (11, 16)
 """Stop buttons: the right stick pressed, and the button in the middle."""
-_HALF: Final = 0.5
+_HALF_DEFLECTION: Final = 0.5
 _MESSAGE_BYTES: Final = 2000
 _MESSAGES_S: Final = 100
 """More messages in a second cannot come from our script: its line is closed (ours)."""
@@ -119,7 +119,7 @@ def read_state(message: str | bytes) -> PadState | None:
         raise ValueError("no number")
     if not standard:
         return PadState(name, False, frozenset(), ())
-    sides = tuple(int(value > _HALF) - int(value < -_HALF) for value in axes)
+    sides = tuple(int(value > _HALF_DEFLECTION) - int(value < -_HALF_DEFLECTION) for value in axes)
     return PadState(name, True, pressed, sides)
 
 
@@ -159,7 +159,7 @@ class BrowserGamepad:
         return self._now_s() - self._told_s > STALE_S
 
     @property
-    def _is_free(self) -> bool:
+    def _is_unclaimed(self) -> bool:
         return self._steers is None or self.is_stale
 
     def take(self, source: Hashable, message: str | bytes, since_s: float | None = None) -> bool:
@@ -183,9 +183,9 @@ class BrowserGamepad:
             browser.state = state
             was_down = before.pressed if before is not None else frozenset[int]()
             stops = state is not None and not (state.pressed - was_down).isdisjoint(STOP)
-            is_first = state is not None and self._is_free
+            is_first = state is not None and self._is_unclaimed
             if not is_late and (source == self._steers or is_first):
-                self._keys += _pressed(before, state)
+                self._keys += _pressed_keys(before, state)
                 self._steers = source if state is not None else None
                 self.state = state
                 self._told_s = now_s
@@ -227,7 +227,7 @@ class BrowserGamepad:
             self.leave(connection)
 
 
-def _pressed(before: PadState | None, state: PadState | None) -> list[str]:
+def _pressed_keys(before: PadState | None, state: PadState | None) -> list[str]:
     """Keys that a change means: a button that is down when a gamepad is first seen does not count.
 
     A stick counts once each time it leaves the middle.

@@ -7,7 +7,7 @@ from snakewalk.controller.motion.command import LATE_S, Refused
 from snakewalk.controller.motion.refusals import NAME_MAX
 from snakewalk.controller.view.dead_man import HOLD, DeadMan
 
-_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S: Final = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
 
 
@@ -37,7 +37,7 @@ def in_time(line: str, now_s: Callable[[], float]) -> str | Refused:
         return Refused(f"page: {line[:NAME_MAX]}: has no time; restart the program that sends it")
     if command.startswith(HOLD) and "@" in command:
         return command
-    if -_AHEAD_S <= age_s <= LATE_S:
+    if -_MOST_AHEAD_S <= age_s <= LATE_S:
         return command
     return Refused(
         f"page: {command[:NAME_MAX]} came {age_s:.1f} s late and is dropped; at most {LATE_S:g} s "

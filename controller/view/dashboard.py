@@ -26,8 +26,8 @@ _EVENTS: Final = 7
 _AMBIENT_C: Final = 20.0
 _LATE_CYCLES: Final = 3.0
 """Readings that are this number of cycles old are shown in another colour (ours)."""
-_GOOD, _WARN, _BAD, _INK = colours.MEASURED, colours.WARNING, colours.FAULT, "#666"
-_LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD}
+_GOOD, _WARN, _BAD_COLOUR, _INK = colours.MEASURED, colours.WARNING, colours.FAULT, "#666"
+_LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD_COLOUR}
 
 
 class Dashboard:
@@ -131,7 +131,7 @@ class Dashboard:
 
     def show_verdict(self, verdict: RunVerdict) -> None:
         """Show how the run ended."""
-        colour = _BAD if verdict.exit_code else _INK
+        colour = _BAD_COLOUR if verdict.exit_code else _INK
         self._verdict.content = (
             f"<div style='padding:0 .8em .4em;color:{colour}'>{escape(verdict.text)}"
             f"<br>{escape(verdict.evidence)}</div>"
@@ -151,7 +151,7 @@ class Dashboard:
         for joint, name in enumerate(self._names):
             age_s = rows.age_s[cycle, joint]
             stale = age_s > self._stale_s
-            old = _BAD if stale else _WARN if age_s > _LATE_CYCLES * period_s else _INK
+            old = _BAD_COLOUR if stale else _WARN if age_s > _LATE_CYCLES * period_s else _INK
             low, high = self._volts
             bad_v = not low <= volts[joint] <= high and np.isfinite(volts[joint])
             current_a = abs(rows.current_a[cycle, joint])
@@ -166,7 +166,8 @@ class Dashboard:
                 _bar(
                     (heat[joint] - _AMBIENT_C) / (self._limit_c - _AMBIENT_C), f"{heat[joint]:.0f}"
                 ),
-                f"<span style='color:{_BAD if bad_v else _INK}'>{_number(volts[joint], 1)}</span>",
+                f"<span style='color:{_BAD_COLOUR if bad_v else _INK}'>"
+                f"{_number(volts[joint], 1)}</span>",
                 f"<span style='color:{old}'>{_number(age_s * 1e3, 0)}</span>",
             )
             lines.append("<tr><td>" + "</td><td>".join(cells) + "</td></tr>")
@@ -190,12 +191,12 @@ class Dashboard:
         self._current.data = (time_s, *rows.current_a[pick].T)
         if len(record.shadow.time_s):
             self._apart.visible = True
-            self._apart.data = (time_s, *_apart_a(record, pick).T)
+            self._apart.data = (time_s, *_current_difference_a(record, pick).T)
         for panel, plot in self._panels.items():
             curves = panel_curves(record, panel)
             if curves:
                 plot.visible = True
-                plot.data = (time_s, *_newest(panel, curves, time_s))
+                plot.data = (time_s, *_newest_values(panel, curves, time_s))
 
     def show_events(self, events: tuple[Event, ...]) -> None:
         """Show the newest events, the newest first; of a checked pose, its facts as well."""
@@ -242,7 +243,7 @@ def _plot(
     )
 
 
-def _apart_a(record: RunRecord, rows: np.ndarray) -> Floats:
+def _current_difference_a(record: RunRecord, rows: np.ndarray) -> Floats:
     """Currents (n, J) of some cycles less those of the shadow; NaN where it has no row."""
     time_s = record.cycle.time_s[rows]
     shadow = record.shadow
@@ -274,7 +275,7 @@ def _curve_colours(panel: Panel) -> dict[str, str]:
     return {curve.name: colours.COLOURS[curve.colour] for curve in curves}
 
 
-def _newest(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
+def _newest_values(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
     """Values (n,) of each curve of a panel that were the newest at some times."""
     newest_values = {
         curve.curve.name: curve.values[_rows_at(curve.time_s, time_s)] for curve in curves
@@ -292,7 +293,7 @@ def _bar(share: float, text: str) -> str:
     """A bar from the left; red where it nears its limit."""
     is_known = np.isfinite(share)
     width = 100.0 * min(max(share, 0.0), 1.0) if is_known else 0.0
-    color = _BAD if width > 85.0 else _WARN if width > 60.0 else _GOOD
+    color = _BAD_COLOUR if width > 85.0 else _WARN if width > 60.0 else _GOOD
     return _box(
         f"<div style='width:{width:.0f}%;height:100%;background:{color};opacity:.55'></div>",
         text if is_known else "",

@@ -7,7 +7,7 @@ from typing import Final
 
 STALE_S: Final = 0.3
 """A gamepad that sends nothing for this time is not held (ours)."""
-_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S: Final = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
 HOLD: Final = "pad="
 """Begins a state of a gamepad."""
@@ -54,7 +54,7 @@ class DeadMan:
             self._until_s = math.inf
         elif down == "0":
             self._until_s = -math.inf
-        elif down == "1" and text and at_s <= self._now_s() + _AHEAD_S:
+        elif down == "1" and text and at_s <= self._now_s() + _MOST_AHEAD_S:
             self._until_s = at_s + STALE_S
         else:
             return False

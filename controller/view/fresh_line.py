@@ -74,17 +74,17 @@ class FreshConnection(ServerConnection):
         """Check a frame's age in the order of arrival."""
         if isinstance(event, Frame):
             if event.opcode is Opcode.PONG:
-                self._answered(bytes(event.data))
-            elif event.opcode in DATA_OPCODES and self._is_dropped(event):
+                self._note_answer(bytes(event.data))
+            elif event.opcode in DATA_OPCODES and self._drops_frame(event):
                 return
         super().process_event(event)
 
-    def _answered(self, data: bytes) -> None:
+    def _note_answer(self, data: bytes) -> None:
         if data in self._pings_s:
             self._since_s = self._pings_s[data]
             self._pings_s = {k: at_s for k, at_s in self._pings_s.items() if at_s > self._since_s}
 
-    def _is_dropped(self, frame: Frame) -> bool:
+    def _drops_frame(self, frame: Frame) -> bool:
         assert self.request is not None
         if urlsplit(self.request.path).path in self._late_paths:
             if frame.fin:

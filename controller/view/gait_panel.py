@@ -18,7 +18,7 @@ from snakewalk.controller.motion.refusals import NAME_MAX
 
 _EVERY_S: Final = 0.2
 """A slider that is drawn along commands no more often (ours)."""
-_SETTLED_S: Final = 1.0
+_SETTLING_S: Final = 1.0
 """An input shows the run's value this time after its last change: also a refusal (ours)."""
 _BUTTONS: Final = {"halt, go on": "space", "defaults": "d"}
 """Keys of an ``Operator``."""
@@ -69,7 +69,7 @@ class GaitPanel:
         """Inputs that were set since the last call, the newest value of each; call it often."""
         self._now_s = now_s
         self._collect()
-        late = {name for name, at_s in self._moved_s.items() if now_s - at_s >= _SETTLED_S}
+        late = {name for name, at_s in self._moved_s.items() if now_s - at_s >= _SETTLING_S}
         if late:
             self._moved_s = {k: at_s for k, at_s in self._moved_s.items() if k not in late}
             self._settle()
@@ -92,7 +92,7 @@ class GaitPanel:
             shown.on_update(self._command_of(name))
 
     def _input(self, name: str, span: Range) -> Any:
-        value = _shown(self._values[name])
+        value = _shown_value(self._values[name])
         hint = span.description or None
         label = ", ".join(filter(None, label_and_unit(name)))
         if span.kind is bool:
@@ -127,14 +127,14 @@ class GaitPanel:
         self._collect()
         current_values = {
             "gait": self._name,
-            **{k: _shown(value) for k, value in self._values.items()},
+            **{k: _shown_value(value) for k, value in self._values.items()},
         }
         for name, shown in {"gait": self._gait, **self._inputs}.items():
             if name not in self._moved_s and shown.value != current_values[name]:
                 shown.value = current_values[name]
 
 
-def _shown(value: Any) -> Any:
+def _shown_value(value: Any) -> Any:
     """A number with as many digits as fit next to its slider."""
     return round(value, 4) if isinstance(value, float) else value
 

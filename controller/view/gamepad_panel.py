@@ -9,7 +9,7 @@ import viser
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.dead_man import WITHOUT
 
-_NONE: Final = (
+_NO_GAMEPAD: Final = (
     "No gamepad. Press a button of a gamepad at the computer of this browser; the browser "
     "reports it only then."
 )
@@ -43,7 +43,9 @@ class GamepadPanel:
         stale = self._gamepad.is_stale
         if state is None:
             text = (
-                _NONE if not self._needed else "The gamepad is gone: the body stands in its shape."
+                _NO_GAMEPAD
+                if not self._needed
+                else "The gamepad is gone: the body stands in its shape."
             )
         elif not state.standard:
             text = f"{state.name}: this browser does not know which button is which; not taken."

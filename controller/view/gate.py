@@ -26,7 +26,7 @@ from websockets.http11 import Request, Response
 from snakewalk.controller.view.fresh_line import FreshConnection, Freshness
 
 _LOCAL: Final = frozenset({"127.0.0.1", "localhost", "::1"})
-_ANY: Final = frozenset({"0.0.0.0", "::"})
+_ANY_ADDRESS: Final = frozenset({"0.0.0.0", "::"})
 _HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[\w.-]+)(:\d+)?")
 _ASK: Final = (
     "<!doctype html><title>snakewalk</title><meta name=viewport content='width=device-width'>"
@@ -62,18 +62,18 @@ class Gate:
 
     def answer(self, request: Request, port: int) -> Response | None:
         """Return the refusal, or None if the request may pass."""
-        host = _only(request, "Host")
-        if not self._is_expected(host):
+        host = _single_header(request, "Host")
+        if not self._is_expected_host(host):
             text = f"{escape(host) or 'no host'}: the page is not served by this name"
             return _response(http.HTTPStatus.FORBIDDEN, text)
         needs_origin = bool(request.headers.get_all("Origin") or request.headers.get_all("Upgrade"))
-        if needs_origin and not _is_of(_only(request, "Origin"), host):
+        if needs_origin and not _is_origin_of_host(_single_header(request, "Origin"), host):
             return _response(http.HTTPStatus.FORBIDDEN, "another page may not open this one")
         cookie = f"snakewalk-{port}"
-        if self._is_right(_cookie(request, cookie)):
+        if self._is_right_password(_cookie(request, cookie)):
             return None
         given = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
-        if self._is_right(given):
+        if self._is_right_password(given):
             response = _response(http.HTTPStatus.SEE_OTHER, "")
             response.headers["Location"] = "/"
             kept = f"{cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
@@ -82,10 +82,10 @@ class Gate:
         text = "That is another token." if given else "The token that the command has printed:"
         return _response(http.HTTPStatus.UNAUTHORIZED, _ASK.format(escape(text)))
 
-    def _is_right(self, given: str) -> bool:
+    def _is_right_password(self, given: str) -> bool:
         return hmac.compare_digest(given.encode(errors="replace"), self.token.encode())
 
-    def _is_expected(self, host: str) -> bool:
+    def _is_expected_host(self, host: str) -> bool:
         """Whether a request may name this host: a name of another page may lead here."""
         match = _HOST.fullmatch(host)
         if match is None:
@@ -95,7 +95,7 @@ class Gate:
             return name in _LOCAL
         if name == self._host.lower().removesuffix("."):
             return True
-        if self._host not in _ANY:
+        if self._host not in _ANY_ADDRESS:
             return False
         host_name, _, _ = socket.gethostname().lower().partition(".")
         return _is_address(name) or name.partition(".")[0] == host_name
@@ -166,7 +166,7 @@ def _is_address(name: str) -> bool:
     return True
 
 
-def _is_of(origin: str, host: str) -> bool:
+def _is_origin_of_host(origin: str, host: str) -> bool:
     try:
         place = urlsplit(origin)
     except ValueError:
@@ -174,7 +174,7 @@ def _is_of(origin: str, host: str) -> bool:
     return place.scheme in {"http", "https"} and place.netloc.lower() == host.lower()
 
 
-def _only(request: Request, header: str) -> str:
+def _single_header(request: Request, header: str) -> str:
     """Value of a header that is there once; else empty."""
     values = request.headers.get_all(header)
     return values[0] if len(values) == 1 else ""

@@ -54,7 +54,7 @@ _SERVOS_S: Final = 0.2
 _CURVES_S: Final = 0.5
 _SILENT_S: Final = 0.5
 """A run that sends nothing for this time may have ended."""
-_LAST_S: Final = 1.5
+_LAST_VERDICT_S: Final = 1.5
 """Longest time for the verdict to reach the browsers."""
 _ROWS: Final = round(SPAN_S / _PERIOD_S)
 
@@ -131,7 +131,7 @@ class _LivePage:
             self._end.ask()
             self._send_commands()
         for topic, row in self._end.rows(_PERIOD_S):
-            self._take(topic, row)
+            self._store_row(topic, row)
             if topic == PoseTable.topic.name:
                 self._told_s = self._clock.now_s()
                 self._stop.newest_s = self._freshness.now_s()
@@ -144,7 +144,7 @@ class _LivePage:
 
     def end(self) -> None:
         """Wait until the browsers were sent what they show from now on."""
-        until_s = self._clock.now_s() + _LAST_S
+        until_s = self._clock.now_s() + _LAST_VERDICT_S
         while not self._stop.is_shown and self._clock.now_s() < until_s:
             self._clock.sleep_until_s(self._clock.now_s() + _PERIOD_S)
 
@@ -182,13 +182,13 @@ class _LivePage:
             commands += self._gamepad_panel.commands()
         return commands
 
-    def _take(self, topic: str, row: dict[str, Any]) -> None:
+    def _store_row(self, topic: str, row: dict[str, Any]) -> None:
         if topic == BUTTON:
             self._button = PressedButton(Path(row["path"]))
             self._stop.arm()
             return
         if topic == ConfigTable.topic.name:
-            self._open(record_of({topic: [row]}, complete=False, note="").header)
+            self._open_run(record_of({topic: [row]}, complete=False, note="").header)
             return
         if topic in (PICTURE, VERDICT):
             self._show(topic, row)
@@ -218,7 +218,7 @@ class _LivePage:
             self._dashboard.show_verdict(verdict)
             self._stop.judged(f"{verdict.text} ({verdict.evidence})")
 
-    def _open(self, header: Header) -> None:
+    def _open_run(self, header: Header) -> None:
         """Draw the body of a run that begins, and its panels."""
         self._header = header
         with self._server.atomic():

@@ -84,7 +84,7 @@ class LogPage:
                 board = Dashboard(self.server, record.header)
             if not board.checks_pose:
                 board.show_verdict(verdict(record, summary(record)))
-            self._shown.append(_Shown(record, scene, board))
+            self._shown.append(_ShownLog(record, scene, board))
         self._shown[0].scene.first_camera()
         self.playing = False
         self._repeats = repeats
@@ -135,7 +135,7 @@ class LogPage:
 
 
 @dataclass(slots=True)
-class _Shown:
+class _ShownLog:
     """A log in the page."""
 
     record: RunRecord

@@ -25,7 +25,7 @@ def open_page(
         OSError: nothing can be served there, or not behind the gate.
 
     """
-    if not _is_here(host):  # viser would wait for ever
+    if not _is_local_host(host):  # viser would wait for ever
         raise OSError(
             f"{host} is not an address of this machine; use 127.0.0.1 (this machine only) or "
             "0.0.0.0 (all of its addresses)"
@@ -49,7 +49,7 @@ def _in_url(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _is_here(host: str) -> bool:
+def _is_local_host(host: str) -> bool:
     """Whether this machine can serve at one of a host's addresses."""
     try:
         places = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)

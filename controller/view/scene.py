@@ -32,14 +32,14 @@ _OLD_PATH: Final = rgb(colours.GREY)
 _TRAIL: Final = rgb(colours.CENTRE)
 _WATER: Final = (140, 204, 235)
 _WAYPOINT: Final = rgb(colours.TO_COME)
-_REACHED: Final = rgb(colours.REACHED)
+_REACHED_COLOUR: Final = rgb(colours.REACHED)
 _GROUND: Final = np.array([rgb(colours.LOWLAND), rgb(colours.HIGHLAND)])
 """Colours (ours); a link's hot at full current, the ground's from lowest to highest."""
 _CONTOUR: Final = (92, 84, 66)
 _CONTOUR_ABOVE_M: Final = 0.002
 _CONTOURS: Final = 12
 """Most contours of a ground (ours)."""
-_ABOVE_M: Final = 0.006
+_LINE_HEIGHT_M: Final = 0.006
 """Height of lines above the ground, so that they are visible (ours)."""
 _GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
 """Height above the body's axis and thickness of the line of the goals, in radii of the body
@@ -48,7 +48,7 @@ _LINE: Final = 3.0
 _FLOOR_M: Final = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
 _TRAIL_POINTS: Final = 400
-_SEEN_M = 60.0
+_VISIBLE_M = 60.0
 _RAY_STEP_M = 0.02
 """Reach of a click, and the steps in which the ground is searched (ours)."""
 
@@ -161,7 +161,7 @@ class BodyScene:
         """X and y of the drawn ground where a ray of the page meets it; None where it does not."""
         at_m = np.asarray(origin_m, float) - self._frame.position
         along = np.asarray(direction, float) / max(float(np.linalg.norm(direction)), 1e-9)
-        points_m = at_m + np.arange(0.0, _SEEN_M, _RAY_STEP_M)[:, None] * along
+        points_m = at_m + np.arange(0.0, _VISIBLE_M, _RAY_STEP_M)[:, None] * along
         above_m = points_m[:, 2] - self._height_m(points_m[:, :2])
         below = np.flatnonzero((above_m <= 0.0) & self._is_drawn(points_m[:, :2]))
         if not len(below) or below[0] == 0:
@@ -304,7 +304,7 @@ class BodyScene:
         if reached != self._reached:
             self._reached = reached
             for number, sphere in enumerate(self._waypoints):
-                sphere.color = _REACHED if number < reached else _WAYPOINT
+                sphere.color = _REACHED_COLOUR if number < reached else _WAYPOINT
 
     def _draw_waypoints(self) -> None:
         for sphere in self._waypoints:
@@ -330,7 +330,7 @@ class BodyScene:
 
     def _line(self, name: str, points_m: Floats, color: tuple[int, int, int], width: float) -> None:
         flat = points_m[:, :2]
-        raised = np.column_stack([flat, self._height_m(flat) + _ABOVE_M])
+        raised = np.column_stack([flat, self._height_m(flat) + _LINE_HEIGHT_M])
         segments = np.array(list(pairwise(raised)))
         self._scene.add_line_segments(
             name, segments, color, thickness=width, thickness_units="screen"

@@ -21,7 +21,7 @@ from snakewalk.config import colours
 from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.operators import Operators
 
-_LOOK_S: Final = 0.05
+_POLL_S: Final = 0.05
 """Time between two looks at the state to be shown (ours)."""
 _BEAT_LOOKS: Final = 5
 """Looks after which a state is sent again: a browser reports 1 s without one."""
@@ -143,7 +143,7 @@ class StopElement:
                     browser.shown = state
                 if browser.tab:
                     self.operators.hear(browser.tab, browser.connection.heard_s)
-                await asyncio.sleep(_LOOK_S)
+                await asyncio.sleep(_POLL_S)
 
     @property
     def _age_ms(self) -> int | None:

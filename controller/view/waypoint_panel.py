@@ -12,7 +12,7 @@ from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.walk.live_course import ADD, CLEAR, END, NEXT
 
 _HINT: Final = "Shift and a click on the ground add a waypoint, too"
-_BAD: Final = colours.FAULT
+_FAULT_COLOUR: Final = colours.FAULT
 
 
 class WaypointPanel:
@@ -38,8 +38,8 @@ class WaypointPanel:
                 gui.add_button(label, hint=what).on_click(self._commanding(word))
             self._text = gui.add_html("")
         self._show(_HINT)
-        server.scene.on_click()(self._clicked)
-        server.scene.on_click(modifier="shift")(self._clicked)
+        server.scene.on_click()(self._on_click)
+        server.scene.on_click(modifier="shift")(self._on_click)
 
     def commands(self) -> list[str]:
         """Clicks since the last call, for a ``LiveCourse``."""
@@ -51,7 +51,7 @@ class WaypointPanel:
     def show(self, kind: str, text: str) -> None:
         """Show the event of the log that answers a click."""
         if kind in ("operator", "refused"):
-            self._show(text, _BAD if kind == "refused" else "inherit")
+            self._show(text, _FAULT_COLOUR if kind == "refused" else "inherit")
 
     def _arming(self, word: str) -> Callable[[object], None]:
         """Callback of a button that waits for a click, or stops waiting."""
@@ -69,14 +69,14 @@ class WaypointPanel:
 
         return pressed
 
-    def _clicked(self, event: viser.SceneClickEvent) -> None:
+    def _on_click(self, event: viser.SceneClickEvent) -> None:
         word = ADD if event.modifier == "shift" else self._armed
         self._armed = ""
         if not word:
             return
         point_m = self._scene.ground_m(event.ray_origin, event.ray_direction)
         if point_m is None:
-            self._show("refused: you did not click on the ground", _BAD)
+            self._show("refused: you did not click on the ground", _FAULT_COLOUR)
             return
         self._commands.put(f"{word}={point_m[0]:.3f},{point_m[1]:.3f}")
         self._show("asked of the run")

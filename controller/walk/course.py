@@ -25,11 +25,11 @@ _REPLAN_AFTER_BODIES = 2.0
 # A body that gains less than this on its path over this travel is stalled.
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
-_KEPT_M = 0.3
+_KEPT_PATH_M = 0.3
 """Length of the path before the head that a renewal keeps: the body is on it by then."""
 _BEND_RAD = 0.8
 """Largest bend of a renewed path where it continues (ours)."""
-_BEYOND = 1.5
+_BEYOND_PATH_WEIGHT = 1.5
 """Weight of a straight metre that no path covers yet, metres of path (ours)."""
 
 
@@ -238,7 +238,7 @@ class Course:
             why = self._failing(centre_m)
             if why is None:
                 return
-            if self._is_stalled:
+            if self._body_is_stalled:
                 self._stalls_m.append(np.array(head_m))
             self._request(why, heading_rad, is_miss=True)
 
@@ -285,16 +285,16 @@ class Course:
         """
         path = self.path
         along_m = float(self._along_m[1])
-        join_m = min(along_m + _KEPT_M, path.length_m)
+        join_m = min(along_m + _KEPT_PATH_M, path.length_m)
         if self._passed_m[-1] <= join_m:
             return
-        if self._gap_m[1] > _KEPT_M or not is_clear(path.piece_m(along_m, join_m)):
+        if self._gap_m[1] > _KEPT_PATH_M or not is_clear(path.piece_m(along_m, join_m)):
             with suppress(InputError):
                 self._lay(self._followers_m[1].copy(), heading_rad())
                 self.replanned = why
             return
         onwards: list[_Onward] = []
-        for at_m in dict.fromkeys((join_m, max(join_m, path.length_m - _KEPT_M))):
+        for at_m in dict.fromkeys((join_m, max(join_m, path.length_m - _KEPT_PATH_M))):
             if is_clear(path.piece_m(join_m, at_m)):
                 with suppress(InputError):
                     onwards.append(self._onward(at_m))
@@ -376,12 +376,14 @@ class Course:
         passes = [
             pass_m if math.isinf(pass_m) else min(pass_m, tabulated.length_m) for pass_m in passes
         ]
-        return _Onward(tabulated, [*behind, *passes], tabulated.length_m + _BEYOND * beyond_m)
+        return _Onward(
+            tabulated, [*behind, *passes], tabulated.length_m + _BEYOND_PATH_WEIGHT * beyond_m
+        )
 
     def _failing(self, centre_m: Floats) -> str | None:
-        if self._is_stalled:
+        if self._body_is_stalled:
             return "no advance on the path"
-        if self._has_passed(centre_m):
+        if self._has_passed_waypoint(centre_m):
             return f"waypoint {self.reached + 1} passed by"
         if self._gap_m[0] > _OFF_PATH_BODIES * self.length_m:
             return f"{self._gap_m[0]:.2f} m off the path"
@@ -393,10 +395,10 @@ class Course:
             self._gained_m, self._gained_at = along_m, self._travel
 
     @property
-    def _is_stalled(self) -> bool:
+    def _body_is_stalled(self) -> bool:
         return (self._travel - self._gained_at) / self._per_body > _STALL_AFTER_BODIES
 
-    def _has_passed(self, centre_m: Floats) -> bool:
+    def _has_passed_waypoint(self, centre_m: Floats) -> bool:
         """Whether the body is beyond the next waypoint on the path, which it did not come near."""
         path = self.path
         end_m = self.path.length_m

@@ -31,7 +31,7 @@ WAYPOINTS_MAX: Final = 1000
 """Most waypoints that a run accepts (ours)."""
 _COMMANDS_MAX: Final = 10
 """Largest number of commands in a step (ours): a person clicks less often."""
-_APART_M: Final = 0.05
+_LEAST_DISTANCE_M: Final = 0.05
 """Least distance between the begin and the goal of a path (ours)."""
 
 
@@ -139,7 +139,7 @@ class LiveCourse(MotionWrapper, OnCourse):
             if word in (ADD, NEXT):
                 point_m = self._point_m(value, left_m if word == ADD else left_m[:0], view)
                 self._lead_to(np.vstack([left_m, point_m] if word == ADD else [point_m]), view)
-                text = f"waypoint {len(self.waypoints_m)} at {_shown(point_m)}"
+                text = f"waypoint {len(self.waypoints_m)} at {_point_text(point_m)}"
             else:
                 self._lead_to(left_m[:0], view)
                 self._ends = word == END
@@ -172,15 +172,17 @@ class LiveCourse(MotionWrapper, OnCourse):
         if not np.isfinite(point_m).all():
             raise InputError(f"waypoint {text}: expected X,Y in metres")
         if len(self.waypoints_m) >= WAYPOINTS_MAX:
-            raise InputError(f"waypoint {_shown(point_m)}: a run accepts {WAYPOINTS_MAX} at most")
+            raise InputError(
+                f"waypoint {_point_text(point_m)}: a run accepts {WAYPOINTS_MAX} at most"
+            )
         self._check(point_m)
         before_m = left_m[-1] if len(left_m) else view.link_m[0, :2]
-        if np.hypot(*(point_m - before_m)) < _APART_M:
+        if np.hypot(*(point_m - before_m)) < _LEAST_DISTANCE_M:
             what = "the waypoint before it" if len(left_m) else "the head"
-            raise InputError(f"waypoint {_shown(point_m)}: {what} is there")
+            raise InputError(f"waypoint {_point_text(point_m)}: {what} is there")
         return point_m
 
 
-def _shown(point_m: Floats) -> str:
+def _point_text(point_m: Floats) -> str:
     x_m, y_m = (round(float(coordinate), 2) + 0.0 for coordinate in point_m)  # avoids -0.00
     return f"({x_m:.2f}, {y_m:.2f})"

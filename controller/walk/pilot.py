@@ -268,7 +268,7 @@ class Pilot(OnCourse):
             self._fall_back,
         )
         self.decision = None
-        self._has_thought = self._think(view)
+        self._has_thought = self._prepare_decision(view)
         if not self._has_thought:
             self.course.continue_planning(self._fall_back)
         if self.course.complete:
@@ -277,7 +277,7 @@ class Pilot(OnCourse):
             self._time_law.go_on()
         return self._move(dt_s, view)
 
-    def _think(self, view: BodyView) -> bool:
+    def _prepare_decision(self, view: BodyView) -> bool:
         """Prepare the next piece of track, or decide; return whether that fills the cycle.
 
         While a path is planned, it gets at least every second cycle. At rest it comes first,
@@ -371,7 +371,7 @@ class Pilot(OnCourse):
         """
         if self._pitch_fitter is None:
             return goal_rad
-        head_m, headings_rad = self._ahead(view)
+        head_m, headings_rad = self._head_and_headings_ahead(view)
         target = self._pitch_fitter(head_m, headings_rad).goal_rad
         if self._pitch_rad is None:
             self._pitch_rad = target
@@ -380,7 +380,7 @@ class Pilot(OnCourse):
         )
         return goal_rad + self._pitch_rad
 
-    def _ahead(self, view: BodyView) -> tuple[Floats, Floats]:
+    def _head_and_headings_ahead(self, view: BodyView) -> tuple[Floats, Floats]:
         """Head (2,) and headings (L,) of the links ``_pitch_lead_s`` ahead on the track.
 
         Goals for the ground under the body now would be late.

@@ -37,7 +37,7 @@ SERPENOIDS = (SerpenoidParameters(), *CLIMBING)
 """Carriers that the walk falls back on."""
 _JOIN = 0.1
 """Share of a body over which a repeated state blends from its head angle to its tail angle."""
-_REST = 20
+_RECENT_DECISIONS = 20
 """Decisions in which no state comes again."""
 _BATCH = 6
 """Rollouts in a cycle: 1 to 3 ms of a processor of 2020."""
@@ -64,7 +64,7 @@ class _Option:
     """Sample of the carrier at the begin."""
 
 
-class _Tried(NamedTuple):
+class _TriedPiece(NamedTuple):
     """A piece of track and the cost of its rollout."""
 
     cost_m2: float
@@ -109,7 +109,7 @@ class PredictiveWalker:
         self._carrier_rad = 0.0
         self._base_rad = 0.0
         self._bends = np.zeros(2)
-        self._tried: list[_Tried] = []
+        self._tried: list[_TriedPiece] = []
         self._thinking: Iterator[bool] | None = None
         self._lost = False
         self.try_piece: Callable[[PathPose, Floats], Rolled] | None = None
@@ -118,7 +118,7 @@ class PredictiveWalker:
         """Asks a simulated body elsewhere about pieces (n,), or None."""
         self.answers: Callable[[], Mapping[int, Rolled | None]] = dict
         """Returns the results that have arrived, by the number of the piece."""
-        self._asked: list[_Tried] = []
+        self._asked: list[_TriedPiece] = []
         self._in_trouble = False
         self.outlook = 1.0
         """Predicted progress of the last decision, relative to the wanted pulse without slip.
@@ -171,11 +171,11 @@ class PredictiveWalker:
         while self.track.end == self.track.points and self.think(lambda: pose):
             pass
         self._thinking = None
-        best = self._answered_best(self._tried_best(pose, self._best()))
+        best = self._best_answer(self._best_on_twin(pose, self._best_piece()))
         self.outlook = best.progress
         option = best.option
         keep = self._keep
-        if self._is_new:
+        if self._state_is_new:
             if option.state != SERPENOID:
                 self._star.take(option.state)
             self._at = 0
@@ -194,26 +194,26 @@ class PredictiveWalker:
         return Decision(option.state, error, float(bend), near, distinct, self._carrier_rad)
 
     @property
-    def _is_new(self) -> bool:
+    def _state_is_new(self) -> bool:
         return self._at >= self._until
 
-    def _best(self) -> _Tried:
+    def _best_piece(self) -> _TriedPiece:
         """Cheapest piece with an accepted body; else the cheapest of all."""
         ranked = sorted(self._tried, key=lambda trial: trial.cost_m2)
         return next(filter(self._may_be_made, ranked), ranked[0])
 
-    def _may_be_made(self, tried: _Tried) -> bool:
+    def _may_be_made(self, tried: _TriedPiece) -> bool:
         old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
         return self._accept(np.concatenate([tried.piece_rad[: self._keep][::-1], old]))
 
-    def _tried_best(self, pose: PathPose, best: _Tried) -> _Tried:
+    def _best_on_twin(self, pose: PathPose, best: _TriedPiece) -> _TriedPiece:
         """On steep ground try the best piece on a simulated body; if it fails, try others."""
         if not self.try_piece or self._walk.tries == 0 or not self.steering.is_steep(pose):
             return best
         on_twin = self._on_twin(pose, best)
         if on_twin.cost_m2 <= _TROUBLE_M2 or self._lost:
             return on_twin
-        for other in self._others(pose, best):
+        for other in self._dissimilar_pieces(pose, best):
             tried = self._on_twin(pose, other)
             if tried.cost_m2 < on_twin.cost_m2:
                 on_twin = tried
@@ -221,18 +221,18 @@ class PredictiveWalker:
             self._until = self._at  # another state begins
         return on_twin
 
-    def _on_twin(self, pose: PathPose, piece: _Tried) -> _Tried:
+    def _on_twin(self, pose: PathPose, piece: _TriedPiece) -> _TriedPiece:
         """Return the piece with its cost and progress on the simulated body."""
         assert self.try_piece is not None
         cost_m2, progress = self.steering.cost(self.try_piece(pose, piece.piece_rad))
         return piece._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
 
-    def _answered_best(self, best: _Tried) -> _Tried:
+    def _best_answer(self, best: _TriedPiece) -> _TriedPiece:
         """Return the best piece among the answers of the remote twin.
 
         Without an answer about the best piece on paper, another one must be good.
         """
-        best_answered: _Tried | None = None
+        best_answered: _TriedPiece | None = None
         is_best_known = False
         for number, rolled in self.answers().items():
             if rolled is not None and number < len(self._asked):
@@ -253,29 +253,29 @@ class PredictiveWalker:
         return best_answered
 
     def _ask_about(self, pose: PathPose) -> Iterator[bool]:
-        best = self._best()
+        best = self._best_piece()
         if self.ask is None or self._lost or self._walk.tries == 0 or not best.cost_m2 < np.inf:
             return
         if not self.steering.is_steep(pose):
             return
         if self._in_trouble:
             yield from self._screen(pose, [best.option], FAR)
-        chosen = [best, *self._unlike(best)]
+        chosen = [best, *self._unlike_pieces(best)]
         self._asked = [*chosen[1:2], best, *chosen[2:]] if self._in_trouble else chosen
         self.ask(pose, [trial.piece_rad for trial in self._asked])
 
-    def _others(self, pose: PathPose, best: _Tried) -> list[_Tried]:
+    def _dissimilar_pieces(self, pose: PathPose, best: _TriedPiece) -> list[_TriedPiece]:
         """Dissimilar pieces, cheapest first: of the current state, and of others."""
         self._roll(pose, [(best.option, bends) for bends in FAR])
-        if not self._is_new:
+        if not self._state_is_new:
             options = self._new_options(pose)
             for carrier in CLIMBING:
                 options += self._new_options(pose, carrier)[:3]
             for option in options:
                 self._roll(pose, [(option, bends) for bends in UNLIKE])
-        return self._unlike(best)
+        return self._unlike_pieces(best)
 
-    def _unlike(self, best: _Tried) -> list[_Tried]:
+    def _unlike_pieces(self, best: _TriedPiece) -> list[_TriedPiece]:
         """Judged pieces that differ from the best and each other, cheapest first."""
         chosen = [best]
         for trial in sorted(self._tried, key=lambda option_trial: option_trial.cost_m2):
@@ -293,35 +293,35 @@ class PredictiveWalker:
     def _judge(self, pose: PathPose) -> Iterator[bool]:
         """Judge options and bends in batches, the most likely first."""
         bends = self._bends[None]
-        if self._is_new:
+        if self._state_is_new:
             bends = np.append(SCREEN, bends, axis=0)
         yield from self._screen(pose, self._options(pose), bends)
         if (
-            self._is_new
+            self._state_is_new
             and not self._lost
-            and self._best_so_far().progress < self._walk.climb_progress
+            and self._best_piece_so_far().progress < self._walk.climb_progress
         ):
             for carrier in CLIMBING:
                 yield from self._screen(pose, self._options(pose, carrier), bends)
-        yield from self._narrow(pose)
-        best = self._best_so_far()
+        yield from self._narrow_search(pose)
+        best = self._best_piece_so_far()
         if best.cost_m2 > _ASTRAY_M2:
             yield from self._screen(pose, [best.option], FAR)
-            yield from self._narrow(pose)
+            yield from self._narrow_search(pose)
         yield from self._ask_about(pose)
 
-    def _narrow(self, pose: PathPose) -> Iterator[bool]:
+    def _narrow_search(self, pose: PathPose) -> Iterator[bool]:
         """Judge bends about the best, and the minimum of a parabola through them.
 
         If the minimum may lie outside, repeat.
         """
         for _ in range(2):
-            middle = self._best_so_far()
+            middle = self._best_piece_so_far()
             yield from self._screen(pose, [middle.option], hexagon(middle.bends))
             costs_m2 = [trial.cost_m2 for trial in self._tried[-6:]]
             minimum = vertex(middle.bends, middle.cost_m2, costs_m2)
             yield from self._screen(pose, [middle.option], minimum.bends[None])
-            best = self._best_so_far()
+            best = self._best_piece_so_far()
             if minimum.enclosed and (best is middle or best is self._tried[-1]):
                 break
 
@@ -332,7 +332,7 @@ class PredictiveWalker:
             self._roll(pose, tried[k : k + _BATCH])
             yield True
 
-    def _best_so_far(self) -> _Tried:
+    def _best_piece_so_far(self) -> _TriedPiece:
         return min(self._tried, key=lambda trial: trial.cost_m2)
 
     def _roll(self, pose: PathPose, tried: list[tuple[_Option, Floats]]) -> None:
@@ -345,7 +345,7 @@ class PredictiveWalker:
         _bend(pieces, bases, bends, self._walk.bend_limit_rad, points)
         cost_m2, progress = self.steering.judge(pose, pieces)
         self._tried += [
-            _Tried(cost, on, option, bend, piece)
+            _TriedPiece(cost, on, option, bend, piece)
             for cost, on, (option, bend), piece in zip(
                 cost_m2.tolist(), progress.tolist(), tried, pieces, strict=True
             )
@@ -353,7 +353,7 @@ class PredictiveWalker:
 
     def _options(self, pose: PathPose, carrier: SerpenoidParameters | None = None) -> list[_Option]:
         """Possible next pieces: the rest of the current state, or new states."""
-        if self._option is not None and not self._is_new:
+        if self._option is not None and not self._state_is_new:
             state = self._option.state
             going_on = self._option.wave_rad[self._at :]
             return [_Option(state, self._option.near, self._base_rad, going_on)]
@@ -373,7 +373,9 @@ class PredictiveWalker:
             carried = carrier.wave_rad(phase - 1 + np.arange(len(carried)), points)
         placed = self.track.last_rad - share * self._shapes[:, -1] - carried[0]
         error = wrap(placed + pose.offset_rad - pose.aim_rad)
-        ranks, near = self._star.order(error, walk.heading_tolerance_rad, walk.nearest_count, _REST)
+        ranks, near = self._star.order(
+            error, walk.heading_tolerance_rad, walk.nearest_count, _RECENT_DECISIONS
+        )
         states = np.array(list(islice(ranks, walk.proposals)))
         waves = share * self._waves_rad(states) + carried[1:]
         rough = self._roughness(placed[states, None] + waves[:, : self._walked])

@@ -23,7 +23,7 @@ _UPHILL = 0.7
 _LEAST_SLOPE = 0.07
 _TURNS_RAD = np.array([1.2, 2.4])
 """Turns of the walk away from the arc, before it (ours)."""
-_AT_ONCE_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
+_IMMEDIATE_BENDS_RAD = np.array([-2.6, -2.0, -1.4, 1.4, 2.0, 2.6])
 """Bends that the joints make at once, without a piece of track (ours)."""
 _TRIES = 6
 """Plans that are tried on a twin, the fastest on paper first (ours)."""
@@ -109,7 +109,7 @@ class RollPlanner:
         plans = self._plans(pose, walker, target_m)
         for turn in _TURNS_RAD.tolist():
             plans += self._plans(pose, walker, target_m, turn)
-        for bend in _AT_ONCE_RAD.tolist():
+        for bend in _IMMEDIATE_BENDS_RAD.tolist():
             plans += self._plan(pose, target_m, bend, np.empty(0), pose.centre_m, heading_rad, 0.0)
         return sorted(plans, key=lambda plan: -plan.speed_m_s)[:_TRIES]
 

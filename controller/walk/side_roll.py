@@ -46,11 +46,11 @@ _UPRIGHT_RAD = 0.6
 """Largest roll of a body that lies as the arc needs."""
 _DROP_M = 0.1
 """Height lost since the highest place, at which a roll stops."""
-_EARLY_RAD = 0.3
+_JOIN_TURN_RAD = 0.3
 """Angle of the last turn that the join makes."""
 _AGAIN_BODIES = 0.5
 """Travel of the walk between two rolls."""
-_SLOW = 0.3
+_SLOW_PROGRESS = 0.3
 """Progress of the walk from which nothing is tried on a twin (ours)."""
 _TRY_AGAIN_BODIES = 0.4
 """Travel of the walk between two trials of rolls."""
@@ -171,7 +171,7 @@ class SideRolls(MotionWrapper, OnCourse):
             or abs(body_roll_rad(view)) > _UPRIGHT_RAD
         ):
             return
-        plan = self._best(view, self._target_m(view))
+        plan = self._best_roll(view, self._target_m(view))
         if plan is None or plan.speed_m_s < max(LEAST_SPEED_M_S, progress * self._pulse_m_s):
             return
         self._plan = plan
@@ -191,21 +191,21 @@ class SideRolls(MotionWrapper, OnCourse):
             return next_one[0]
         return self.course.ahead_m(_TARGET_M)
 
-    def _best(self, view: BodyView, target_m: Floats) -> RollPlan | None:
+    def _best_roll(self, view: BodyView, target_m: Floats) -> RollPlan | None:
         """Return the fastest roll to a target: on the twin if there is one, else on paper."""
         pose = self._pilot.path_pose(view)
         twin = self._pilot.twin
         if twin is None:
             return self._planner.best(pose, self._walker, target_m)
-        if self._walker.outlook >= _SLOW:
+        if self._walker.outlook >= _SLOW_PROGRESS:
             return None
         plans = self._planner.tried(pose, self._walker, target_m, view.heading_rad)
-        tried_plans = [self._tried(plan, view, twin) for plan in plans]
+        tried_plans = [self._tried_roll(plan, view, twin) for plan in plans]
         travel = _TRY_AGAIN_BODIES * self._walker.track.points
         self._walks_until = self._pilot.head + travel
         return max(tried_plans, key=lambda plan: plan.speed_m_s, default=None)
 
-    def _tried(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
+    def _tried_roll(self, plan: RollPlan, view: BodyView, twin: TwinRollout) -> RollPlan:
         roll = _RollOnTwin(
             self._pilot.coasting(plan.piece_rad),
             _cycle(plan, self._robot),
@@ -329,7 +329,7 @@ class _Rolling:
             return True
         if self._time_s > JOIN_S + 1.5 * self._turns / self._hz:
             return True
-        if self._turned_rad < 2.0 * np.pi * self._turns - _EARLY_RAD:
+        if self._turned_rad < 2.0 * np.pi * self._turns - _JOIN_TURN_RAD:
             return False
         to_go_m = planner.to_go_m(
             self._plan.target_m,

@@ -14,7 +14,7 @@ from snakewalk.controller.walk.angle_track import AngleTrack
 from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.drivers.compiling import compiled
 
-_TINY = 1e-9
+_LEAST_BEND = 1e-9
 
 
 class TimeLaw:
@@ -37,9 +37,9 @@ class TimeLaw:
         self._slew = cruise_segments_s / ramp_time_s
         self._stopping = False
         self._least = cruise_segments_s
-        self._rest()
+        self._come_to_rest()
 
-    def _rest(self) -> None:
+    def _come_to_rest(self) -> None:
         self.head = float(self.joints.first)
         """Segments travelled."""
         self.speed_segments_s = 0.0
@@ -67,7 +67,7 @@ class TimeLaw:
     def restart(self) -> None:
         """Begin again, at rest, at the end of the track."""
         self.joints.restart()
-        self._rest()
+        self._come_to_rest()
 
     def stop(self) -> None:
         """Slow down to rest."""
@@ -80,9 +80,9 @@ class TimeLaw:
     def advance(self, dt_s: float) -> float:
         """Advance by ``dt_s``; return the head, never beyond the known track."""
         if self.joints.grow():
-            self._look_ahead()
+            self._tabulate_speed()
         slew = -self._slew if self._stopping else self._slew
-        travelled, self.speed_segments_s = _moved(
+        travelled, self.speed_segments_s = _next_place_and_speed(
             self.head - self._first,
             self.speed_segments_s,
             dt_s,
@@ -98,7 +98,7 @@ class TimeLaw:
         """(J,) joint goals at the head."""
         return self.joints.goal_rad(self.head)
 
-    def _look_ahead(self) -> None:
+    def _tabulate_speed(self) -> None:
         """Tabulate the allowed speed from the head onwards, braking included."""
         self._first = max(self.joints.first, int(self.head) - 1)
         slope, turn = self.joints.bends(self._first)
@@ -127,7 +127,7 @@ def _limit_at(allowed: Floats, position: float) -> float:
     "UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64[::1], float64[::1])",
     makes_arrays=False,
 )
-def _moved(
+def _next_place_and_speed(
     position: float,
     speed: float,
     dt_s: float,
@@ -138,7 +138,7 @@ def _moved(
 ) -> tuple[float, float]:
     """Return place (from the tables' start) and speed after ``dt_s``; ``slew`` < 0 stops."""
     bend = slope[max(min(int(position), len(slope) - 1), 0)]
-    thrust = min(abs(slew), half_acceleration / max(bend, _TINY))
+    thrust = min(abs(slew), half_acceleration / max(bend, _LEAST_BEND))
     limit = min(_limit_at(allowed, position), _limit_at(allowed, position + speed * dt_s))
     speed = max(0.0, min(limit, speed + (thrust if slew > 0.0 else -thrust) * dt_s))
     return position + speed * dt_s, speed
@@ -157,8 +157,8 @@ def _allow(
     for k in range(len(slope)):
         allowed[k] = cruise
     for k in range(len(slope)):
-        by_bend = np.sqrt(half_acceleration / max(turn[k], _TINY))
-        limit_here = min(speed_limit / max(slope[k], _TINY), by_bend)
+        by_bend = np.sqrt(half_acceleration / max(turn[k], _LEAST_BEND))
+        limit_here = min(speed_limit / max(slope[k], _LEAST_BEND), by_bend)
         for near in range(max(k - 1, 0), min(k + 2, len(slope))):
             allowed[near] = min(allowed[near], limit_here)
 
@@ -167,5 +167,5 @@ def _allow(
 def _brake(allowed: Floats, slope: Floats, half_acceleration: float) -> None:
     """Limit each speed so that the body can brake to the next."""
     for k in range(len(allowed) - 2, -1, -1):
-        brake = half_acceleration / max(slope[k], slope[k + 1], _TINY)
+        brake = half_acceleration / max(slope[k], slope[k + 1], _LEAST_BEND)
         allowed[k] = min(allowed[k], np.sqrt(allowed[k + 1] ** 2 + 2.0 * brake))

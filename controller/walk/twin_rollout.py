@@ -17,7 +17,7 @@ from snakewalk.controller.walk.twin import Twin, seen_state
 
 LENGTH_BODIES = 1.0
 """Length of pulse that is rolled out."""
-_LONGEST_S = 6.0
+_LONGEST_ROLLOUT_S = 6.0
 
 
 @runtime_checkable
@@ -70,7 +70,7 @@ class TwinRollout:
         """
         followed = Followed(pose.path, pose.path_at)
         view = self._seen[-1]
-        bodies = self.bodies(move, _LONGEST_S)
+        bodies = self.bodies(move, _LONGEST_ROLLOUT_S)
         while not is_over():
             next_view = next(bodies, None)
             if next_view is None:

@@ -235,17 +235,17 @@ class ControlCycle:
             outcome = by.finish()
             if isinstance(outcome, GroupReadReply):
                 self._note_stall(request)
-                self._succeeded()
+                self._note_success()
                 return outcome
             raw, reply = self._receive_rest(request, outcome, by.remaining_s)
         self._note_stall(request)
         responded = reply.answered
         if not self._pending.empty:
-            reply = self._without_late(request, reply)
+            reply = self._without_late_replies(request, reply)
         if reply.clean and reply.complete:
-            self._succeeded()
+            self._note_success()
         else:
-            self._failed(request, reply, responded, timed_out=len(raw) < request.reply_bytes)
+            self._note_failure(request, reply, responded, timed_out=len(raw) < request.reply_bytes)
         if order == self._default_order and self.read_bytes == reply.data.shape[1]:
             return reply
         back = np.argsort(order)
@@ -264,7 +264,7 @@ class ControlCycle:
             self.counters.stalls += 1
             self.counters.stalled_s += late_s
 
-    def _without_late(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
+    def _without_late_replies(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
         new = np.array(
             [
                 not self._pending.is_pending(i, request.length, fast=request.fast)
@@ -372,7 +372,7 @@ class ControlCycle:
     def _byte_s(self) -> float:
         return BITS_PER_BYTE / self._port.getBaudRate()
 
-    def _succeeded(self) -> None:
+    def _note_success(self) -> None:
         self._clean_in_a_row += 1
         if self._clean_in_a_row == 1:
             self._failed_in_a_row = 0
@@ -380,7 +380,7 @@ class ControlCycle:
         if self._clean_in_a_row >= _CLEAN_READS:
             self._order = self._default_order
 
-    def _failed(
+    def _note_failure(
         self,
         request: GroupReadRequest,
         reply: GroupReadReply,

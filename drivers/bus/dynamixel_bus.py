@@ -244,7 +244,7 @@ class DynamixelBus:
             ControlTableError: no such register, or the value does not fit.
 
         """
-        register = self._shared(servo_ids, name)
+        register = self._shared_register(servo_ids, name)
         data = register.encode(value)
         params = register.address.to_bytes(2, "little") + register.size.to_bytes(2, "little")
         params += b"".join(bytes([servo_id]) + data for servo_id in servo_ids)
@@ -310,13 +310,15 @@ class DynamixelBus:
             ControlTableError: the model lacks a register.
 
         """
-        end = self._shared(servo_ids, last)
-        start, end_address = self._shared(servo_ids, first).address, end.address + end.size
+        end = self._shared_register(servo_ids, last)
+        start, end_address = self._shared_register(servo_ids, first).address, end.address + end.size
         return ControlCycle(
             self.port,
             servo_ids,
             registers=CycleRegisters(
-                self._shared(servo_ids, "Goal Position").address, start, end_address - start
+                self._shared_register(servo_ids, "Goal Position").address,
+                start,
+                end_address - start,
             ),
             fast=fast,
             latency_s=self.latency_s,
@@ -340,7 +342,7 @@ class DynamixelBus:
         """Control table of a servo's model."""
         return self._tables.get(servo_id, self.table)
 
-    def _shared(self, servo_ids: Sequence[int], name: str) -> Register:
+    def _shared_register(self, servo_ids: Sequence[int], name: str) -> Register:
         """A register that all servos of a group have at one address.
 
         Raises:
@@ -360,14 +362,14 @@ class DynamixelBus:
         """Run a transaction, and again after silence or damage; a refusal is final."""
         for remaining in range((tries or self._tries) - 1, -1, -1):
             try:
-                return self._guarded(once)
+                return self._call_with_recovery(once)
             except NoAnswerError:
                 self.port.drain_until_quiet(self.latency_s)  # the reply may be late
                 if not remaining:
                     raise
         raise AssertionError("tries is at least 1")
 
-    def _guarded(self, call: Callable[[], T]) -> T:
+    def _call_with_recovery(self, call: Callable[[], T]) -> T:
         try:
             return call()
         finally:

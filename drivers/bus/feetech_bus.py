@@ -162,7 +162,7 @@ class FeetechBus(DynamixelBus):
             ControlTableError: no such register, or the value does not fit.
 
         """
-        self._shared(servo_ids, name)
+        self._shared_register(servo_ids, name)
         if servo_ids:
             facts = self.table_of(servo_ids[0]).facts
             packet = FeetechWrite(servo_ids, name, facts)
@@ -193,7 +193,7 @@ class FeetechBus(DynamixelBus):
 
         """
         del fast
-        start, end = self._shared(servo_ids, first), self._shared(servo_ids, last)
+        start, end = self._shared_register(servo_ids, first), self._shared_register(servo_ids, last)
         length = end.address + end.size - start.address
         facts = self._facts_of(servo_ids)
         convert = BlockFormat(facts, start.address, length).convert

@@ -14,7 +14,7 @@ from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
 
 _HEAD: Final = Register("Firmware Version to Model Number", 0, 5, signed=False)
-_ANY: Final = "STS3215"
+_REFERENCE_MODEL: Final = "STS3215"
 """Model whose first registers all Feetech models share."""
 _TURN_S: Final = 0.3e-3
 """Time after which the next servo replies to a broadcast ping (ours)."""
@@ -62,10 +62,10 @@ def find_feetech(
     try:
         for baud in bauds:
             on_progress(f"Feetech servos at {baud} baud")
-            if not port.setBaudRate(baud) or not _anybody(port):
+            if not port.setBaudRate(baud) or not _any_byte_follows(port):
                 continue
             on_progress(f"Feetech servos at {baud} baud, ID by ID")
-            bus = FeetechBus(port, _ANY, latency_s=latency_s, tries=1)
+            bus = FeetechBus(port, _REFERENCE_MODEL, latency_s=latency_s, tries=1)
             for servo_id in bus.answering():
                 servo = identify(bus, servo_id, baud)
                 if servo is not None:
@@ -75,7 +75,7 @@ def find_feetech(
     return [servo_by_id[servo_id] for servo_id in sorted(servo_by_id)]
 
 
-def _anybody(port: BytePort) -> bool:
+def _any_byte_follows(port: BytePort) -> bool:
     """Whether a broadcast ping is followed by any byte, an echo of the adapter included."""
     packet = frame(BROADCAST_ID, FeetechInstruction.PING)
     port.clearPort()
@@ -88,7 +88,7 @@ def _anybody(port: BytePort) -> bool:
 
 def identify_at(port: BytePort, servo_id: int, latency_s: float) -> FeetechServo | None:
     """Model of a servo at the rate of the port; None for a DYNAMIXEL servo, and without a reply."""
-    bus = FeetechBus(port, _ANY, latency_s=latency_s, tries=_TRIES)
+    bus = FeetechBus(port, _REFERENCE_MODEL, latency_s=latency_s, tries=_TRIES)
     return identify(bus, servo_id, port.getBaudRate())
 
 

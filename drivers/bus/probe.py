@@ -21,7 +21,7 @@ from snakewalk.drivers.protocol.parser import PacketParser
 _PING_BYTES = 3
 _SETTLE_S = 2e-3
 """Silence after a request, longer than the longest return delay (0.508 ms)."""
-_REST_S = 0.05
+_REPLY_REMAINDER_S = 0.05
 """Longest delay of the rest of a reply (ours): a busy computer hands over a part of it first."""
 _LATEST_S = 0.05
 """Time for which the first missing reply of a servo is awaited (ours)."""
@@ -126,7 +126,7 @@ def probe_with(
             if not data and reader.pending and is_patient and not waited:
                 waited = True  # only a part of the reply has arrived
                 rest = max(1, reply_bytes - reader.pending)
-                data = port.read_until(rest, port.clock.now_s() + _REST_S)
+                data = port.read_until(rest, port.clock.now_s() + _REPLY_REMAINDER_S)
                 is_patient = bool(data)  # else replies are cut off, not late
             if not data and not replies and may_be_late and not reader.pending:
                 may_be_late = False

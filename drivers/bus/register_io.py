@@ -109,7 +109,7 @@ def _exchange(
             if (
                 isinstance(reply, StatusPacket)
                 and reply.servo_id == packet.servo_id
-                and not _is_other(reply, data_bytes, pending)
+                and not _is_foreign_reply(reply, data_bytes, pending)
             ):
                 if line.came_twice(free_s, len(raw) * byte_s, expected * byte_s):
                     copies = True
@@ -128,7 +128,7 @@ def _exchange(
     raise NoAnswerError(f"servo {packet.servo_id}: {what}: {reason}")
 
 
-def _is_other(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:
+def _is_foreign_reply(reply: StatusPacket, data_bytes: int, pending: PendingReplies) -> bool:
     length = len(reply.params)
     if length == data_bytes or reply.result:
         return False

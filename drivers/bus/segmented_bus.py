@@ -110,7 +110,7 @@ class SegmentedBus:
             PortError: a port is gone; the others have the value.
 
         """
-        self._each(
+        self._call_each_port(
             lambda bus, places: bus.sync_write([servo_ids[k] for k in places], name, value),
             self._places(servo_ids),
         )
@@ -161,9 +161,9 @@ class SegmentedBus:
                 "ports: the servo models have their block of a control cycle at different "
                 "addresses; use models with the same control table"
             )
-        return SegmentedCycle(cycles, places, self._each)
+        return SegmentedCycle(cycles, places, self._call_each_port)
 
-    def _each(
+    def _call_each_port(
         self,
         do: Callable[[DynamixelBus, list[int]], None],
         places: Mapping[DynamixelBus, list[int]],
@@ -210,12 +210,12 @@ class SegmentedCycle:
         Args:
             cycles: of each port.
             places: indices of each port's servos in the common arrays.
-            call_each: ``SegmentedBus._each``.
+            call_each: ``SegmentedBus._call_each_port``.
 
         """
         self._cycles = cycles
         self._places = places
-        self._each = call_each
+        self._call_each_port = call_each
         self._count = sum(map(len, places.values()))
 
     @property
@@ -246,7 +246,9 @@ class SegmentedCycle:
             PortError: a port is gone; the other servos have their goals.
 
         """
-        self._each(lambda bus, places: self._cycles[bus].write_goals(goals[places]), self._places)
+        self._call_each_port(
+            lambda bus, places: self._cycles[bus].write_goals(goals[places]), self._places
+        )
 
     def read(self) -> GroupReadReply:
         """Read the block of all servos: ask on all ports, then receive.
@@ -266,12 +268,12 @@ class SegmentedCycle:
             replies[bus] = self._cycles[bus].finish_read()
 
         try:
-            self._each(ask, self._places)
+            self._call_each_port(ask, self._places)
         finally:  # else a reply would meet the next request
-            self._each(receive, asked)
-        return self._whole(replies)
+            self._call_each_port(receive, asked)
+        return self._joined_reply(replies)
 
-    def _whole(self, replies: Mapping[DynamixelBus, GroupReadReply]) -> GroupReadReply:
+    def _joined_reply(self, replies: Mapping[DynamixelBus, GroupReadReply]) -> GroupReadReply:
         """One reply with the results of all ports; zeros fill the rows of shorter registers."""
         width = max(reply.data.shape[1] for reply in replies.values())
         data = np.zeros((self._count, width), np.uint8)

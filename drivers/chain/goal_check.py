@@ -25,7 +25,7 @@ the reads among which they count (ours). A program that writes rarely is seen in
 MOST_LATE = 8
 """Number of goals that a servo or an adapter holds back at most (ours). A goal that was replaced
 earlier does not come back by itself."""
-_REMEMBERED = 256
+_REMEMBERED_GOALS = 256
 """Goals that are known to be of this run (ours)."""
 
 
@@ -54,7 +54,7 @@ class GoalCheck:
         self._labels = labels
         self._rows = rows
         self.cycle = cycle
-        self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED)
+        self._sent: deque[Int32s] = deque(maxlen=_REMEMBERED_GOALS)
         self._writes = 0
         self._differences: dict[int, _Difference] = {}
         self._confirmed_write = np.zeros(len(labels), np.int64)
@@ -93,7 +93,7 @@ class GoalCheck:
         self._watched = max(self._watched - 1, 0)
         self._read()
         over = [
-            joint for joint, difference in self._differences.items() if self._is_over(difference)
+            joint for joint, difference in self._differences.items() if self._exceeds_tolerance(difference)
         ]
         if over:
             raise BusError(self._fault(sorted(over), explain))
@@ -146,7 +146,7 @@ class GoalCheck:
             self._seen_at = self._writes
             self._watched = WATCHED_READS
 
-    def _is_over(self, difference: _Difference) -> bool:
+    def _exceeds_tolerance(self, difference: _Difference) -> bool:
         if difference.is_foreign:
             return difference.count >= FOREIGN_READS or self._seen >= SEEN_READS
         return difference.count >= OWN_READS

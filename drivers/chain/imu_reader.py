@@ -66,7 +66,7 @@ class ImuReader:
         now_s = self._port.clock.now_s()
         measured_at_s = now_s - self._cycle.since_sent_s
         if reply.valid[0]:
-            self._take(decode(self._config, reply.data[0].tobytes()), measured_at_s)
+            self._store_sample(decode(self._config, reply.data[0].tobytes()), measured_at_s)
         valid = self._measured_at_s == measured_at_s
         if self._state is None:
             return None
@@ -77,7 +77,7 @@ class ImuReader:
             on_event(f"imu (ID {self._config.id}): {what}")
         return self._state._replace(age_s=age_s, valid=valid)
 
-    def _take(self, sample: ImuSample, measured_at_s: float) -> None:
+    def _store_sample(self, sample: ImuSample, measured_at_s: float) -> None:
         rotation = sample.rotation
         if rotation is None and sample.acceleration_m_s2 is not None:
             step_s = measured_at_s - self._measured_at_s

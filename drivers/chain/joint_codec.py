@@ -183,7 +183,7 @@ class StateDecoder:
 
 
 @compiled(f"int64({_BLOCKS}, int64, int64, int64)", makes_arrays=False)
-def _signed(data: Bytes, row: int, offset: int, size: int) -> int:
+def _signed_value(data: Bytes, row: int, offset: int, size: int) -> int:
     value = 0
     for k in range(size):
         value |= int(data[row, offset + k]) << (8 * k)
@@ -199,9 +199,9 @@ def decode_state(data: Bytes, zero: Floats, scale: Floats, out: Floats) -> None:
     """
     for row in range(len(data)):
         # 0 times a negative scale is -0; adding 0 makes it 0
-        out[0, row] = _signed(data, row, 0, 2) * scale[0, row] + 0.0
-        out[1, row] = _signed(data, row, 2, 4) * scale[1, row] + 0.0
-        out[2, row] = (_signed(data, row, 6, 4) - zero[row]) * scale[2, row] + 0.0
+        out[0, row] = _signed_value(data, row, 0, 2) * scale[0, row] + 0.0
+        out[1, row] = _signed_value(data, row, 2, 4) * scale[1, row] + 0.0
+        out[2, row] = (_signed_value(data, row, 6, 4) - zero[row]) * scale[2, row] + 0.0
 
 
 def voltages_v(blocks: Bytes) -> Floats:

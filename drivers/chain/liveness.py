@@ -27,7 +27,7 @@ from snakewalk.drivers.protocol.registers import WATCHDOG
 SLOW_EVERY = 16
 """Cycles of a round (ours). Voltages and temperatures are read in its cycle 0."""
 _GOALS_AT = 2
-_CHECKED_AT = (5,), (8,), (10,), (13,), (3, 11), (6, 9, 12, 14)
+_CHECK_CYCLES = (5,), (8,), (10,), (13,), (3, 11), (6, 9, 12, 14)
 """Cycles of a round in which torque, identity, watchdog, a setting, one that shapes the motion, and
 the fingerprint are read, at most one in each."""
 
@@ -87,7 +87,7 @@ class LivenessCheck:
         self._checks = [check for turn in turns for check in turn]
         self._turns = {
             place: (turn, places)
-            for turn, places in zip(turns, _CHECKED_AT, strict=True)
+            for turn, places in zip(turns, _CHECK_CYCLES, strict=True)
             for place in places
         }
         """Checks that are made in turn, and their places in a round, by place."""

@@ -47,7 +47,7 @@ from snakewalk.drivers.protocol.registers import (
 from snakewalk.drivers.types import JointCommand, JointState
 
 _GOAL = "Goal Position"
-_SLOW_S = 1.0
+_SLOW_AGE_S = 1.0
 """Age from which voltages and temperatures are read in every cycle until they come (ours)."""
 _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
@@ -387,7 +387,7 @@ class ServoChain:
         losses = self._losses.update(read, len(reply.valid), self.counters.late_bytes)
         if losses is not None:
             self.on_event(losses)
-        measured_at_s = self._take(reply)
+        measured_at_s = self._decode_state(reply)
         imu = None
         if read > 0:  # else the additional reads wait, and the state grows stale
             self._reads += 1
@@ -407,7 +407,7 @@ class ServoChain:
     def _read_slow(self, measured_at_s: float) -> bool:
         """Read voltages and temperatures if due; return whether they were."""
         its_turn = (self._reads - 1) % SLOW_EVERY == 0
-        if not its_turn and measured_at_s - self._readings.slow_at_s <= _SLOW_S:
+        if not its_turn and measured_at_s - self._readings.slow_at_s <= _SLOW_AGE_S:
             return False
         reply = self._slow.read()
         self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
@@ -417,7 +417,7 @@ class ServoChain:
             self.on_event(line)
         return True
 
-    def _take(self, reply: GroupReadReply, *, again: bool = False) -> float:
+    def _decode_state(self, reply: GroupReadReply, *, again: bool = False) -> float:
         """Decode a group read of the state; return its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
@@ -457,7 +457,7 @@ class ServoChain:
         try:
             asked = check(self._reads - 1, has_time=has_time)
         except BusError:
-            self._take(self._cycle.read(), again=True)
+            self._decode_state(self._cycle.read(), again=True)
             if not self._readings.alert:
                 raise
         if asked is not None:
@@ -538,7 +538,7 @@ class ServoChain:
     def _first_state(self) -> JointState:
         for _ in range(_FIRST_READS):
             state = self.read()
-            if state.valid.all() and state.slow_age_s.max() <= _SLOW_S:
+            if state.valid.all() and state.slow_age_s.max() <= _SLOW_AGE_S:
                 return state
             self._reads = 0  # so that the slow state is read again
         silent = ", ".join(map(self.robot.joint_label, np.flatnonzero(~state.valid).tolist()))

@@ -58,7 +58,7 @@ SHAPING_SETTINGS = (
 )
 """Settings that another program would change, and a reboot would not."""
 IDENTITY = JOINT_NUMBER
-_REPORTED = (
+_REPORTED_REGISTERS = (
     "Firmware Version",
     "Hardware Error Status",
     "Return Delay Time",
@@ -68,7 +68,7 @@ _REPORTED = (
     "Present Input Voltage",
     "Present Velocity",
 )
-_COMPARED = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position")
+_COMPARED_REGISTERS = (*RAM_SETTINGS, *SHAPING_SETTINGS, IDENTITY, "Present Position")
 """Registers read as well, for comparisons of a servo with its earlier state."""
 _SETTINGS = (
     "Torque Enable",
@@ -88,7 +88,7 @@ _SETTINGS = (
 """Registers that ``configure`` checks besides those of the fingerprint."""
 _TURNING_RAD_S = 0.2
 """Velocity of a servo that does not hold its position (ours)."""
-_FEW = 3
+_MOST_LISTED = 3
 """Largest number of servos of another model that are reported in a line each (ours)."""
 ALL_REPLY = 2
 """Value of Status Return Level(68) at which a servo replies to every instruction."""
@@ -184,7 +184,7 @@ def inspect(
             for text, remedy in fixed_faults(servo_id, report.registers, table.facts)
         ]
     for (name, model), ids in others.items():
-        if len(ids) <= _FEW:
+        if len(ids) <= _MOST_LISTED:
             labels = (robot.joint_label(robot.servo_ids.index(joint_id)) for joint_id in ids)
             texts = [f"{label}: is a {name}, not a {model}" for label in labels]
         else:
@@ -227,7 +227,7 @@ def read_report(bus: ChainBus, servo_id: int, name: str) -> ServoReport:
     """
     table = bus.table_of(servo_id)
     feetech_names = FEETECH_SETTINGS if table.facts.is_feetech else ()
-    names = present((*_REPORTED, *_COMPARED, *feetech_names), table.facts)
+    names = present((*_REPORTED_REGISTERS, *_COMPARED_REGISTERS, *feetech_names), table.facts)
     names += fingerprint_registers(table.facts)
     values = bus.read_each(servo_id, names)
     return ServoReport(

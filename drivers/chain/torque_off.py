@@ -52,7 +52,7 @@ class TorqueOff:
             try:
                 if part in gone:
                     self._wait_to_send(part, joints_on[part], give_up_s)
-                silent += self._unconfirmed(part, joints_on[part])
+                silent += self._unconfirmed_ids(part, joints_on[part])
             except PortError as error:
                 faults[part] = error
         self._report(sorted(silent), faults)
@@ -99,7 +99,7 @@ class TorqueOff:
             else:
                 return
 
-    def _unconfirmed(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
+    def _unconfirmed_ids(self, bus: DynamixelBus, on_it: Sequence[int]) -> list[int]:
         ids = self._robot.servo_ids
         joints = list(on_it)
         for _ in range(_GROUP_ROUNDS):
@@ -113,7 +113,9 @@ class TorqueOff:
         give_up_s = self._clock.now_s() + _ASK_S
         silent = joints  # servos after a silent one stay silent in a group read
         while silent and self._clock.now_s() < give_up_s:
-            silent = [joint for joint in silent if not self._is_off(bus, ids[joint], give_up_s)]
+            silent = [
+                joint for joint in silent if not self._has_no_torque(bus, ids[joint], give_up_s)
+            ]
         confirmed = self._ids_of(joint for joint in on_it if joint not in silent)
         if confirmed and all(WATCHDOG in bus.table_of(servo_id) for servo_id in confirmed):
             bus.sync_write(confirmed, WATCHDOG, 0)
@@ -121,7 +123,7 @@ class TorqueOff:
             bus.block(confirmed, WATCHDOG, WATCHDOG, fast=False).read()
         return silent
 
-    def _is_off(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
+    def _has_no_torque(self, bus: DynamixelBus, servo_id: int, give_up_s: float) -> bool:
         if self._clock.now_s() >= give_up_s:
             return False
         try:

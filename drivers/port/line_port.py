@@ -95,7 +95,7 @@ class LinePort(ABC):
 
     def openPort(self) -> bool:
         if self._serial is None:
-            self._open()
+            self._open_line()
         return True
 
     def closePort(self) -> None:
@@ -147,7 +147,7 @@ class LinePort(ABC):
         return self._clock.now_s() >= self._timeout_at_s
 
     @abstractmethod
-    def _open(self) -> None:
+    def _open_line(self) -> None:
         """Set ``_serial``."""
 
     @property

@@ -22,7 +22,7 @@ NETWORK_LATENCY_S: Final = 0.1
 """Largest delay of a reply besides its wire time: a local network and its server (ours)."""
 _POLL_S: Final = 0.001
 """Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
-_FIXED: Final = ("socket",)
+_SCHEMES_WITHOUT_BAUD: Final = ("socket",)
 """Schemes that carry no baud rate: that of the far end stays what it is."""
 _TO_A_HOST: Final = ("socket", "rfc2217")
 
@@ -89,11 +89,11 @@ class NetworkPort(LinePort):
         return self._name.partition("://")[0].lower()
 
     def setBaudRate(self, baudrate: int) -> bool:
-        if self._scheme in _FIXED:
+        if self._scheme in _SCHEMES_WITHOUT_BAUD:
             return baudrate == self._baud
         return super().setBaudRate(baudrate)
 
-    def _open(self) -> None:
+    def _open_line(self) -> None:
         from snakewalk.config.robot.ports import port_fault  # noqa: PLC0415  slow to import
 
         fault = port_fault(self._name)

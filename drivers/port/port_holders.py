@@ -13,7 +13,7 @@ except ImportError:  # Windows has no /proc either
 
 PROC = "/proc"
 """Folder with the processes and locks of all users on Linux."""
-_OWN: Final = "snakewalk"
+_PROGRAM_NAME: Final = "snakewalk"
 """Name of this program."""
 _MASTERS: Final = ("/dev/ptmx", "/dev/pts/ptmx")
 """Devices of the other ends of pseudo-terminals."""
@@ -39,7 +39,7 @@ class PortHolder:
     @property
     def is_ours(self) -> bool:
         """Whether it is a snakewalk command."""
-        return self.program.startswith(f"{_OWN} ")
+        return self.program.startswith(f"{_PROGRAM_NAME} ")
 
     @property
     def has_other_end(self) -> bool:
@@ -56,7 +56,7 @@ def holders_of(device: str) -> list[PortHolder]:
     path = os.path.realpath(device)
     lockers = lockers_of(path)
     holders = []
-    for process in sorted(filter(str.isdigit, _listed(PROC)), key=int):
+    for process in sorted(filter(str.isdigit, _entries(PROC)), key=int):
         files = tuple(open_files(process))
         if path in files or process in lockers:
             with suppress(OSError):  # just ended
@@ -83,7 +83,7 @@ def _user_name(user: int) -> str:
     return str(user)
 
 
-def _listed(folder: str) -> list[str]:
+def _entries(folder: str) -> list[str]:
     try:
         return os.listdir(folder)
     except OSError:  # another user's, or just ended; or not Linux
@@ -93,7 +93,7 @@ def _listed(folder: str) -> list[str]:
 def open_files(process: str) -> Iterator[str]:
     """Yield the paths of a process's open files; none if it is hidden."""
     folder = f"{PROC}/{process}/fd"
-    for entry in _listed(folder):
+    for entry in _entries(folder):
         with suppress(OSError):  # closed just now, like the listing's own
             yield os.readlink(f"{folder}/{entry}")
 
@@ -102,8 +102,8 @@ def _program(process: str) -> str:
     with open(f"{PROC}/{process}/cmdline", encoding="utf-8", errors="replace") as file:
         words = file.read().rstrip("\0").split("\0")
     names = [os.path.basename(word) for word in words[:2]]
-    if _OWN in names:
-        return " ".join([_OWN, *words[names.index(_OWN) + 1 :]])
+    if _PROGRAM_NAME in names:
+        return " ".join([_PROGRAM_NAME, *words[names.index(_PROGRAM_NAME) + 1 :]])
     with open(f"{PROC}/{process}/comm", encoding="utf-8", errors="replace") as file:
         name = file.read().strip()
     return " ".join([name, *_script(words[1:])]) if name.startswith("python") else name

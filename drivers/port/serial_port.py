@@ -136,7 +136,7 @@ class SerialPort(LinePort):
     def _fileno(self) -> int:
         return int(self._line.fileno())
 
-    def _open(self) -> None:
+    def _open_line(self) -> None:
         try:
             self._serial = serial.Serial(self._name, self._baud, timeout=0.0, exclusive=True)
             self._serial.reset_input_buffer()

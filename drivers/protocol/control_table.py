@@ -143,11 +143,11 @@ def load_control_table(model: Model) -> ControlTable:
         ControlTableError: the model does not exist, or has another protocol.
 
     """
-    return _named(model) if isinstance(model, str) else _table(model)
+    return _named_table(model) if isinstance(model, str) else _table(model)
 
 
 @cache
-def _named(model: str) -> ControlTable:
+def _named_table(model: str) -> ControlTable:
     try:
         return _table(servo_model(model, Path()))
     except ConfigError as error:

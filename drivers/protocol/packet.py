@@ -129,12 +129,12 @@ def _frame(servo_id: int, instruction: int, payload: bytes) -> bytes:
 
 
 _HEADER = b"\xff\xff\xfd"
-_STUFFED = b"\xff\xff\xfd\xfd"
+_STUFFED_HEADER = b"\xff\xff\xfd\xfd"
 
 
 def stuff(params: bytes) -> bytes:
     """Add ``FD`` after every ``FF FF FD`` in ``params``, all bytes from instruction to CRC."""
-    return params.replace(_HEADER, _STUFFED)
+    return params.replace(_HEADER, _STUFFED_HEADER)
 
 
 def unstuff(params: bytes) -> bytes:
@@ -144,7 +144,7 @@ def unstuff(params: bytes) -> bytes:
         StuffingError: ``params`` has a bare ``FF FF FD``.
 
     """
-    plain = params.replace(_STUFFED, _HEADER)
+    plain = params.replace(_STUFFED_HEADER, _HEADER)
     if stuff(plain) != params:
         raise StuffingError("FF FF FD without its stuffed FD in a payload")
     return plain

@@ -13,7 +13,7 @@ from snakewalk.drivers.protocol.packet import (
     unstuff,
 )
 
-_FIXED = 7  # header, id and length field, before the counted bytes
+_HEADER_BYTES = 7  # header, id and length field, before the counted bytes
 
 
 class PacketParser:
@@ -54,7 +54,7 @@ class PacketParser:
             header_start = self._next_header(position)
             self.dropped_bytes += header_start - position
             position = header_start
-            if len(buffer) - position < _FIXED + 3:
+            if len(buffer) - position < _HEADER_BYTES + 3:
                 break
             servo_id = buffer[position + 4]
             length = buffer[position + 5] | buffer[position + 6] << 8
@@ -63,7 +63,7 @@ class PacketParser:
             if not possible or not shortest <= length <= self.max_length:
                 position = self._skip(position)
                 continue
-            end = position + _FIXED + length
+            end = position + _HEADER_BYTES + length
             if end > len(buffer):
                 break
             if crc16(buffer[position : end - 2]) != buffer[end - 2] | buffer[end - 1] << 8:

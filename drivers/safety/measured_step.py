@@ -65,14 +65,14 @@ class MeasuredSteps:
         self._remember(doubted, state)
         if not doubted.any():
             is_held = ~state.valid & (position_rad != believed.position_rad)
-            return (_held(state, believed, is_held) if is_held.any() else state), None
+            return (_held_state(state, believed, is_held) if is_held.any() else state), None
         joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
         doubt = (
             f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
             f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: two servos with one "
             "ID, exchanged IDs, a changed zero, a lost turn count, or a position sensor that fails"
         )
-        return _held(state, believed, doubted | ~state.valid), doubt
+        return _held_state(state, believed, doubted | ~state.valid), doubt
 
     def _remember(self, doubted: Bools, state: JointState) -> None:
         before = np.nan if self._doubted_rad is None else self._doubted_rad
@@ -106,7 +106,7 @@ def _is_all_believable(
     return True
 
 
-def _held(state: JointState, believed: JointState, is_held: np.ndarray) -> JointState:
+def _held_state(state: JointState, believed: JointState, is_held: np.ndarray) -> JointState:
     """State with the credible values of the joints in ``is_held`` (J,)."""
     age_s = believed.age_s + (state.time_s - believed.time_s)
     arrays = {

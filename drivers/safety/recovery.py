@@ -159,7 +159,7 @@ class Recovery(Generic[C]):
         joint: int | None = None,
     ) -> JointState | None:
         self._on_event(event)
-        checked = self._wait(believed_rad, stopped, joint)
+        checked = self._wait_for_chain(believed_rad, stopped, joint)
         if checked is None:
             return None
         self._on_event(f"verified: {checked}")
@@ -178,7 +178,7 @@ class Recovery(Generic[C]):
         self._on_event("going on from where it stands")
         return state
 
-    def _wait(
+    def _wait_for_chain(
         self, believed_rad: Floats, stopped: Callable[[], str | None], joint: int | None
     ) -> C | None:
         """A chain that may continue; None after ``patience_s``.

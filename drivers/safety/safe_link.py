@@ -239,7 +239,7 @@ class SafeLink:
                 self._trip(f"{stale}: {doubt}")
                 return state
         self._state = state
-        joint = self._overloaded(state, self._memory)
+        joint = self._overloaded_joint(state, self._memory)
         if joint is not None:
             name = self._limits.joint_names[joint]
             return self._recover(f"{name}: alarm: overload", None, joint)
@@ -318,7 +318,7 @@ class SafeLink:
         self.tripped = self._tripped_by = None
         self._stop_requested = None
 
-    def _overloaded(self, state: JointState, memory: SafetyMemory) -> int | None:
+    def _overloaded_joint(self, state: JointState, memory: SafetyMemory) -> int | None:
         """The joint to reboot: an overload has shut it down, and all else is well."""
         if self._recovery is None or self.tripped is not None:
             return None

@@ -35,9 +35,9 @@ except ImportError:  # Windows: a killed program leaves its button until the fil
 
 _HAS_LOCKS: bool = fcntl is not None
 _BYTES: Final = 4096
-_PRESSED = 0
-_ENDED = 1
-_WHO: Final = slice(16, 528)
+_PRESSED_BYTE = 0
+_ENDED_BYTE = 1
+_REQUESTER: Final = slice(16, 528)
 _END: Final = slice(528, 1552)
 _RUN: Final = slice(1552, _BYTES)
 BUTTON_SUFFIX: Final = ".stop"
@@ -114,14 +114,14 @@ class StopButton:
             if fault is not None:
                 return fault
         self._calls += 1
-        if not self._is_pressed():
+        if not self._reads_pressed():
             return None
-        return f"stop requested by {_read_text(self._map, _WHO) or 'an operator'}"
+        return f"stop requested by {_read_text(self._map, _REQUESTER) or 'an operator'}"
 
-    def _is_pressed(self) -> bool:
+    def _reads_pressed(self) -> bool:
         if not _HAS_LOCKS:  # Windows cannot truncate a mapped file
-            return bool(self._map[_PRESSED])
-        return os.pread(self._file, 1, _PRESSED) == b"\1"
+            return bool(self._map[_PRESSED_BYTE])
+        return os.pread(self._file, 1, _PRESSED_BYTE) == b"\1"
 
     def _fault(self) -> str | None:
         """Fault of the file, or None."""
@@ -138,9 +138,9 @@ class StopButton:
 
     def report_end(self, how: str) -> None:
         """Report the end to programs that press the button; the first report counts."""
-        if os.fstat(self._file).st_size >= _BYTES and not self._map[_ENDED]:
+        if os.fstat(self._file).st_size >= _BYTES and not self._map[_ENDED_BYTE]:
             _write_text(self._map, _END, how)
-            self._map[_ENDED] = 1
+            self._map[_ENDED_BYTE] = 1
 
     def end(self, how: str) -> None:
         """Remove the button, and report the end to waiting programs; safe to call twice."""
@@ -174,7 +174,7 @@ class PressedButton:
                     f"{path}: is not a stop button of this user; name a run of this user"
                 )
             self._map = mmap.mmap(self._file, _BYTES)
-            run_facts = _parsed(_read_text(self._map, _RUN))
+            run_facts = _parsed_run(_read_text(self._map, _RUN))
             self.run = StoppableRun(**run_facts | {"ports": tuple(run_facts["ports"])})
             self.since_s = info.st_mtime
             """Time of day at which the button was made, s."""
@@ -197,7 +197,7 @@ class PressedButton:
     def is_held(self) -> bool:
         """Whether its program still holds it."""
         if not _HAS_LOCKS:
-            return not self._map[_ENDED]
+            return not self._map[_ENDED_BYTE]
         try:
             # shared: a second reader does not look like the holder
             fcntl.flock(self._file, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -218,12 +218,12 @@ class PressedButton:
     @property
     def end(self) -> str | None:
         """How the run ended; None before."""
-        return _read_text(self._map, _END) if self._map[_ENDED] else None
+        return _read_text(self._map, _END) if self._map[_ENDED_BYTE] else None
 
     def press(self, who: str) -> None:
         """Make the run's safe link switch torque off and latch, at its next read or write."""
-        _write_text(self._map, _WHO, who)
-        self._map[_PRESSED] = 1
+        _write_text(self._map, _REQUESTER, who)
+        self._map[_PRESSED_BYTE] = 1
 
 
 def resolved(port: str) -> str:
@@ -304,7 +304,7 @@ def _new_file(folder: Path, suffix: str) -> tuple[int, Path]:
     return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _OPEN_FLAGS, 0o600), path
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def _parsed_run(text: str) -> dict[str, Any]:
     """Parse the description of a run.
 
     Raises:

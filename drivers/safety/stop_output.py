@@ -47,7 +47,7 @@ class StopOutput(Protocol):
         ...
 
 
-class _Plain:
+class _UnpreparedOutput:
     """Base of outputs that need no preparation."""
 
     def __enter__(self) -> Self:
@@ -58,7 +58,7 @@ class _Plain:
 
 
 @dataclass(frozen=True, slots=True)
-class StopCall(_Plain):
+class StopCall(_UnpreparedOutput):
     """A function that stops the servos, such as that of a simulated supply."""
 
     name: str
@@ -70,7 +70,7 @@ class StopCall(_Plain):
 
 
 @dataclass(frozen=True, slots=True)
-class StopCommand(_Plain):
+class StopCommand(_UnpreparedOutput):
     """A program of the user, started without a shell."""
 
     words: tuple[str, ...]
@@ -145,7 +145,7 @@ class StopLine:
         try:
             port.open()
             self._port = port
-            self._set(on=self._is_inverted)
+            self._set_output(on=self._is_inverted)
         except (OSError, serial.SerialException) as error:
             port.close()
             raise PortError(
@@ -165,9 +165,9 @@ class StopLine:
             OSError: the port is gone.
 
         """
-        self._set(on=not self._is_inverted)
+        self._set_output(on=not self._is_inverted)
 
-    def _set(self, *, on: bool) -> None:
+    def _set_output(self, *, on: bool) -> None:
         if self._port is None:
             raise OSError("the port is closed")
         setattr(self._port, self._line, on)

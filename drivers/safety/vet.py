@@ -52,7 +52,7 @@ class SafetyMemory(NamedTuple):
         """Memory of joints that hold the pose in ``state``."""
         position_rad = np.array(state.position_rad, float)
         return SafetyMemory(
-            state.time_s, position_rad, _never(len(position_rad)), _never(len(position_rad))
+            state.time_s, position_rad, _unlimited(len(position_rad)), _unlimited(len(position_rad))
         )
 
 
@@ -83,11 +83,11 @@ def vet(
     """
     veto, checked = check_state(state, last, limits, now_s)
     if veto is not None:
-        return _refused(veto, checked)
+        return _refusal(veto, checked)
     requested = np.asarray(command.goal_rad, float)
     joints = len(limits.limit_rad)
     if requested.shape != limits.limit_rad.shape:
-        return _refused(f"command of shape {requested.shape} for {joints} joints", checked)
+        return _refusal(f"command of shape {requested.shape} for {joints} joints", checked)
     # after a pause the allowance is at most that of one stale limit
     dt_s = min(max(now_s - last.time_s, 0.0), limits.stale_limit_s)
     step = limits.goal_rate_rad_s * dt_s
@@ -98,14 +98,14 @@ def vet(
     bad = _clamp(requested, last.goal_rad, measured, limits.limit_rad, step, lead, goal, clamped)
     if bad >= 0:
         veto = f"{limits.joint_names[bad]}: commanded {requested[bad]}: not a number"
-        return _refused(veto, checked)
+        return _refusal(veto, checked)
     goal.setflags(write=False)
     over_s, under_s = checked.over_current_since_s, checked.under_voltage_since_s
     memory = SafetyMemory(now_s, goal, over_s, under_s, checked.checked_state)
     return Verdict(goal, None, clamped, memory)
 
 
-def _refused(veto: str, checked: SafetyMemory) -> Verdict:
+def _refusal(veto: str, checked: SafetyMemory) -> Verdict:
     return Verdict(checked.goal_rad, veto, np.zeros(len(checked.goal_rad), np.bool_), checked)
 
 
@@ -140,7 +140,7 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
     since = last.over_current_since_s
     over = np.abs(state.current_a) > limits.current_limit_a
     if not over.any() and not np.isfinite(since).any():
-        return _never(len(since))
+        return _unlimited(len(since))
     started = np.where(np.isnan(since), state.time_s, since)
     return np.where(state.valid, np.where(over, started, np.nan), since)
 
@@ -150,7 +150,7 @@ def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyL
     since = last.under_voltage_since_s
     low = state.voltage_v < limits.voltage_min_v
     if not low.any():
-        return _never(len(since))
+        return _unlimited(len(since))
     started = np.where(np.isnan(since), state.time_s - state.slow_age_s, since)
     return np.where(low, started, np.nan)
 
@@ -271,7 +271,7 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
 
     The quick check costs a tenth of ``state_fault`` and is stricter.
     """
-    never = _never(len(last.over_current_since_s))
+    never = _unlimited(len(last.over_current_since_s))
     if last.over_current_since_s is not never or last.under_voltage_since_s is not never:
         return math.nan
     try:
@@ -384,7 +384,7 @@ def _clamp(
 
 
 @cache
-def _never(joints: int) -> Floats:
+def _unlimited(joints: int) -> Floats:
     """(J,) NaN, read-only: no value exceeds its limit. One array per J, compared by identity."""
     since_s = np.full(joints, np.nan)
     since_s.setflags(write=False)

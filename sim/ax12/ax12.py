@@ -140,32 +140,32 @@ class Ax12Servos(SimulatedServos):
         ticks = (self.plant.position_rad - self._turn_rad) * self._per_rad + self._centre
         _, last = self.facts.registers["Goal Position"].range or (0, 1023)
         self["Present Position"][:] = np.clip(np.rint(ticks), 0, last)
-        self["Present Speed"][:] = _signed(
+        self["Present Speed"][:] = _with_direction_bit(
             self.plant.velocity_rad_s / self.facts.rad_s_per_velocity
         )
-        self["Present Load"][:] = _signed(self.blocked_shaft.pwm() * 1023.0)
+        self["Present Load"][:] = _with_direction_bit(self.blocked_shaft.pwm() * 1023.0)
         self["Present Voltage"][:] = np.clip(np.rint(self.drive.supply_v * 10.0), 0, 255)
         celsius = np.rint(self.protection.temperature_c)
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
-        self["Moving"][:] = self._trajectory.ongoing & self._on() & ~self._wheel()
+        self["Moving"][:] = self._trajectory.ongoing & self._torque_is_on() & ~self._wheel()
         if self._readings.any:
             self._readings.apply()
 
-    def _on(self) -> Bools:
+    def _torque_is_on(self) -> Bools:
         return np.asarray((self["Torque Enable"] == 1) & self.powered)
 
     def _wheel(self) -> Bools:
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 
     def _update_turns(self) -> None:
-        free = ~self._on() | self._wheel()
+        free = ~self._torque_is_on() | self._wheel()
         turn_rad = TURN_RAD * np.rint(self.plant.position_rad / TURN_RAD)
         self._turn_rad = np.where(free, turn_rad, self._turn_rad)
 
     def _update_drive(self, seconds: float) -> None:
         drive = self.drive
         wheel = self._wheel()
-        on = self._on()
+        on = self._torque_is_on()
         speed = self["Moving Speed"].astype(int)
         shaft = self.plant.position_rad
         self._trajectory.restart(~on | wheel, shaft)
@@ -198,7 +198,7 @@ class Ax12Servos(SimulatedServos):
         return block.view(f"<u{cell.size}")[:, 0]
 
 
-def _signed(values: Floats) -> NDArray[np.int_]:
+def _with_direction_bit(values: Floats) -> NDArray[np.int_]:
     """Magnitude up to 1023, direction in bit 10."""
     size = np.clip(np.rint(np.abs(values)), 0, 1023).astype(int)
     return np.where((values < 0.0) & (size > 0), size | CLOCKWISE, size)

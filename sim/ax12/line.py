@@ -126,7 +126,7 @@ class Ax12Line(Wire):
             for answer in self._execute_packet(packet)
         ]
 
-    def _addressed(self, servo_id: int) -> list[int]:
+    def _addressed_rows(self, servo_id: int) -> list[int]:
         servos = self.servos
         rate = self.getBaudRate()
         return [
@@ -143,7 +143,7 @@ class Ax12Line(Wire):
         if code == Instruction1.SYNC_WRITE:
             return self._sync_write(packet)
         replies = []
-        for row in self._addressed(packet.servo_id):
+        for row in self._addressed_rows(packet.servo_id):
             servo_id = int(self.servos["ID"][row])
             delay_s = self._delay_s(row)
             replies_to = self._replies_to(row, code)
@@ -170,7 +170,7 @@ class Ax12Line(Wire):
         return int(self.servos["Status Return Level"][row]) >= REPLY_LEVELS.get(code, 2)
 
     def _obeying(self, servo_id: int) -> list[int]:
-        return self._addressed(servo_id)
+        return self._addressed_rows(servo_id)
 
     def _respond(self, replies: list[Reply]) -> Reply:
         """Bytes on the wire of servos with one ID."""

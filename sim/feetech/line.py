@@ -63,7 +63,7 @@ class FeetechLine(Ax12Line):
             return [(0.0, packet) for packet in self.tamper(data)]
         return super()._reply_with_faults(data, now_s)
 
-    def _addressed(self, servo_id: int) -> list[int]:
+    def _addressed_rows(self, servo_id: int) -> list[int]:
         return self._rows(servo_id, "ID")
 
     def _rows(self, servo_id: int, name: str) -> list[int]:
@@ -80,7 +80,7 @@ class FeetechLine(Ax12Line):
             and abs(rates[row] / rate - 1.0) <= BAUD_TOLERANCE
         ]
 
-    def _also(self, servo_id: int) -> list[int]:
+    def _rows_by_secondary_id(self, servo_id: int) -> list[int]:
         """Rows of the servos with this secondary ID; they obey without a reply."""
         if servo_id == BROADCAST_ID:
             return []
@@ -93,12 +93,12 @@ class FeetechLine(Ax12Line):
         if packet.instruction == Code.SYNC_READ:
             return self._sync_read(packet)
         if packet.instruction in (Code.WRITE, Code.REG_WRITE, Code.ACTION):
-            for row in self._also(packet.servo_id):
+            for row in self._rows_by_secondary_id(packet.servo_id):
                 self._execute_one(row, packet.instruction, packet.params)
         return super()._execute_packet(packet)
 
     def _obeying(self, servo_id: int) -> list[int]:
-        return [*self._addressed(servo_id), *self._also(servo_id)]
+        return [*self._addressed_rows(servo_id), *self._rows_by_secondary_id(servo_id)]
 
     def _replies_to(self, row: int, code: int) -> bool:
         return code in _ALWAYS_ANSWERED or bool(self.servos["Status Return Level"][row])
@@ -145,7 +145,7 @@ class FeetechLine(Ax12Line):
         length = params[1]
         replies = []
         for servo_id in params[2:]:
-            rows = [row for row in self._addressed(servo_id) if not self._muted[row]]
+            rows = [row for row in self._addressed_rows(servo_id) if not self._muted[row]]
             if not rows:
                 break
             answers = [

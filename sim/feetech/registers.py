@@ -48,7 +48,7 @@ class FeetechRegisters:
     def read(self, row: int, address: int, length: int) -> bytes:
         """Bytes of a block of one servo."""
         data = bytearray(TABLE_END)
-        for name, register in self._inside(address - 1, address + length + 1):
+        for name, register in self._registers_in_range(address - 1, address + length + 1):
             raw = encode_word(int(self.values[name][row]), register, self.facts, name)
             data[register.address : register.address + register.size] = raw
         return bytes(data[address : address + length])
@@ -59,7 +59,7 @@ class FeetechRegisters:
         Read-only registers and values out of range are ignored (ours).
         """
         accepted = []
-        for name, register in self._inside(address, address + len(data)):
+        for name, register in self._registers_in_range(address, address + len(data)):
             if register.range is None:
                 continue
             value = decode_word(data[register.address - address :], register, self.facts)
@@ -101,7 +101,7 @@ class FeetechRegisters:
         """Store the EEPROM parameters for ``reset``."""
         self._backup[row] = {name: int(kept[row]) for name, kept in self._kept.items()}
 
-    def _inside(self, start: int, end: int) -> Iterable[tuple[str, RegisterRow]]:
+    def _registers_in_range(self, start: int, end: int) -> Iterable[tuple[str, RegisterRow]]:
         return [
             (name, row)
             for name, row in self._rows.items()

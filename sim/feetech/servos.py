@@ -209,7 +209,7 @@ class FeetechServos(SimulatedServos):
     def refresh(self) -> None:
         """Write all present values into the registers."""
         facts = self.facts
-        free = ~self._on() | (self._mode() == VELOCITY) | (self._mode() == PUSH)
+        free = ~self._torque_is_on() | (self._mode() == VELOCITY) | (self._mode() == PUSH)
         free &= ~self._phase(Phase.ALL_TURNS)
         self._turns = np.where(free, self._turn(), self._turns)
         position = self._ticks() - self._offset() - self._turns * facts.units.positions_per_turn
@@ -234,13 +234,13 @@ class FeetechServos(SimulatedServos):
         celsius = np.rint(self.protection.temperature_c)
         self["Present Temperature"][:] = np.clip(celsius, 0, 255)
         self["Hardware Error Status"][:] = self.protection.shown
-        self["Moving"][:] = self._trajectory.ongoing & self._on()
+        self["Moving"][:] = self._trajectory.ongoing & self._torque_is_on()
         if "Present Goal Position" in facts.registers:
             self["Present Goal Position"][:] = self["Goal Position"]
         if self._readings.any:
             self._readings.apply()
 
-    def _on(self) -> Bools:
+    def _torque_is_on(self) -> Bools:
         return np.asarray((self["Torque Enable"] == 1) & self.powered)
 
     def _mode(self) -> NDArray[np.int64]:
@@ -300,7 +300,7 @@ class FeetechServos(SimulatedServos):
         drive = self.drive
         facts = self.facts
         mode = self._mode()
-        on = self._on()
+        on = self._torque_is_on()
         registers = self.registers
         shaft = self._servo_rad()
         self._step_goal[(mode != STEP) | ~on] = np.nan
@@ -346,7 +346,9 @@ class FeetechServos(SimulatedServos):
             limit = registers["Integral Limit"] * _INTEGRAL_LIMIT_UNIT
             most = np.where(limit > 0.0, limit, most)
         grown = self._integral + np.where(active, i_gain * positions * seconds, 0.0)
-        self._integral = np.where((i_gain > 0) & self._on(), np.clip(grown, -most, most), 0.0)
+        self._integral = np.where(
+            (i_gain > 0) & self._torque_is_on(), np.clip(grown, -most, most), 0.0
+        )
         return np.asarray(output + self._integral / _FULL)
 
     def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:

@@ -89,13 +89,13 @@ class PlainRead(GroupRead):
         size = self._share
         frames = [raw[start : start + size] for start in range(0, len(raw), size)]
         if raw.count(HEADER[:3]) > len(frames):  # some data look like a header
-            frames = [self._stuffed(frame) for frame in frames]
+            frames = [self._stuffed_frame(frame) for frame in frames]
         elif gapless and self._gapless:
             return [Reply(self._delays_s[0], raw)]
         return [Reply(*reply_facts) for reply_facts in zip(self._delays_s, frames, strict=True)]
 
     @staticmethod
-    def _stuffed(frame: bytes) -> bytes:
+    def _stuffed_frame(frame: bytes) -> bytes:
         payload = stuff(frame[8:-2])
         body = frame[:5] + (len(payload) + 3).to_bytes(2, "little") + bytes((STATUS,)) + payload
         return body + crc16(body).to_bytes(2, "little")
@@ -117,7 +117,7 @@ _GROUP_READS = (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ)
 _PREFIX = HEADER + b"\xfe"
 _GOALS = bytes((Instruction.SYNC_WRITE, 116, 0, 4, 0))
 """Code, address and length of a sync write of goals."""
-_SHORTEST = 15
+_LEAST_BYTES = 15
 """A group instruction of one servo without data."""
 
 
@@ -176,7 +176,7 @@ class GroupFastPath:
         ids = raw[12:-2:5]
         goals = self._goals
         if goals is None or goals[0] != head or goals[1] != ids:
-            if len(raw) < _SHORTEST or raw[:5] != _PREFIX:
+            if len(raw) < _LEAST_BYTES or raw[:5] != _PREFIX:
                 return None
             rows = self._handler.directory.rows[np.frombuffer(ids, np.uint8)]
             if (len(raw) - 14) % 5 or (rows < 0).any() or len(np.unique(rows)) != len(rows):
@@ -192,7 +192,7 @@ class GroupFastPath:
         return []
 
     def _plan(self, raw: bytes) -> GroupRead | None:
-        if len(raw) < _SHORTEST or raw[:5] != _PREFIX or raw[7] not in _GROUP_READS:
+        if len(raw) < _LEAST_BYTES or raw[:5] != _PREFIX or raw[7] not in _GROUP_READS:
             return None
         if not is_intact(np.frombuffer(raw, np.uint8)):
             return None

@@ -180,25 +180,25 @@ class InstructionHandler:
             return []
         if code == Instruction.READ:
             return self._read(servo_id, params)
-        return self._respond(self._addressed(servo_id, code, params))
+        return self._respond(self._execute_for_id(servo_id, code, params))
 
     def _broadcast(self, code: int, params: bytes) -> None:
         if code == Instruction.FACTORY_RESET and params == b"\xff":  # refused since firmware 42
             return
         for row in self.directory.present():
-            self._one(row, code, params)
+            self._execute_for_row(row, code, params)
 
-    def _addressed(self, servo_id: int, code: int, params: bytes) -> list[Reply]:
+    def _execute_for_id(self, servo_id: int, code: int, params: bytes) -> list[Reply]:
         """Execute an instruction for one ID; return the reply of each device that has it."""
         replies = []
         for row in self.directory.primary(servo_id):
             level = int(self.bank["Status Return Level"][row])
             delay_s = self.delay_s(row)
-            error = self._one(row, code, params)
+            error = self._execute_for_row(row, code, params)
             if level == 2 and not self.directory.mute[row]:
                 replies.append(Reply(delay_s, self._status(row, servo_id, error, b"")))
         for row in self.directory.secondary(servo_id):
-            self._one(row, code, params, ram_only=True)
+            self._execute_for_row(row, code, params, ram_only=True)
         if self._imu_at(servo_id) is not None:  # no register of it is known to be writable
             refused = StatusPacket(servo_id, ResultError.ACCESS, b"")
             replies.append(Reply(0.0, encode_status(refused)))
@@ -355,7 +355,9 @@ class InstructionHandler:
             if not deaf[row]:
                 self._instructions.write(row, address, data, ram_only=True)
 
-    def _one(self, row: int, code: int, params: bytes, *, ram_only: bool = False) -> int:
+    def _execute_for_row(
+        self, row: int, code: int, params: bytes, *, ram_only: bool = False
+    ) -> int:
         error = self._instructions.execute(row, code, params, ram_only=ram_only)
         self._written()
         return int(error)

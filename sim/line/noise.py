@@ -49,7 +49,7 @@ class Noise:
             if not self._applies(fault, data, now_s, of):
                 continue
             self.counts[fault.kind] = self.counts.get(fault.kind, 0) + 1
-            packets = [new for packet in packets for new in self._one(fault, *packet)]
+            packets = [new for packet in packets for new in self._apply_fault(fault, *packet)]
         return packets
 
     def _applies(self, fault: plan.NoiseFault, data: bytes, now_s: float, of: str) -> bool:
@@ -62,7 +62,9 @@ class Noise:
             return False
         return fault.chance >= 1.0 or self._random.random() < fault.chance
 
-    def _one(self, fault: plan.NoiseFault, slow_s: float, data: bytes) -> list[tuple[float, bytes]]:
+    def _apply_fault(
+        self, fault: plan.NoiseFault, slow_s: float, data: bytes
+    ) -> list[tuple[float, bytes]]:
         if not data:
             return []
         match fault.kind:

@@ -279,14 +279,14 @@ class SimLine(Wire):
         if self._script is None:
             bytewise = self.tamper is not None or bool(self.taps)
             quick = self._group.execute(data, end_s, gapless=not bytewise)
-            return self._one_by_one(data, end_s) if quick is None else quick
+            return self._replies_one_by_one(data, end_s) if quick is None else quick
         replies: list[Reply] = []
         for piece in self._instruction_with_faults(data, end_s):
             quick = self._group.execute(piece, end_s, gapless=False)
-            replies += self._one_by_one(piece, end_s) if quick is None else quick
+            replies += self._replies_one_by_one(piece, end_s) if quick is None else quick
         return replies
 
-    def _one_by_one(self, data: bytes, end_s: float) -> list[Reply]:
+    def _replies_one_by_one(self, data: bytes, end_s: float) -> list[Reply]:
         return [
             reply
             for packet in self._reader.feed(data)

@@ -45,7 +45,7 @@ class RxQueue:
 
     def count(self, now_s: float) -> int:
         """Number of arrived, unread bytes."""
-        return sum(self._arrived(packet, now_s) for packet in self.packets)
+        return sum(self._arrived_bytes(packet, now_s) for packet in self.packets)
 
     def due_s(self, count: int) -> float | None:
         """Arrival time of ``count`` bytes; None if fewer are under way."""
@@ -62,11 +62,11 @@ class RxQueue:
         """Up to ``count`` arrived bytes."""
         packets = self.packets
         taken = bytearray()
-        if packets and len(packets[0][1]) == count == self._arrived(packets[0], now_s):
+        if packets and len(packets[0][1]) == count == self._arrived_bytes(packets[0], now_s):
             return packets.popleft()[1]  # the usual case: one packet, complete
         while packets and len(taken) < count:
             start_s, data = packets[0]
-            ready = min(self._arrived(packets[0], now_s), count - len(taken))
+            ready = min(self._arrived_bytes(packets[0], now_s), count - len(taken))
             taken += data[:ready]
             if ready < len(data):
                 packets[0] = (start_s + ready * self.byte_s, data[ready:])
@@ -80,10 +80,12 @@ class RxQueue:
 
     def cut(self, at_s: float) -> None:
         """Drop bytes that arrive after ``at_s``."""
-        kept = [(packet[0], packet[1][: self._arrived(packet, at_s)]) for packet in self.packets]
+        kept = [
+            (packet[0], packet[1][: self._arrived_bytes(packet, at_s)]) for packet in self.packets
+        ]
         self.packets = deque(packet for packet in kept if packet[1])
 
-    def _arrived(self, packet: tuple[float, bytes], now_s: float) -> int:
+    def _arrived_bytes(self, packet: tuple[float, bytes], now_s: float) -> int:
         start_s, data = packet
         return min(len(data), max(0, int((now_s - start_s) / self.byte_s + EARLY)))
 

@@ -21,7 +21,7 @@ from snakewalk.sim.physics.mechanics import GROUND, Mechanics
 from snakewalk.sim.physics.tangent_planes import AWAY_M, PLANES, TangentPlanes
 
 _ROWS = readonly_array(dimensions=2, layout="C")
-_WORD = 8
+_WORD_BYTES = 8
 _DEEP_M = 1e-3
 """Depth of the contacts that give the constants."""
 _SAFE = 1.0 + 1e-9
@@ -189,7 +189,7 @@ def write_contacts(
         if turn:
             if plane_m[plane, 2] <= AWAY_M:
                 continue
-            call(turn, plane_axes.ctypes.data, plane_quat.ctypes.data + plane * 4 * _WORD)
+            call(turn, plane_axes.ctypes.data, plane_quat.ctypes.data + plane * 4 * _WORD_BYTES)
             n0, n1, n2 = plane_axes[2], plane_axes[5], plane_axes[8]
         x = place_m[belly, 0] + axes[belly, 2] * along
         y = place_m[belly, 1] + axes[belly, 5] * along
@@ -204,10 +204,10 @@ def write_contacts(
         base = size * slot
         if claimed_slots[slot] != c:
             claimed_slots[slot] = c
-            to = room + base * _WORD
-            source = constants + c * size * _WORD
+            to = room + base * _WORD_BYTES
+            source = constants + c * size * _WORD_BYTES
             copy_words(to, source, first)
-            copy_words(to + last * _WORD, source + last * _WORD, size - last)
+            copy_words(to + last * _WORD_BYTES, source + last * _WORD_BYTES, size - last)
         back = -dist / 2.0 - radius
         length = 1.0 / np.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         reals[base + at_dist] = dist

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snakewalk.drivers.fallbacks import is_forced
 from snakewalk.sim.physics.step_memory import FUNCTIONS, POINTERS, WHOLE
 
-_PLAIN: dict[str, type] = {
+_SCALAR_TYPES: dict[str, type] = {
     "int": ctypes.c_int,
     "float": ctypes.c_float,
     "char": ctypes.c_char,
@@ -32,7 +32,7 @@ _PLAIN: dict[str, type] = {
 }
 _POINTERS: Final = (ctypes.c_void_p,) * 3
 _IN_DATA: Final = POINTERS[2:]
-_WORD: Final = 8
+_WORD_BYTES: Final = 8
 _BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
 
@@ -65,7 +65,7 @@ class StepLayout:
 
     def contact_words(self, data: mujoco.MjData) -> NDArray[np.int64]:
         """Copy the present contacts as (contacts, words of eight bytes)."""
-        size = data.ncon * self.contact["size"] // _WORD
+        size = data.ncon * self.contact["size"] // _WORD_BYTES
         memory = (ctypes.c_int64 * size).from_address(data.contact.dist.ctypes.data)
         return np.array(memory, np.int64).reshape(data.ncon, -1)
 
@@ -80,23 +80,23 @@ def step_layout() -> StepLayout | str:
     if is_forced("mujoco"):
         return "the environment asks for it"
     try:
-        layout, arrays = _described()
+        layout, arrays = _mujoco_layout()
     except ImportError:
         return "it does not describe its memory"
     except (KeyError, AttributeError, OSError) as error:
         return f"its memory is not described as expected ({error})"
-    if not _is_as_shown(layout, arrays):
+    if not _matches_arrays(layout, arrays):
         return "its memory is not as it describes it"
     if layout.has_parts and not _steps_by_parts(layout):
         return StepLayout(layout.data, layout.contact, _addresses(FUNCTIONS[:WHOLE]))
     return layout
 
 
-def _described() -> tuple[StepLayout, dict[str, int]]:
+def _mujoco_layout() -> tuple[StepLayout, dict[str, int]]:
     """Return the layout that MuJoCo describes, and ``mjData`` offsets of two arrays."""
     data = _structure("mjData")
     contact = _structure("mjContact")
-    hessian = contact.H.offset // _WORD
+    hessian = contact.H.offset // _WORD_BYTES
     fields = {
         "size": ctypes.sizeof(contact),
         "dist": contact.dist.offset,
@@ -105,7 +105,7 @@ def _described() -> tuple[StepLayout, dict[str, int]]:
         "geom": contact.geom.offset,
         "row": contact.efc_address.offset,
         "hessian_begin": hessian,
-        "hessian_end": hessian + contact.H.size // _WORD,
+        "hessian_end": hessian + contact.H.size // _WORD_BYTES,
     }
     functions = _addresses(FUNCTIONS[:WHOLE])
     with contextlib.suppress(AttributeError):  # one of them is not exported
@@ -141,7 +141,7 @@ def _ctype(kind: object) -> Any:
             item = item * extent
         return item
     name = str(getattr(kind, "name", kind)).removeprefix("struct ").rstrip("_")
-    return _PLAIN[name] if name in _PLAIN else _structure(name)
+    return _SCALAR_TYPES[name] if name in _SCALAR_TYPES else _structure(name)
 
 
 def _addresses(functions: Iterable[str]) -> dict[str, int]:
@@ -158,7 +158,7 @@ def _ball() -> tuple[mujoco.MjModel, mujoco.MjData]:
     return model, mujoco.MjData(model)
 
 
-def _is_as_shown(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
+def _matches_arrays(layout: StepLayout, arrays: Mapping[str, int]) -> bool:
     model, data = _ball()
     mujoco.mj_step(model, data)
 
@@ -212,9 +212,11 @@ def _steps_by_parts(layout: StepLayout) -> bool:
             return False
         begin, end = layout.contact["hessian_begin"], layout.contact["hessian_end"]
         first = parts.contact.dist.ctypes.data
-        ctypes.memmove(first, words.ctypes.data, begin * _WORD)
+        ctypes.memmove(first, words.ctypes.data, begin * _WORD_BYTES)
         ctypes.memmove(
-            first + end * _WORD, words.ctypes.data + end * _WORD, (words.shape[1] - end) * _WORD
+            first + end * _WORD_BYTES,
+            words.ctypes.data + end * _WORD_BYTES,
+            (words.shape[1] - end) * _WORD_BYTES,
         )
         ctypes.c_int.from_address(fields["ncon_at"]).value = count
         ctypes.c_int64.from_address(fields["parena_at"]).value = count * layout.contact["size"]

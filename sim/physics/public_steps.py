@@ -27,7 +27,7 @@ from snakewalk.sim.physics.step_state import (
 )
 from snakewalk.sim.plant import ServoDrive
 
-_AT = ContactFields(size=9, dist=0, place=1, normal=4, geom=14, row=16)
+_FIELD_PLACES = ContactFields(size=9, dist=0, place=1, normal=4, geom=14, row=16)
 """Fields of a copied contact; geoms and row are integers in its last two words."""
 
 _apply = compiled_when_called(apply_forces)
@@ -91,18 +91,18 @@ class PublicSteps:
     def _contacts(self) -> Contacts:
         contact = self._mechanics.data.contact
         count = len(contact.dist)
-        reals = np.zeros((count, _AT.size))
-        reals[:, _AT.dist], reals[:, 1:4], reals[:, 4:7] = (
+        reals = np.zeros((count, _FIELD_PLACES.size))
+        reals[:, _FIELD_PLACES.dist], reals[:, 1:4], reals[:, 4:7] = (
             contact.dist,
             contact.pos,
             contact.frame[:, :3],
         )
         integers = reals.view(np.int32)
-        integers[:, _AT.geom : _AT.geom + 2] = contact.geom
-        integers[:, _AT.row] = contact.efc_address
+        integers[:, _FIELD_PLACES.geom : _FIELD_PLACES.geom + 2] = contact.geom
+        integers[:, _FIELD_PLACES.row] = contact.efc_address
         if count > len(self._lanes[1]):
             self._lanes = make_lanes(count)
-        return Contacts(reals.ravel(), integers.ravel(), count, _AT)
+        return Contacts(reals.ravel(), integers.ravel(), count, _FIELD_PLACES)
 
     def _forces_n(self) -> Floats:
         """MuJoCo's constraint forces; empty in the air."""

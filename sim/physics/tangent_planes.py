@@ -21,11 +21,11 @@ PLANES = 2
 """Planes of a ball, which may lie in a crease; of a corner's three faces the deepest two count."""
 AWAY_M = -1e3
 """Height of a plane that its ball does not touch."""
-_SAME = 0.05
+_SAME_CONTACT = 0.05
 """Points nearer to each other than this share of the radius are one contact."""
 _PROBE = 1e-3
 """Share of a cell's width: distance from a point at which the surface is probed for nearer ones."""
-_NEARER = 0.01
+_NEARER_TANGENT = 0.01
 """Least tangent of an angle at which a nearby point counts as nearer."""
 _RING = 8
 
@@ -54,7 +54,7 @@ def _face(
 
 
 @compiled(f"boolean({_POINT}, float64[:, ::1])")
-def _is_above(x: float, y: float, z: float, corners: Floats) -> bool:
+def _is_above_triangle(x: float, y: float, z: float, corners: Floats) -> bool:
     """Whether a point is on the upper side of a triangle's plane."""
     b0, b1, b2 = (
         corners[1, 0] - corners[0, 0],
@@ -116,7 +116,7 @@ def _nearest_point(x: float, y: float, z: float, corners: Floats, nearest: Float
 
 
 @compiled(f"boolean({_POINT}, float64[::1], float64, {_FIELD})")
-def _is_nearest(
+def _is_nearest_contact(
     x: float,
     y: float,
     z: float,
@@ -132,13 +132,13 @@ def _is_nearest(
         pz, _, _ = _face(px, py, z_m, corner_m)
         step = math.sqrt(reach * reach + (pz - point[2]) ** 2)
         away = math.sqrt((x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2)
-        if away < distance - _NEARER * step:
+        if away < distance - _NEARER_TANGENT * step:
             return False
     return True
 
 
 @compiled(f"void(float64[::1], {_POINT}[:, ::1])")
-def _keep(point: Floats, distance: float, same_m: float, planes: Floats) -> None:
+def _keep_plane(point: Floats, distance: float, same_m: float, planes: Floats) -> None:
     slot = 0
     for k in range(PLANES):
         distance_m2 = 0.0
@@ -205,11 +205,11 @@ def touch(
                     continue
                 distance = math.sqrt(square)
                 if inside:  # not a face seen from behind, such as the wall under a trench's edge
-                    counts = _is_above(x, y, z, corners)
+                    counts = _is_above_triangle(x, y, z, corners)
                 else:
-                    counts = _is_nearest(x, y, z, nearest, distance, z_m, corner_m)
+                    counts = _is_nearest_contact(x, y, z, nearest, distance, z_m, corner_m)
                 if counts:
-                    _keep(nearest, distance, _SAME * radius_m, planes)
+                    _keep_plane(nearest, distance, _SAME_CONTACT * radius_m, planes)
 
 
 @compiled(

@@ -68,7 +68,9 @@ class TubeGrid:
     @property
     def uv(self) -> Floats:
         """(V, 2): 0 at the head to 1 at the tail, and 0 on the back to 1 on the belly."""
-        along, round_rad = np.meshgrid(_along(self.rings), self._round_rad(), indexing="ij")
+        along, round_rad = np.meshgrid(
+            _places_along_body(self.rings), self._round_rad(), indexing="ij"
+        )
         belly = np.abs(np.arctan2(np.sin(round_rad), np.cos(round_rad))) / np.pi
         return np.stack([along, belly], axis=-1).reshape(-1, 2)
 
@@ -78,7 +80,7 @@ class TubeGrid:
         centre = place @ points_m
         ahead = -_unit(slope @ points_m)
         radius = radius_m @ place.T
-        along = _along(self.rings)
+        along = _places_along_body(self.rings)
         bulge = np.minimum(along / _HEAD, 1.0) ** 0.5 * np.minimum((1.0 - along) / 0.2, 1.0) ** 0.7
         centre[:, 0] += _NOSE * radius[:, :1] * ahead[:, 0]
         centre[:, -1] -= _TAIL * radius[:, -1:] * ahead[:, -1]
@@ -109,7 +111,7 @@ class CrowdMeshes:
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add skins and textures to an uncompiled model."""
         for kind, (back, band) in enumerate(COLOURS):
-            _material(spec, f"crowd{kind}", _banded(back, band), alpha=False)
+            _material(spec, f"crowd{kind}", _banded_texture(back, band), alpha=False)
             for level, grid in enumerate(self._grids):
                 _skin(
                     spec,
@@ -152,7 +154,7 @@ class CrowdMeshes:
             _draw(model, scene, "crowd-shadow", flat, np.broadcast_to([0.0, 0.0, 1.0], flat.shape))
 
 
-def _along(rings: int) -> Floats:
+def _places_along_body(rings: int) -> Floats:
     """(rings,) places along a body, denser at its ends."""
     even = np.linspace(0.0, 1.0, rings)
     return even - 0.6 * np.sin(2.0 * np.pi * even) / (2.0 * np.pi)
@@ -166,7 +168,7 @@ def _unit(vectors: Floats) -> Floats:
 def _spline(points: int, rings: int) -> tuple[Floats, Floats]:
     """(rings, points) weights of points in a cubic spline and its slopes."""
     line = CubicSpline(np.linspace(0.0, 1.0, points), np.eye(points))
-    return line(_along(rings)), line(_along(rings), 1)
+    return line(_places_along_body(rings)), line(_places_along_body(rings), 1)
 
 
 def _shadow_corners(lines: Floats, ground: HeightField) -> Floats:
@@ -193,7 +195,7 @@ def _ribbon_uv() -> Floats:
     return np.column_stack([along, np.tile([0.0, 1.0], _SHADOW_RINGS)])
 
 
-def _banded(back: Rgba, band: Rgba) -> Image:
+def _banded_texture(back: Rgba, band: Rgba) -> Image:
     """(H, W, 3) texture: bands across a back, a paler belly, and eyes."""
     wide, high = _TEXTURE
     along, belly = np.meshgrid(np.linspace(0.0, 1.0, wide), np.linspace(0.0, 1.0, high))

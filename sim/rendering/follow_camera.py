@@ -91,7 +91,7 @@ def follow(track: BodyTrack, ground: HeightField | None) -> Floats:
     cost = np.inf
     for place, offset in enumerate(offsets):
         plain = np.column_stack([lookat, heading_deg + offset, heading_deg, distance])
-        camera = _raised(track, plain, level, ground)
+        camera = _raised_cameras(track, plain, level, ground)
         rise = float((camera[:, 4] - level).mean()) + _RELUCTANCE_DEG * place
         if rise < cost:
             best = camera
@@ -125,7 +125,7 @@ def hidden(eye_m: Floats, target_m: Floats, ground: HeightField) -> Bools:
     return np.asarray((inside & ~above).any(axis=-1))
 
 
-def _raised(
+def _raised_cameras(
     track: BodyTrack, plain: Floats, first_deg: float, ground: HeightField | None
 ) -> Floats:
     """Cameras (F, 6) that rise until the ground hides no bone, or to the last elevation.

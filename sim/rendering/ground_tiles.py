@@ -62,7 +62,7 @@ class GroundTiles:
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add the tiles to an uncompiled model with the material ``ground``, which they replace."""
         spec.geom("ground").group = _UNSEEN
-        for name, tile in self._named():
+        for name, tile in self._named_tiles():
             spec.add_mesh(
                 name=name,
                 uservert=tile.corners_m.ravel(),
@@ -90,13 +90,13 @@ class GroundTiles:
         fits = self._error_m <= MOST_PIXELS * pixel_m[:, None]
         level = np.where(fits, np.arange(len(STEPS)), 0).max(axis=1)
         if not self._geoms.size:
-            names = [model.geom(name).id for name, _ in self._named()]
+            names = [model.geom(name).id for name, _ in self._named_tiles()]
             self._geoms = np.array(names).reshape(-1, len(STEPS))
         model.geom_group[self._geoms] = _UNSEEN
         shown = np.flatnonzero(view.touches(self._middle_m, self._radius_m))
         model.geom_group[self._geoms[shown, level[shown]]] = 0
 
-    def _named(self) -> Iterator[tuple[str, TileMesh]]:
+    def _named_tiles(self) -> Iterator[tuple[str, TileMesh]]:
         for tile, levels in enumerate(self._tiles):
             for level, tile_level in enumerate(levels):
                 yield f"tile{tile}-{level}", tile_level

@@ -13,7 +13,7 @@ import numpy as np
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 
-_UNCLOSED: "weakref.WeakSet[Offscreen]" = weakref.WeakSet()
+_UNCLOSED_CONTEXTS: "weakref.WeakSet[Offscreen]" = weakref.WeakSet()
 REMEDY = "apt-get install libosmesa6 (draws on the CPU), or libegl1 with a driver"
 
 
@@ -39,10 +39,10 @@ class Offscreen:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._mjr)
         self._view = mujoco.MjrRect(0, 0, width, height)
         self._pixels = np.zeros((height, width, 3), np.uint8)
-        self.close = weakref.finalize(self, _free, self._gl, self._mjr)
+        self.close = weakref.finalize(self, _free_contexts, self._gl, self._mjr)
         """Free the frame buffer; safe to call twice."""
         self.close.atexit = False  # EGL may be gone by then
-        _UNCLOSED.add(self)
+        _UNCLOSED_CONTEXTS.add(self)
         _free_at_exit()
 
     def draw(
@@ -81,7 +81,7 @@ class Offscreen:
         self.close()
 
 
-def _free(gl: Any, mjr: mujoco.MjrContext) -> None:
+def _free_contexts(gl: Any, mjr: mujoco.MjrContext) -> None:
     gl.make_current()
     mjr.free()
     gl.free()
@@ -93,11 +93,11 @@ def _free_at_exit() -> None:
 
     Registered after MuJoCo's end of EGL and the end of finalizers, it runs before both.
     """
-    atexit.register(_free_unclosed)
+    atexit.register(_free_unclosed_contexts)
 
 
-def _free_unclosed() -> None:
-    for renderer in list(_UNCLOSED):
+def _free_unclosed_contexts() -> None:
+    for renderer in list(_UNCLOSED_CONTEXTS):
         renderer.close()
 
 

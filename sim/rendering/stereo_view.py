@@ -43,7 +43,7 @@ def tilted(tilt_rad: float, carrier: Floats) -> Floats:
     return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])
 
 
-def _level(c: float, s: float) -> Floats:
+def _level_rotation(c: float, s: float) -> Floats:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -94,7 +94,7 @@ class StereoView:
         ``at_m`` is the left camera; ``heading_rad`` is seen from above, ``tilt_rad`` downwards.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
-        return self.taken([CameraFrame(np.array(at_m), tilted(tilt_rad, _level(c, s)))])
+        return self.taken([CameraFrame(np.array(at_m), tilted(tilt_rad, _level_rotation(c, s)))])
 
     def taken(
         self, frames: Sequence[CameraFrame], qpos: Floats | None = None
@@ -115,7 +115,7 @@ class StereoView:
         for shift_m in (0.0, self._baseline_m):
             drawn = np.zeros((*self._size[::-1], 3))
             for frame in frames:
-                self._look(frame.at_m + shift_m * frame.axes[:, 0], frame.axes)
+                self._aim_camera(frame.at_m + shift_m * frame.axes[:, 0], frame.axes)
                 drawn += self._screen.draw(self._scene)
             noisy = drawn / len(frames) + self._random.normal(0.0, NOISE, drawn.shape)
             taken.append(np.clip(np.rint(noisy), 0, 255).astype(np.uint8))
@@ -125,7 +125,7 @@ class StereoView:
         """Free the frame buffer."""
         self._screen.close()
 
-    def _look(self, at_m: Floats, axes: Floats) -> None:
+    def _aim_camera(self, at_m: Floats, axes: Floats) -> None:
         wide, tall = self._size
         scale = _NEAR_M / self._focal_px
         for camera in self._scene.camera:

@@ -80,16 +80,16 @@ class TopView:
             self._ground,
         )
         left, right, top, low = self._window(np.array(data.xipos[spine]))
-        self._look_at(left, right, top, low)
+        self._narrow_cameras(left, right, top, low)
         grey = self._floor.copy()
         grey[top:low, left:right] = self._screen.draw(
             self._scene, size_px=(right - left, low - top)
         )
-        return self._sensed(grey)
+        return self._with_sensor_noise(grey)
 
     def empty_floor(self) -> Image:
         """(H, W, 3) picture without the robot."""
-        return self._sensed(self._floor)
+        return self._with_sensor_noise(self._floor)
 
     def close(self) -> None:
         """Free the frame buffer."""
@@ -121,7 +121,7 @@ class TopView:
             span += [first, min(max(math.ceil(float(values.max()) + beyond), first + 1), side)]
         return span[0], span[1], span[2], span[3]
 
-    def _look_at(self, left: int, right: int, top: int, low: int) -> None:
+    def _narrow_cameras(self, left: int, right: int, top: int, low: int) -> None:
         """Narrow the scene's cameras to these columns and rows."""
         for camera in self._scene.camera:
             half = camera.frustum_top
@@ -129,7 +129,7 @@ class TopView:
             camera.frustum_center = pixel * 0.5 * (left + right - self._camera.width_px)
             camera.frustum_top, camera.frustum_bottom = half - pixel * top, half - pixel * low
 
-    def _sensed(self, grey: Image) -> Image:
+    def _with_sensor_noise(self, grey: Image) -> Image:
         """Add sensor noise: a random part of one of a few fields."""
         field = self._noise[self._random.integers(_FIELDS)]
         down, right = (int(k) for k in self._random.integers(_SLACK, size=2))

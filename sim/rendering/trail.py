@@ -50,7 +50,7 @@ class TrailLine:
         been = int(np.searchsorted(self.time_s, now_s, side="right"))
         for k in range(max(1, been - MOST), been):
             kind = mujoco.mjtGeom.mjGEOM_LINE
-            piece = _next(scene)
+            piece = _next_geom(scene)
             mujoco.mjv_initGeom(piece, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), self.rgba)
             mujoco.mjv_connector(piece, kind, 3.0, self.points_m[k - 1], self.points_m[k])
 
@@ -80,7 +80,7 @@ class Trail:
         for k, colour in ((current - 1, FORMER), (current, PATH)):
             for at_m in self.dots_m[k] if k >= 0 else ():
                 mujoco.mjv_initGeom(
-                    _next(scene),
+                    _next_geom(scene),
                     mujoco.mjtGeom.mjGEOM_SPHERE,
                     np.full(3, 0.012),
                     at_m,
@@ -127,14 +127,14 @@ def add_axes(
     _label(scene, foot - [0.3 * length_m, 0.3 * length_m, 0.0], f"{length_m:g} m")
     for axis, (name, colour) in enumerate(zip("xy", AXES, strict=True)):
         along = np.eye(3)[axis] * length_m
-        geom = _next(scene)
+        geom = _next_geom(scene)
         mujoco.mjv_initGeom(geom, rod, *still, colour)
         mujoco.mjv_connector(geom, rod, 0.03 * length_m, foot, foot + along)
         _label(scene, foot + 1.1 * along, name)
 
 
 def _label(scene: mujoco.MjvScene, at_m: Floats, text: str) -> None:
-    geom = _next(scene)
+    geom = _next_geom(scene)
     white = (1.0, 1.0, 1.0, 1.0)
     kind = mujoco.mjtGeom.mjGEOM_LABEL
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), at_m, np.eye(3).ravel(), white)
@@ -146,7 +146,7 @@ def _line(time_s: Floats, point_m: Floats, ground: HeightField | None, rgba: Rgb
     return TrailLine(time_s[rows], _on_ground(point_m[rows, :2], ground), rgba)
 
 
-def _next(scene: mujoco.MjvScene) -> mujoco.MjvGeom:
+def _next_geom(scene: mujoco.MjvScene) -> mujoco.MjvGeom:
     scene.ngeom += 1
     return scene.geoms[scene.ngeom - 1]
 

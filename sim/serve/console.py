@@ -34,7 +34,7 @@ class Console:
         self.set_pace: Callable[[float], None] | None = None
         """Sets a new factor of time; None while no server runs the line in real time."""
         self._commands: dict[str, Callable[[list[str]], str]] = {
-            "set": self._set,
+            "set": self._set_command,
             "get": self._get,
             "load": self._load,
             "fault": self._fault,
@@ -67,7 +67,7 @@ class Console:
         ]
         return rows_of(self._line, asked)
 
-    def _set(self, words: list[str]) -> str:
+    def _set_command(self, words: list[str]) -> str:
         if len(words) < 3:
             raise ValueError
         rows = self._rows(words[0])

@@ -74,7 +74,7 @@ class PtyServer:
         self._link_checked_s = clock.now_s()
         self.path = ""
         """Path of the device to open as a serial port; empty while the port has vanished."""
-        self._open()
+        self._open_pty()
 
     def __enter__(self) -> "PtyServer":
         return self
@@ -121,10 +121,10 @@ class PtyServer:
             self._catch_up()
             if not line.disconnected:
                 line.openPort()
-                self._open()
+                self._open_pty()
             return
         self._check_link()
-        ready = self._wait(wait_s)
+        ready = self._wait_for_client(wait_s)
         self._catch_up()
         if line.disconnected:
             self.close()
@@ -154,7 +154,7 @@ class PtyServer:
         self.output_flushes += bool(received[0] & termios.TIOCPKT_FLUSHWRITE)
         return b""
 
-    def _wait(self, wait_s: float) -> bool:
+    def _wait_for_client(self, wait_s: float) -> bool:
         """Wait for a client, a line event or ``wait_s``; return whether a client has sent."""
         until_s, due_s = self._clock.now_s() + wait_s, self._line.next_event_s()
         if due_s is not None:
@@ -168,7 +168,7 @@ class PtyServer:
             nap_s = left_s if left_s == before_s else 0.0  # a clock that a test moves
         return True
 
-    def _open(self) -> None:
+    def _open_pty(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)  # no echo; held open so that clients may come and go
         os.set_blocking(self._master, False)

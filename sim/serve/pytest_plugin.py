@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from snakewalk.sim.serve.servo_bus import ServoBus
 
 
-_SHOWN = 20
+_REPORTED_PACKETS = 20
 """Packets in the report of a failed test (ours)."""
 _BUSES: "pytest.StashKey[list[ServoBus]]" = pytest.StashKey()
 
@@ -32,7 +32,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
         buses = [bus for node in item.listchain() for bus in node.stash.get(_BUSES, [])]
         for bus in buses:
             lines = [bus.lateness] if bus.lateness else []
-            lines += [packet.text() for packet in bus.packets[-_SHOWN:]]
+            lines += [packet.text() for packet in bus.packets[-_REPORTED_PACKETS:]]
             if lines:
                 report.sections.append(("servo_bus", "\n".join(lines)))
 

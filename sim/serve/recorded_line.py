@@ -80,7 +80,7 @@ class RecordedLine(Wire):
     def _on_baud_change(self, baud: int) -> None: ...
 
     def _execute(self, data: bytes, end_s: float) -> list[Reply]:
-        for alike in (_same, _same_write):
+        for alike in (_is_same_request, _same_write):
             for k in range(len(self._exchanges)):
                 index = (self._at + k) % len(self._exchanges)
                 if alike(self._exchanges[index].question, data):
@@ -95,7 +95,7 @@ class RecordedLine(Wire):
         return [data[start:end] for start, end in zip(starts, ends, strict=True)]
 
 
-def _same(recorded: bytes, data: bytes) -> bool:
+def _is_same_request(recorded: bytes, data: bytes) -> bool:
     return recorded == data
 
 

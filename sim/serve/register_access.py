@@ -13,7 +13,7 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bench import BenchPlant
 
 BenchLine = SimLine | Ax12Line
-_MEASURED: Final = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
+_MEASURED_NAMES: Final = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
 
 
 def rows_of(line: BenchLine, servo_ids: Sequence[int] | None) -> list[int]:
@@ -70,7 +70,7 @@ def set_register(line: BenchLine, rows: Sequence[int], name: str, value: int) ->
         raise InputError(f"{name} {value}: must be a whole number")
     value = int(value)
     full_name = register_name(line, name, rows)
-    if full_name.startswith(_MEASURED):
+    if full_name.startswith(_MEASURED_NAMES):
         raise InputError(f"{full_name}: is measured, not set; see load and fault")
     if isinstance(line, Ax12Line):
         line.write_register(np.array(rows, np.intp), full_name, value)

@@ -98,7 +98,7 @@ class ServoBus:
         def change() -> None:
             set_register(self.line, self._rows(ids), register, value)
 
-        self._do(change)
+        self._apply_change(change)
 
     def load(self, load_n_m: float, ids: Sequence[int] | None = None) -> None:
         """Put a constant torque on the shafts of some servos, or of all.
@@ -107,7 +107,7 @@ class ServoBus:
             InputError: an ID is unknown.
 
         """
-        self._do(lambda: set_load(self.line, self._rows(ids), load_n_m))
+        self._apply_change(lambda: set_load(self.line, self._rows(ids), load_n_m))
 
     def fault(self, kind: str, **keys: object) -> None:
         """Begin a fault of a fault file now: ``fault("mute", ids=[3], for_s=2.0)``.
@@ -123,7 +123,7 @@ class ServoBus:
                 self._faults = FaultPlayer(self.line, FaultPlan())
             self._faults.add(plan, "fault")
 
-        self._do(begin)
+        self._apply_change(begin)
 
     @property
     def packets(self) -> list[DecodedPacket]:
@@ -156,7 +156,7 @@ class ServoBus:
     def _rows(self, ids: Sequence[int] | None) -> list[int]:
         return rows_of(self.line, ids)
 
-    def _do(self, change: Callable[[], None]) -> None:
+    def _apply_change(self, change: Callable[[], None]) -> None:
         if self._thread is None:
             self.line.settle()
             change()

@@ -29,7 +29,7 @@ from snakewalk.sim.servo.register_rules import (
     registers_of,
 )
 
-_SHARED = (
+_COMPARED_REGISTERS = (
     "Torque Enable",
     "Goal Position",
     "Present Position",
@@ -127,7 +127,7 @@ class ServoBank:
             f"{kind.layout.model} and {kinds[0].layout.model} have {name} at different addresses: "
             "they cannot be on one simulated line"
             for kind in kinds[1:]
-            for name in _SHARED
+            for name in _COMPARED_REGISTERS
             if kind.layout[name] != kinds[0].layout[name]
         ][:1]
         if faults:

@@ -86,7 +86,7 @@ class BenchPlant:
 
 
 @compiled("float64(float64, float64)")
-def _within(value: float, limit: float) -> float:
+def _clamp(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
@@ -138,10 +138,10 @@ def _step(
         for _ in range(steps):
             q, w = position[k], velocity[k]
             motor_rad_s = play[SPEED, k] if has_play else w
-            share = _within(p_gain_per_rad[k] * (goal_rad[k] - q), pwm_limit[k]) * on
+            share = _clamp(p_gain_per_rad[k] * (goal_rad[k] - q), pwm_limit[k]) * on
             amps = (share * supply_v[k] - back_emf_v_s[k] * motor_rad_s) / ohm * on
             if abs(amps) > current_limit_a[k]:
-                push = _within(amps, current_limit_a[k]) * torque_constant_n_m_a[k]
+                push = _clamp(amps, current_limit_a[k]) * torque_constant_n_m_a[k]
                 damping = viscous
             else:
                 push = stiff * share * supply_v[k]
@@ -171,7 +171,7 @@ def _step(
             velocity[k] = w
             position[k] = q + h * (w + more) if has_play else q + h * w
             amps = (share * supply_v[k] - back_emf_v_s[k] * turned) / ohm * on
-            amps = _within(amps, current_limit_a[k])
+            amps = _clamp(amps, current_limit_a[k])
             pwm[k], current_a[k] = share, amps
             torque_n_m[k] = amps * torque_constant_n_m_a[k]
             lost_j = h * ohm * amps**2

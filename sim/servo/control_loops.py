@@ -30,7 +30,7 @@ TINY_GAIN = 1e-9
 _READ = readonly_array()
 _BOOLS = readonly_array("boolean")
 _GAINS = readonly_array(dimensions=2, layout="C")
-_FORWARD = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
+_FEEDFORWARD_GAINS = ("Feedforward 1st Gain", "Feedforward 2nd Gain")
 
 
 class ControlLoops:
@@ -70,7 +70,7 @@ class ControlLoops:
         placed = (mode == POSITION_MODE) | (mode == EXTENDED_MODE) | (mode == CURRENT_POSITION_MODE)
         beyond_p = (bank["Position D Gain"] != 0) | (bank["Position I Gain"] != 0)
         beyond_p |= bank["Profile Velocity"] != 0
-        for name in _FORWARD:
+        for name in _FEEDFORWARD_GAINS:
             beyond_p |= bank[name] != 0
         position = on & placed & beyond_p
         velocity = on & (mode == VELOCITY_MODE)
@@ -89,7 +89,7 @@ class ControlLoops:
         self._timed = (bank["Drive Mode"] & TIME_BASED) != 0
         integral = bank["Position I Gain"] / 65_536.0
         differential = bank["Position D Gain"] / 16.0
-        forward = [bank[name] / 4.0 for name in _FORWARD]
+        forward = [bank[name] / 4.0 for name in _FEEDFORWARD_GAINS]
         self._gains = np.stack([kp, integral, differential, *forward])
         if self._any_velocity:
             goal_rad_s = bank["Goal Velocity"] * self._rad_s_per_velocity

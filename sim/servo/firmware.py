@@ -73,7 +73,7 @@ class Watchdog:
 
 FAR_RAD = 1e9
 """Goal of a motor that only has to push: the output saturates at its limit."""
-_NEVER = 1 << 40
+_BEYOND_GOALS = 1 << 40
 """Beyond every goal."""
 STARTUP_TORQUE_ON = 0x01
 STARTUP_RAM_RESTORE = 0x02
@@ -222,7 +222,7 @@ class Firmware:
         single = mode == POSITION_MODE
         low = np.where(single, bank["Min Position Limit"].astype(int), self._extended[0])
         high = np.where(single, bank["Max Position Limit"].astype(int), self._extended[1])
-        self._limits = np.where(tripped, [[_NEVER], [-_NEVER]], [low, high])
+        self._limits = np.where(tripped, [[_BEYOND_GOALS], [-_BEYOND_GOALS]], [low, high])
         self._set_drive_goals()
         self._watchdog.arm(on)
 

@@ -12,7 +12,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 _READ = readonly_array(layout="C")
-_WHICH = readonly_array("boolean")
+_MASK = readonly_array("boolean")
 
 STEP = 0x00
 RECTANGULAR = 0x10
@@ -81,7 +81,7 @@ class Trajectory:
         _advance(seconds, which, self.goal, self._speed, self._ramp, *columns)
 
 
-@compiled(f"void(float64, {_WHICH}, {', '.join([_READ] * 3)}, {', '.join(['float64[::1]'] * 3)})")
+@compiled(f"void(float64, {_MASK}, {', '.join([_READ] * 3)}, {', '.join(['float64[::1]'] * 3)})")
 def _advance(
     seconds: float,
     which: Bools,

@@ -109,11 +109,13 @@ def registers_of(model: Model) -> ModelRegisters:
         ControlTableError: the model cannot be simulated.
 
     """
-    return _named(model) if isinstance(model, str) else _registers(load_control_table(model))
+    return (
+        _named_registers(model) if isinstance(model, str) else _registers(load_control_table(model))
+    )
 
 
 @cache
-def _named(model: str) -> ModelRegisters:
+def _named_registers(model: str) -> ModelRegisters:
     return _registers(load_control_table(model))
 
 

@@ -20,7 +20,7 @@ from snakewalk.drivers.protocol.frames import (
 _READ = readonly_array("uint8", layout="C")
 _TABLE = "uint8[:, ::1]"
 _PLACES = readonly_array("int64", layout="C")
-_SEEN = readonly_array(layout="C")
+_READ_TABLE = readonly_array(layout="C")
 _FRAME = readonly_array(dimensions=2, layout="C")
 
 
@@ -32,7 +32,8 @@ def write_le(data: Bytes, offset: int, value: int, size: int) -> None:
 
 
 @compiled(
-    f"void({_TABLE}, {_PLACES}, {_SEEN}, {_SEEN}, {_SEEN}, {_FRAME}, {_FRAME}, {_FRAME})",
+    f"void({_TABLE}, {_PLACES}, {_READ_TABLE}, {_READ_TABLE}, {_READ_TABLE},"
+    f" {_FRAME}, {_FRAME}, {_FRAME})",
     makes_arrays=False,
 )
 def write_motion(
@@ -154,7 +155,7 @@ def is_intact(raw: Bytes) -> bool:
 
 @compiled(
     f"void({_READ}, {_PLACES}, {_TABLE}, int64, int64, {readonly_array('int64', 2, 'C')},"
-    f" {_FRAME}, {_SEEN}, float64[::1], boolean[::1])",
+    f" {_FRAME}, {_READ_TABLE}, float64[::1], boolean[::1])",
     makes_arrays=False,
 )
 def accept_goals(
@@ -214,7 +215,7 @@ def warm_up(
 
 
 @compiled(
-    f"boolean({_SEEN}, {readonly_array('uint8')}, {_SEEN}, {readonly_array('uint16')},"
+    f"boolean({_READ_TABLE}, {readonly_array('uint8')}, {_READ_TABLE}, {readonly_array('uint16')},"
     f" {readonly_array('uint16')})",
     makes_arrays=False,
 )
@@ -235,7 +236,7 @@ def out_of_range(
     return False
 
 
-@compiled(f"float64({_SEEN}, {_SEEN})", makes_arrays=False)
+@compiled(f"float64({_READ_TABLE}, {_READ_TABLE})", makes_arrays=False)
 def supply_current_a(pwm: Floats, current_a: Floats) -> float:
     """Supply current of the bridges, A."""
     sum_a = 0.0
@@ -245,7 +246,8 @@ def supply_current_a(pwm: Floats, current_a: Floats) -> float:
 
 
 @compiled(
-    f"float64(float64[::1], float64, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN}, {_SEEN})",
+    f"float64(float64[::1], float64, {_READ_TABLE}, {_READ_TABLE}, {_READ_TABLE},"
+    f" {_READ_TABLE}, {_READ_TABLE})",
     makes_arrays=False,
 )
 def count_blocked(

@@ -134,15 +134,15 @@ class Decoder:
         self._fast.clear()
         values: dict[str, object] = {}
         if code == Instruction.READ and len(params) == 4:
-            self._asked[servo_id] = (_word(params, 0), _word(params, 2))
+            self._asked[servo_id] = (_word_at(params, 0), _word_at(params, 2))
             values = self._names(servo_id, self._asked[servo_id])
         elif code in (Instruction.WRITE, Instruction.REG_WRITE) and len(params) > 2:
-            values = self._values(servo_id, _word(params, 0), params[2:])
+            values = self._values(servo_id, _word_at(params, 0), params[2:])
         elif code in _GROUP_READS:
             values = self._group_read(code, params)
         elif code == Instruction.SYNC_WRITE and len(params) >= 4:
-            address = _word(params, 0)
-            size = _word(params, 2)
+            address = _word_at(params, 0)
+            size = _word_at(params, 2)
             for start in range(4, len(params) - size, size + 1):
                 part = self._values(params[start], address, params[start + 1 : start + 1 + size])
                 values |= {f"{params[start]}: {key}": value for key, value in part.items()}
@@ -153,11 +153,11 @@ class Decoder:
 
     def _group_read(self, code: int, params: bytes) -> dict[str, object]:
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
-            span = (_word(params, 0), _word(params, 2))
+            span = (_word_at(params, 0), _word_at(params, 2))
             asked = [(param, span) for param in params[4:]]
         else:
             asked = [
-                (params[start], (_word(params, start + 1), _word(params, start + 3)))
+                (params[start], (_word_at(params, start + 1), _word_at(params, start + 3)))
                 for start in range(0, len(params) - 4, 5)
             ]
         self._asked = dict(asked)
@@ -172,9 +172,9 @@ class Decoder:
         values: dict[str, object] = {}
         start = 0
         while start + 5 <= len(params):
-            size = _word(params, start + 3)
+            size = _word_at(params, start + 3)
             data = params[start + 5 : start + 5 + size]
-            part = self._values(params[start], _word(params, start + 1), data)
+            part = self._values(params[start], _word_at(params, start + 1), data)
             values |= {f"{params[start]}: {key}": value for key, value in part.items()}
             start += 5 + size
         return values
@@ -187,7 +187,7 @@ class Decoder:
             )
         values: dict[str, object] = {}
         if self._last == Instruction.PING and len(packet.params) == 3:
-            number = _word(packet.params, 0)
+            number = _word_at(packet.params, 0)
             model = model_numbers().get(number, f"model {number}")
             table = self._tables.get(packet.servo_id, self._usual)
             if table.model_number == number:
@@ -248,5 +248,5 @@ def _outcome(error: int) -> str:
     return f"{name}, alert" if error & ALERT else name
 
 
-def _word(params: bytes, offset: int) -> int:
+def _word_at(params: bytes, offset: int) -> int:
     return int.from_bytes(params[offset : offset + 2], "little")

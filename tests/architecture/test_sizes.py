@@ -41,7 +41,7 @@ KERNELS: Final[dict[str, str]] = {
     "controller/mechanics/rollout_kernel.py:roll_pieces": "its arrays are the state of all pieces",
     "controller/mechanics/rollout_kernel.py:write_result": "runs at the end of each rollout",
     "controller/repertoire/crowd.py:_step": "a slice per body costs more than its arithmetic",
-    "controller/runtime/derating.py:_is_unlimited": "runs in each cycle on plain arrays",
+    "controller/runtime/derating.py:_needs_no_limit": "runs in each cycle on plain arrays",
     "controller/studies/identification/pendulum_swing.py:_swing": "a signature of numba",
     "controller/terrain/dijkstra.py:_settle": "arrays of a heap are made once",
     "controller/terrain/safe_graph.py:_weigh": "a numba signature knows no records",

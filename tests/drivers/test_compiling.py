@@ -51,7 +51,7 @@ def test_a_loop_that_makes_an_array_has_to_say_so() -> None:
 def checked_again(mocker: MockerFixture, tmp_path: Path) -> Iterator[None]:
     """The check of numba's private option runs again, and numba's cache is empty."""
     mocker.patch("numba.config.CACHE_DIR", str(tmp_path))
-    mocker.patch.dict(fallbacks._reported, clear=True)
+    mocker.patch.dict(fallbacks._reported_fallbacks, clear=True)
     compiling._can_skip_counting.cache_clear()
     yield
     compiling._can_skip_counting.cache_clear()
@@ -76,7 +76,7 @@ def test_numba_without_the_option_counts_references_and_has_the_same_bits(
     usual = compiled(SIGNATURE, makes_arrays=False)(doubled)
     compiling._can_skip_counting.cache_clear()
     mocker.patch("numba.config.CACHE_DIR", str(tmp_path / "other"))
-    mocker.patch.object(compiling, "_UNCOUNTED", {"_unknown": False})
+    mocker.patch.object(compiling, "_NO_REFERENCE_COUNTS", {"_unknown": False})
     loop = compiled(SIGNATURE, makes_arrays=False)(doubled)
     values = np.random.default_rng(3).normal(size=50)
     ends = []
@@ -103,7 +103,7 @@ def test_the_environment_forces_counted_references(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.usefixtures("checked_again")
 def test_an_option_that_compiles_wrongly_is_not_used(mocker: MockerFixture) -> None:
-    mocker.patch.object(compiling, "_doubled", nothing)
+    mocker.patch.object(compiling, "_double", nothing)
     assert not compiling._can_skip_counting()
     (text,) = fallbacks_in_use()
     assert "is wrong" in text

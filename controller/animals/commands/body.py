@@ -143,7 +143,7 @@ def body(
     check_picture(picture)
     if not 0.1 <= aspect <= 10.0:
         raise InputError(f"aspect: height over width must be from 0.1 to 10, not {aspect:g}")
-    body_options = _Made(output, picture, force, as_json)
+    body_options = _ResultFiles(output, picture, force, as_json)
     given = is_skin(track)
     _check_options(
         track,
@@ -177,7 +177,7 @@ def body(
 
 
 @dataclass(frozen=True)
-class _Measured:
+class _MeasuredBody:
     """A body with widths."""
 
     model: BodyModel
@@ -186,7 +186,7 @@ class _Measured:
 
 
 @dataclass(frozen=True)
-class _Made:
+class _ResultFiles:
     """Where results go."""
 
     output: Path
@@ -201,7 +201,7 @@ class _Made:
     def refuse(self, *, textured: bool) -> None:
         refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
 
-    def solid(self, body: _Measured, skeleton: Floats | None) -> None:
+    def solid(self, body: _MeasuredBody, skeleton: Floats | None) -> None:
         """Write the ellipses along a skeleton; None is straight."""
         body_model = body.model
         worn = body.texture
@@ -310,18 +310,18 @@ def _check_options(
         raise InputError(list(dict.fromkeys(faults)))
 
 
-def _measure(track: str, shots: Sequence[Shot], side: Path | None, aspect: float) -> _Measured:
+def _measure(track: str, shots: Sequence[Shot], side: Path | None, aspect: float) -> _MeasuredBody:
     """Widths of a recording, and its texture from photographs."""
     if track in EMBEDDED:
         if shots or side is not None:
             raise InputError(f"{track}: is made from figures, without widths; give an .npz")
         recording = embedded(track)
-        return _Measured(model.spindle(recording.length_m), recording.points, SkinPicture())
+        return _MeasuredBody(model.spindle(recording.length_m), recording.points, SkinPicture())
     top = model.read_silhouettes(Path(track))
     silhouettes = None if side is None else model.read_silhouettes(side)
     body = model.body_model(top, silhouettes, aspect)
     points = top.points * [1.0, -1.0] if top.pixels else top.points
-    return _Measured(body, points, skin_picture(shots, top, silhouettes, body))
+    return _MeasuredBody(body, points, skin_picture(shots, top, silhouettes, body))
 
 
 def _skeleton(track: str, points: Floats, frame: int) -> Floats:

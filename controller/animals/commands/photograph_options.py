@@ -15,7 +15,7 @@ from snakewalk.controller.animals.mesh.photographs import VIEWS, Photograph, ble
 from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console.messages import LOGGER
 
-_OF_TOP = ("top", "below")
+_VIEWS_FROM_ABOVE = ("top", "below")
 """Views whose skeletons are those of the body seen from above."""
 
 
@@ -64,7 +64,7 @@ def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
 
 def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:
     """Frame of ``--posed``: that of the first photograph from above, or from below."""
-    of_top = [shot.frame for shot in shots if shot.view in _OF_TOP]
+    of_top = [shot.frame for shot in shots if shot.view in _VIEWS_FROM_ABOVE]
     return of_top[0] if of_top else 0 if shots or not frames else frames[0]
 
 
@@ -88,7 +88,7 @@ def skin_picture(
     """
     if not shots:
         return SkinPicture()
-    shown = tuple(_shown(shot, top, side) for shot in shots)
+    shown = tuple(_photographed_body(shot, top, side) for shot in shots)
     files = [str(shot.file) for shot in shots]
     if [shot.view for shot in shots] == ["top"]:
         facts: dict[str, object] = {"texture": files[0], "texture_seen": 0.5}
@@ -118,9 +118,11 @@ def skin_picture(
     return SkinPicture(blended.picture, True, shown, facts)
 
 
-def _shown(shot: Shot, top: Silhouettes, side: Silhouettes | None) -> tuple[Image, Floats, Floats]:
+def _photographed_body(
+    shot: Shot, top: Silhouettes, side: Silhouettes | None
+) -> tuple[Image, Floats, Floats]:
     """Image, skeleton and radii in it."""
-    track = top if shot.view in _OF_TOP else side
+    track = top if shot.view in _VIEWS_FROM_ABOVE else side
     if track is None:
         raise InputError(
             f"{shot.file}: a photograph from the {shot.view} needs the skeletons in it; "

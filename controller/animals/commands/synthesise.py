@@ -43,7 +43,7 @@ _END = (
 )
 FEET = ("footfall", "gc-printed")
 """Paths of the feet of an animal with legs."""
-_SYNTHESISED = ("walk", "walk-printed", "kp")
+_MOTIONS = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
 """Endings of the files, by content."""
 
@@ -141,8 +141,8 @@ def synthesise(
         world=world,
         track=track,
     )
-    if prepared.run.motion not in _SYNTHESISED:
-        raise InputError(f"--motion {prepared.run.motion}: {', '.join(_SYNTHESISED)}")
+    if prepared.run.motion not in _MOTIONS:
+        raise InputError(f"--motion {prepared.run.motion}: {', '.join(_MOTIONS)}")
     name = Path(prepared.run.name) if output is None else output
     left_out = {"film": not film, "skin": not glb}
     files = {

@@ -35,14 +35,14 @@ class Accuracy:
         facts: dict[str, object] = {
             "angle_error_deg": np.median(spine, axis=0).round(2).tolist(),
             "angle_error_95_deg": np.percentile(spine, 95.0, axis=0).round(2).tolist(),
-            "head_error_deg": _two(np.degrees(self.head_rad)),
+            "head_error_deg": _median_and_p95(np.degrees(self.head_rad)),
             "length_found_percent": round(100.0 * self.length_ratio, 1),
-            "skeleton_error_percent": _two(100.0 * self.skeleton),
+            "skeleton_error_percent": _median_and_p95(100.0 * self.skeleton),
             "turned_round": self.turned_round,
         }
         if self.pitch_rad is not None and self.height is not None:
-            facts["pitch_error_deg"] = _two(np.degrees(self.pitch_rad))
-            facts["height_error_percent"] = _two(100.0 * self.height)
+            facts["pitch_error_deg"] = _median_and_p95(np.degrees(self.pitch_rad))
+            facts["height_error_percent"] = _median_and_p95(100.0 * self.height)
         return facts
 
 
@@ -86,6 +86,6 @@ def compare(estimated: Postures, truth: Postures) -> Accuracy:
     )
 
 
-def _two(values: Floats) -> list[float]:
+def _median_and_p95(values: Floats) -> list[float]:
     """Median and 95th percentile."""
     return [round(float(np.median(values)), 2), round(float(np.percentile(values, 95.0)), 2)]

@@ -12,7 +12,7 @@ from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.controller.animals.fish.model import FishModel
 from snakewalk.controller.animals.fish.postures import midline_angles
 
-_AROUND = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+_NEIGHBOURS = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
 
 
 def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
@@ -43,8 +43,8 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
         [points[max(0, k - soft) : k + soft + 1].mean(axis=0) for k in range(len(points))]
     )
     ends = [
-        _beyond(smooth, float(depth[tuple(path[0])])),
-        _beyond(smooth[::-1], float(depth[tuple(path[-1])])),
+        _excess(smooth, float(depth[tuple(path[0])])),
+        _excess(smooth[::-1], float(depth[tuple(path[-1])])),
     ]
     joined = np.concatenate([ends[0][None], smooth[::4], smooth[-1:], ends[1][None]])
     return np.asarray((joined + np.array([-1.5, 1.5])) / scale + np.array([left - 0.5, -top + 0.5]))
@@ -62,7 +62,7 @@ def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
     return midlines
 
 
-def _beyond(points: Floats, reach: float) -> Floats:
+def _excess(points: Floats, reach: float) -> Floats:
     step = points[0] - points[min(4, len(points) - 1)]
     return np.asarray(points[0] + step / max(float(np.hypot(*step)), 1e-9) * reach)
 
@@ -94,7 +94,7 @@ def _walk(
     while ring:
         further = []
         for r, c in ring:
-            for dr, dc in _AROUND:
+            for dr, dc in _NEIGHBOURS:
                 there = (r + dr, c + dc)
                 if there in pixels and there not in before:
                     before[there] = (r, c)

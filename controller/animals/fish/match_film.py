@@ -122,7 +122,7 @@ def match_film(
         height = side_found[:, 0] * unit / camera.scale
     postures = Postures(
         base=parameters[:, :2] * unit,
-        head_rad=_unwrapped(parameters[:, 2]),
+        head_rad=_unwrapped_rad(parameters[:, 2]),
         angles_rad=parameters[:, 3:],
         joints_at=model.joints_at,
         rate_hz=rate_hz,
@@ -246,7 +246,7 @@ def _with_height(
     return model.sized(model.length_px, height=float(factors[k]))
 
 
-def _unwrapped(angle_rad: Floats) -> Floats:
+def _unwrapped_rad(angle_rad: Floats) -> Floats:
     """Turn jumps of 2 pi out, also across missing frames."""
     out = angle_rad.copy()
     is_known = np.isfinite(out)

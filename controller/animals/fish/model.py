@@ -17,8 +17,8 @@ STATIONS = 41
 """Places along the body at which its sections are given, both ends included."""
 PECTORAL = (0.225, 0.3)
 """Places along the body between which a pectoral fin is rooted (ours)."""
-_ASIDE = 0.75
-_BACK = 0.66  # where it points, from above
+_FIN_ASIDE = 0.75
+_FIN_BACK = 0.66  # where it points, from above
 _CARP = ((0.0, 0.01), (0.03, 0.035), (0.1, 0.06), (0.22, 0.085), (0.33, 0.09), (0.5, 0.075),
          (0.7, 0.042), (0.83, 0.022), (0.9, 0.012), (1.0, 0.006))  # fmt: skip
 _CARP_HIGH = ((0.0, 0.015), (0.05, 0.06), (0.2, 0.12), (0.35, 0.145), (0.5, 0.125), (0.7, 0.07),
@@ -112,8 +112,8 @@ class FishModel:
             side_line, other = (
                 np.concatenate([side[: first + 1], side[[first, last]] + tip, side[last:]])
                 for side, tip in (
-                    (side_line, reach * (_ASIDE * left[k] - _BACK * along[k])),
-                    (other, reach * (-_ASIDE * left[k] - _BACK * along[k])),
+                    (side_line, reach * (_FIN_ASIDE * left[k] - _FIN_BACK * along[k])),
+                    (other, reach * (-_FIN_ASIDE * left[k] - _FIN_BACK * along[k])),
                 )
             )
         return np.concatenate([side_line, other[::-1]])

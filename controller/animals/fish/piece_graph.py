@@ -111,7 +111,7 @@ def piece_graph(
     rise = _rise(postures)
     pieces = [_piece(postures, segment, rise) for segment in segments]
     if mirror:
-        pieces += [_mirrored(piece) for piece in pieces]
+        pieces += [_mirrored_piece(piece) for piece in pieces]
     return PieceGraph(tuple(pieces), postures.joints_at, postures.rate_hz, postures.length_m)
 
 
@@ -149,7 +149,7 @@ def _piece(postures: Postures, segment: MotionSegment, rise: Floats | None) -> P
     )
 
 
-def _mirrored(piece: Piece) -> Piece:
+def _mirrored_piece(piece: Piece) -> Piece:
     other: dict[Kind, Kind] = {"left": "right", "right": "left"}
     return Piece(
         kind=other.get(piece.kind, piece.kind),

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from snakewalk.config.arrays import Floats, Image
 
-_FINE = 240  # places along the body at which it is drawn
+_FINE_POINTS = 240  # places along the body at which it is drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class FishScene:
         self._ground = (
             self.conditions.ground + light + self.conditions.marks * pattern / pattern.std()
         )
-        self._back = gaussian_filter(self._rng.normal(size=(64, _FINE)), 3.0)
+        self._back = gaussian_filter(self._rng.normal(size=(64, _FINE_POINTS)), 3.0)
         self._back *= self.conditions.marks / self._back.std()
 
     def background(self) -> Image:
@@ -65,7 +65,7 @@ class FishScene:
 
         ``fin_px`` is the length of the pectoral fins, which lie flat behind the head.
         """
-        points, width = _fine(midline_px, half_width_px)
+        points, width = _fine_midline(midline_px, half_width_px)
         image = self._ground.copy()
         rows, columns = _box(image.shape, points, width.max() + 3.0 + fin_px)
         y, x = np.mgrid[rows, columns]
@@ -83,10 +83,10 @@ class FishScene:
 
         Each section appears as an ellipse, ``half_wide_px`` along x.
         """
-        points, wide = _fine(midline_px, half_wide_px)
+        points, wide = _fine_midline(midline_px, half_wide_px)
         spacing_px = np.hypot(*np.diff(points[::2], axis=0).T).max()
         wide = np.maximum(wide, max(0.7, 1.5 * float(spacing_px)))  # no gaps between sections
-        high = _fine(midline_px, half_high_px)[1]
+        high = _fine_midline(midline_px, half_high_px)[1]
         image = self._ground.copy()
         rows, columns = _box(image.shape, points, max(high.max(), wide.max()) + 3.0)
         y, x = np.mgrid[rows, columns]
@@ -141,8 +141,8 @@ def _blade(places: Floats, root: Floats, tip: Floats) -> Floats:
     return np.asarray(np.clip(length * (0.14 + 0.08 * on / length) - gap + 0.5, 0.0, 1.0))
 
 
-def _fine(points: Floats, size: Floats) -> tuple[Floats, Floats]:
-    place = np.linspace(0.0, 1.0, _FINE)
+def _fine_midline(points: Floats, size: Floats) -> tuple[Floats, Floats]:
+    place = np.linspace(0.0, 1.0, _FINE_POINTS)
     stations = np.linspace(0.0, 1.0, len(points))
     fine = np.column_stack([np.interp(place, stations, points[:, k]) for k in range(2)])
     return fine, np.interp(place, np.linspace(0.0, 1.0, len(size)), size)

@@ -16,10 +16,12 @@ from snakewalk.controller.images.video import Footage, in_8_bits, open_footage
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _FOR_BACKGROUND = 25
-_LEAST_WHOLE = 0.5
+_LEAST_WHOLE_BODIES = 0.5
 """Share of those frames that must show a whole body on the ground that was found (ours)."""
-_THIN = 0.5  # share of the silhouette's threshold: connected pixels above it belong to the body
-_SURE = 12.0  # grey values above the ground at least
+_THIN_PART_LEVEL = (
+    0.5  # share of the silhouette's threshold: connected pixels above it belong to the body
+)
+_SURE_CONTRAST = 12.0  # grey values above the ground at least
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +80,7 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
             f"{some[0].shape[1]} x {some[0].shape[0]}"
         )
     detector = make_detector(some, empty)
-    if empty is None and whole_share(detector, some) < _LEAST_WHOLE:
+    if empty is None and whole_share(detector, some) < _LEAST_WHOLE_BODIES:
         raise InputError(
             f"{path}: fewer than half of the frames show a complete fish on an empty ground; if "
             "it stays at one place, give a picture of the empty scene with --background (for "
@@ -115,7 +117,10 @@ def silhouette_frame(
         smooth_contrast = cv2.GaussianBlur(
             contrast(plain[part], background[part], polarity), (3, 3), 0.0
         )
-        low = max(_THIN * silhouette.threshold, float(np.median(smooth_contrast)) + _SURE)
+        low = max(
+            _THIN_PART_LEVEL * silhouette.threshold,
+            float(np.median(smooth_contrast)) + _SURE_CONTRAST,
+        )
         _, label = cv2.connectedComponents((smooth_contrast > low).astype(np.uint8), connectivity=8)
         core = np.zeros(label.shape, dtype=bool)
         core[top - part[0].start :, left - part[1].start :][:rows, :columns] = silhouette.mask

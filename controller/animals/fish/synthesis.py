@@ -25,7 +25,7 @@ STEERED = 0.2
 _BEAM = 40
 _BEAM_EACH = 3
 _DEPTH = 5
-_LOOK = 5
+_SEARCH_DEPTH = 5
 _LOOK_BEAM = 6
 """Pieces that a random motion looks ahead in a tank, and sequences that it compares."""
 
@@ -99,17 +99,17 @@ def random_sequence(
     """Follow permitted pieces, each as likely as the other, for at least ``seconds``.
 
     In a tank, or among other fish, a piece is drawn again while it, or every sequence of
-    ``_LOOK`` pieces that is found after it, comes too near.
+    ``_SEARCH_DEPTH`` pieces that is found after it, comes too near.
     """
     aim = _Aim(np.zeros((0, 2)), 0.0, around)
     node = _begin(around, 2)
     while not node.order or node.samples / pieces.rate_hz < seconds:
         choice, by_rule = _choice(pieces, node)
         if not around.any:
-            node = _take(pieces, node, int(rng.choice(choice)), by_rule, aim)
+            node = _append_piece(pieces, node, int(rng.choice(choice)), by_rule, aim)
             continue
-        drawn = [_take(pieces, node, int(k), by_rule, aim) for k in rng.permutation(choice)]
-        node = _first_free(pieces, drawn, node.crowded, aim)
+        drawn = [_append_piece(pieces, node, int(k), by_rule, aim) for k in rng.permutation(choice)]
+        node = _first_free_sequence(pieces, drawn, node.crowded, aim)
     return PieceSequence(node.order, node.forced, crowded=node.crowded)
 
 
@@ -119,7 +119,7 @@ def _begin(around: Surroundings, dimensions: int) -> _Node:
     return _Node((), np.array([x, y, 0.0][:dimensions]), head_rad, 0, 0, ())
 
 
-def _first_free(pieces: PieceGraph, drawn: list[_Node], crowded: int, aim: _Aim) -> _Node:
+def _first_free_sequence(pieces: PieceGraph, drawn: list[_Node], crowded: int, aim: _Aim) -> _Node:
     """Return the first sequence that can go on without coming too near; else the best one."""
     ends = []
     for candidate in drawn:
@@ -133,11 +133,11 @@ def _first_free(pieces: PieceGraph, drawn: list[_Node], crowded: int, aim: _Aim)
 
 
 def _escape(pieces: PieceGraph, node: _Node, aim: _Aim) -> tuple[int, float]:
-    """Crowded pieces of the best sequence of ``_LOOK`` more pieces, and its clearance, negative."""
+    """Crowded pieces and clearance, negative, of the best sequence of ``_SEARCH_DEPTH`` pieces."""
     beam = [node]
-    for _ in range(_LOOK):
+    for _ in range(_SEARCH_DEPTH):
         grown = [
-            _take(pieces, beam_node, k, by_rule, aim)
+            _append_piece(pieces, beam_node, k, by_rule, aim)
             for beam_node in beam
             for choice, by_rule in [_choice(pieces, beam_node)]
             for k in choice
@@ -196,7 +196,7 @@ def sequence_through(
                 f"{limit_s:g} s: the segments turn from {min(turns):.0f} to {max(turns):.0f} "
                 "degrees; give a larger --radius, other points, or --mirror"
             )
-        begin = _ahead(pieces, begin, aim, depth)
+        begin = _first_piece_of_best(pieces, begin, aim, depth)
     reached_s = tuple(k / pieces.rate_hz for k in begin.reached_at)
     return PieceSequence(begin.order, begin.forced, reached_s, begin.reached_at, begin.crowded)
 
@@ -249,7 +249,7 @@ def junctions(pieces: PieceGraph, sequence: PieceSequence) -> list[int]:
     return [int(junction) for junction in np.cumsum(lengths[:-1])]
 
 
-def _ahead(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth: int) -> _Node:
+def _first_piece_of_best(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth: int) -> _Node:
     """Return the first piece of the best sequence found."""
     reached = len(first_node.reached_at)
     beam = [first_node]
@@ -257,7 +257,7 @@ def _ahead(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth: int) -> _Nod
     first = len(first_node.order)
     for level in range(depth):
         grown = [
-            _take(pieces, node, k, by_rule, aim)
+            _append_piece(pieces, node, k, by_rule, aim)
             for node in beam
             for choice, by_rule in [_choice(pieces, node)]
             for k in choice
@@ -274,7 +274,7 @@ def _ahead(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth: int) -> _Nod
         best = beam[0]
     node = first_node
     for k in best.order[first : first + 1]:
-        node = _take(pieces, node, k, _is_by_rule(pieces, node, k), aim)
+        node = _append_piece(pieces, node, k, _is_by_rule(pieces, node, k), aim)
     return node
 
 
@@ -298,7 +298,7 @@ def _is_by_rule(pieces: PieceGraph, node: _Node, piece: int) -> bool:
     return not node.order or piece in pieces.permitted(node.last)
 
 
-def _take(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim) -> _Node:
+def _append_piece(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim) -> _Node:
     part = pieces.pieces[piece]
     path = placed(part.base, node.base[:2], node.head_rad)
     if len(node.base) == 3 and part.rise is not None:

@@ -23,7 +23,7 @@ STIFFNESS = 0.15
 """Cost of spine angles that alternate, per px of body length on the canvas, with four angles. With
 more angles it falls with the cube of their number, since a wave then turns back within fewer of
 them."""
-_FOLDED_RAD = 1.5
+_FOLDED_BEND_RAD = 1.5
 _NUDGE_PX, _NUDGE_RAD = 0.5, 0.02
 
 
@@ -82,7 +82,7 @@ class TopViewFit:
 
     def value(self, parameters: Floats) -> float:
         """V of Eq. 3; a folded spine is worth nothing."""
-        if np.abs(parameters[3:]).max() > _FOLDED_RAD:
+        if np.abs(parameters[3:]).max() > _FOLDED_BEND_RAD:
             return float("-inf")
         return self._target.value(self.outline(parameters), self._weight)
 

@@ -19,7 +19,7 @@ from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 
-_SHOWN = 1.2
+_FRAMED_LENGTH = 1.2
 """Length in the camera's frame over the body's: legs and horns add to it."""
 
 
@@ -63,7 +63,7 @@ class AnimalBody:
             file,
             animal_bones(animal_motion.animal, animal_motion.motion),
             rig_look(self.rig, self.texture, spine=SEGMENTS),
-            robot=as_long_robot(prepared.robot, _SHOWN * animal_motion.animal.length_m),
+            robot=as_long_robot(prepared.robot, _FRAMED_LENGTH * animal_motion.animal.length_m),
             reached_s=animal_motion.reached_s(),
             paths=[(0.0, dots)],
             title=f"{animal_motion.animal.name}, {prepared.run.name}",

@@ -18,7 +18,7 @@ from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import BoneMotion
 
-_AROUND = 14
+_RING_CORNERS = 14
 """Corners of a ring."""
 _ROWS = 7
 """Rings of a bowed ornament between its ends."""
@@ -42,7 +42,7 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
 
     def hang(corners: Floats, carrier: int, uv: tuple[float, float]) -> None:
         """Add a bone with its part."""
-        parts.append(carried_part(corners, _AROUND, len(rest), uv))
+        parts.append(carried_part(corners, _RING_CORNERS, len(rest), uv))
         rest.append(np.zeros(3))
         parent.append(carrier)
 
@@ -63,9 +63,14 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
         else:
             root = length_m * np.array(ornament.root) + [-ornament.at * length_m, 0.0, skin.axis_m]
             parts.append(
-                carried_part(cone @ _turned(ornament).T + root, _AROUND, _carrier(ornament.at), uv)
+                carried_part(
+                    cone @ _ornament_rotation(ornament).T + root,
+                    _RING_CORNERS,
+                    _carrier(ornament.at),
+                    uv,
+                )
             )
-    return Rig(*_joined(parts), np.array(rest), np.array(parent, dtype=np.int64))
+    return Rig(*_joined_mesh(parts), np.array(rest), np.array(parent, dtype=np.int64))
 
 
 def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
@@ -85,7 +90,7 @@ def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
         long_m += [length_m * part for part in pair.segments]
         if pair.foot > 0.0:
             right = -toe_left(pair, frame, 1.0 if k % 2 == 0 else -1.0)
-            turns[-1] = _beside(steps_m[:, -1], right)
+            turns[-1] = _rotation_from_axes(steps_m[:, -1], right)
     steps = 2.0 * TURN * motion.time_s / animal.cycle_s
     for ornament in animal.all_ornaments:
         if ornament.swing_rad > 0.0:
@@ -96,7 +101,7 @@ def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:
             swing = Rotation.from_euler(
                 "y", ornament.swing_rad * np.sin(steps)[:, None]
             ).as_matrix()
-            turns.append(turns[k] @ swing @ _turned(ornament))
+            turns.append(turns[k] @ swing @ _ornament_rotation(ornament))
             long_m.append(_length_m(ornament, length_m))
     return BoneMotion(
         motion.time_s, np.stack(front, axis=1), np.stack(turns, axis=1), np.array(long_m)
@@ -107,7 +112,7 @@ def _length_m(ornament: OrnamentConfig, body_m: float) -> float:
     return body_m * float(np.linalg.norm(np.subtract(ornament.tip, ornament.root)))
 
 
-def _turned(ornament: OrnamentConfig) -> Floats:
+def _ornament_rotation(ornament: OrnamentConfig) -> Floats:
     """(3, 3) turn of an ornament in the bone that carries it: its -x is from root to tip."""
     back = np.subtract(ornament.root, ornament.tip)[None]
     side = np.array([[0.0, 0.0, 1.0] if abs(back[0, 0]) >= abs(back[0, 2]) else [1.0, 0.0, 0.0]])
@@ -122,7 +127,7 @@ def _facing(forward: Floats, up: Floats) -> Floats:
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
 
-def _beside(forward: Floats, y: Floats) -> Floats:
+def _rotation_from_axes(forward: Floats, y: Floats) -> Floats:
     """(T, 3, 3) turns whose x is along ``forward`` and whose y is ``y``, normal to it."""
     x = forward / np.linalg.norm(forward, axis=1, keepdims=True)
     return np.stack([x, y, np.cross(x, y)], axis=-1)
@@ -137,7 +142,7 @@ def _horn(ornament: OrnamentConfig, length_m: float, thick_m: float) -> Floats:
     long_m = _length_m(ornament, length_m)
     cone = _tube(long_m, thick_m, _POINT * thick_m, _ROWS if any(ornament.bow) else 1)
     on = np.clip(-cone[:, 0] / long_m, 0.0, 1.0)
-    bow = length_m * np.array(ornament.bow) @ _turned(ornament)
+    bow = length_m * np.array(ornament.bow) @ _ornament_rotation(ornament)
     return np.asarray(cone + 4.0 * (on * (1.0 - on))[:, None] * bow)
 
 
@@ -148,13 +153,13 @@ def _tube(long_m: float, thick_m: float, end_m: float, rows: int) -> Floats:
     x = [*(thick_m * np.cos(cap)), *(-long_m * on), *(-long_m - end_m * np.sin(cap))]
     taper = thick_m + (end_m - thick_m) * on
     radius = [*(thick_m * np.sin(cap)), *taper, *(end_m * np.cos(cap))]
-    turn = np.arange(_AROUND) * TURN / _AROUND
+    turn = np.arange(_RING_CORNERS) * TURN / _RING_CORNERS
     y, z = np.outer(radius, np.cos(turn)), np.outer(radius, np.sin(turn))
-    rings = np.stack([np.repeat(x, _AROUND), y.ravel(), z.ravel()], axis=-1)
+    rings = np.stack([np.repeat(x, _RING_CORNERS), y.ravel(), z.ravel()], axis=-1)
     return np.vstack([rings, [thick_m, 0.0, 0.0], [-long_m - end_m, 0.0, 0.0]])
 
 
-def _joined(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:
+def _joined_mesh(parts: list[tuple[Mesh, Weights]]) -> tuple[Mesh, Weights]:
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh, _ in parts)])
     faces: list[Ints] = [
         mesh.faces + start for (mesh, _), start in zip(parts, starts[:-1], strict=True)

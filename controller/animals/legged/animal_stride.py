@@ -122,7 +122,7 @@ def measure_animal(
     if length_m is not None and not (np.isfinite(length_m) and length_m > 0.0):
         raise InputError(f"--length-m {length_m:g}: must be a positive number of metres")
     order = [_index(keypoints, keypoint) for keypoint in (*names.spine, *names.feet)]
-    places = _even(keypoints, keypoints.sure(order))
+    places = _places_of_all_frames(keypoints, keypoints.sure(order))
     rate_hz = KEYPOINT_RATE_HZ if keypoints.rate_hz is None else keypoints.rate_hz
     girdles = names.spine.index(names.girdles[0]), names.spine.index(names.girdles[1])
     count = len(names.spine)
@@ -145,7 +145,7 @@ def _index(keypoints: Keypoints, name: str) -> int:
     return list(nodes).index(name)
 
 
-def _even(keypoints: Keypoints, places: Floats) -> Floats:
+def _places_of_all_frames(keypoints: Keypoints, places: Floats) -> Floats:
     """Places of every frame from the first to the last, NaN where the file has none."""
     if keypoints.frame is None:
         return places

@@ -111,7 +111,7 @@ def _tube(
         width.append(waist * (wide_m[k + 1] + (wide_m[k] - wide_m[k + 1]) * fade))
         depth.append(waist * (deep_m[k + 1] + (deep_m[k] - deep_m[k + 1]) * fade))
         before, behind = (
-            _shared(long * away, long, long_m[near]) if 0 <= near <= last else 0.0 * on
+            _share_of_other_bone(long * away, long, long_m[near]) if 0 <= near <= last else 0.0 * on
             for away, near in ((on, k - 1), (1.0 - on, k + 1))
         )
         bones.append(np.tile([max(k - 1, 0), k, min(k + 1, last)], (len(on), 1)))
@@ -136,7 +136,7 @@ def _tube(
     return _mesh(corners, AROUND, uv), carried
 
 
-def _shared(away_m: Floats, own_m: float, other_m: float) -> Floats:
+def _share_of_other_bone(away_m: Floats, own_m: float, other_m: float) -> Floats:
     """Share of the bone on the other side of a joint, by distance from the joint."""
     near = 1.0 - away_m / (_BLEND * min(own_m, other_m))
     return np.asarray(0.5 * np.clip(near, 0.0, None) ** 1.5)

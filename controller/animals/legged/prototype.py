@@ -47,7 +47,7 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     length_m = animal.length_m
     cycles = time_s / animal.cycle_s
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
-    phase = [_since_down(pair, cycles) for pair in animal.leg_pairs]
+    phase = [_cycles_since_touchdown(pair, cycles) for pair in animal.leg_pairs]
     foot = []
     hip = []
     contact = []
@@ -69,7 +69,11 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     for pair in animal.leg_pairs:
         turned = _spine_rad(animal, cycles, np.array([pair.at]))
         left = np.stack([-np.sin(turned), np.cos(turned), np.zeros_like(turned)], axis=-1)
-        root = _between(spine, along, pair.at)[:, None] - [0.0, 0.0, pair.hip_drop * length_m]
+        root = _points_along_body(spine, along, pair.at)[:, None] - [
+            0.0,
+            0.0,
+            pair.hip_drop * length_m,
+        ]
         hip.append(root + _SIDES[:, None] * pair.hip_side * length_m * left)
     return Prototype(
         time_s,
@@ -124,13 +128,16 @@ def _spine_m(animal: AnimalConfig, time_s: Floats, high_m: Floats) -> Floats:
     level_m = np.sqrt(segment_m**2 - np.diff(z, axis=1) ** 2)
     steps = level_m[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     plan = np.concatenate([np.zeros((len(time_s), 1, 2)), -np.cumsum(steps, axis=1)], axis=1)
-    plan -= 0.5 * (_between(plan, along, front) + _between(plan, along, hind))[:, None]
+    plan -= (
+        0.5
+        * (_points_along_body(plan, along, front) + _points_along_body(plan, along, hind))[:, None]
+    )
     middle_m = animal.speed_m_s * time_s - 0.5 * animal.length_m * (front + hind)
     plan[..., 0] += middle_m[:, None]
     return np.concatenate([plan, z[..., None]], axis=-1)
 
 
-def _since_down(pair: LegPairConfig, cycles: Floats) -> Floats:
+def _cycles_since_touchdown(pair: LegPairConfig, cycles: Floats) -> Floats:
     """(T, 2) cycles since the left and the right foot came down, 0 to 1."""
     return (cycles[:, None] - [pair.left, pair.right]) % 1.0
 
@@ -190,7 +197,7 @@ def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, phase: Flo
     return np.asarray(height_m + animal.vault * (share * fall).sum(axis=1))
 
 
-def _between(points: Floats, along: Floats, place: float) -> Floats:
+def _points_along_body(points: Floats, along: Floats, place: float) -> Floats:
     """(T, D) of points (T, S + 1, D) at a place along the body."""
     k = min(int(np.searchsorted(along, place, side="right")) - 1, len(along) - 2)
     share = (place - along[k]) / (along[k + 1] - along[k])

@@ -25,7 +25,7 @@ from snakewalk.controller.gaits.wave import TURN
 FEWEST_CYCLES = 2.0
 _FEWEST_FRAMES = 6
 """Fewest frames of a cycle."""
-_MOST_HZ = 0.3
+_MOST_CYCLES_PER_FRAME = 0.3
 """Highest frequency of the search, as a share of the frame rate."""
 
 
@@ -123,7 +123,7 @@ def measure_stride(
 
     """
     time_s = np.arange(len(spine)) / rate_hz
-    spine = _bridged(spine, time_s)
+    spine = _bridged_points(spine, time_s)
     feet = np.asarray(feet, float)
     length = float(np.median(np.linalg.norm(np.diff(spine, axis=1), axis=-1).sum(axis=1)))
     spine = spine / length
@@ -136,8 +136,8 @@ def measure_stride(
         spine, feet = (np.where([True, False], points, 0.0 * points) for points in (spine, feet))
     front, hind = girdles
     girdle = spine[:, [front, front, hind, hind]]
-    rough = _smoothed(spine[:, front] - spine[:, hind], max(3, len(spine) // 4))
-    frequency_hz = _frequency_hz(_over(feet - girdle, _unit(rough)), rate_hz)
+    rough = _smoothed_points(spine[:, front] - spine[:, hind], max(3, len(spine) // 4))
+    frequency_hz = _frequency_hz(_components(feet - girdle, _unit(rough)), rate_hz)
     cycles = time_s[-1] * frequency_hz
     if cycles < FEWEST_CYCLES:
         raise InputError(f"{cycles:.1f} cycles of the legs are seen; expected two or more")
@@ -145,21 +145,23 @@ def measure_stride(
     if window < _FEWEST_FRAMES:
         raise InputError(f"{rate_hz / frequency_hz:.1f} frames a cycle; expected six or more")
     trunk = 0.5 * (spine[:, front] + spine[:, hind])
-    middle = _smoothed(trunk, window)
+    middle = _smoothed_points(trunk, window)
     inner = slice(window // 2, len(spine) - window // 2)  # the mean over a cycle is whole there
     travelled = np.hypot(*np.diff(middle[inner], axis=0).T).sum()
     seconds = (len(middle[inner]) - 1) / rate_hz
     stride = float(travelled / seconds / frequency_hz)
     if stride < 0.05:
         raise InputError(f"{stride:.3f} body lengths a cycle: the animal does not walk")
-    travel = _unit(_smoothed(np.gradient(middle, axis=0), 3))
+    travel = _unit(_smoothed_points(np.gradient(middle, axis=0), 3))
     from_middle = feet - middle[:, None]
     # a foot on the ground is still: relative to the smoothed trunk it goes evenly
-    ahead = _over(from_middle, travel) - np.nanmean(_over(girdle - middle[:, None], travel), axis=0)
+    ahead = _components(from_middle, travel) - np.nanmean(
+        _components(girdle - middle[:, None], travel), axis=0
+    )
     side = travel[:, None, 0] * from_middle[..., 1] - travel[:, None, 1] * from_middle[..., 0]
     side = np.full_like(side, np.nan) if from_side else side
     phase = time_s * frequency_hz
-    fitted, shape = _fitted(phase, ahead, stride)
+    fitted, shape = _fitted_contacts(phase, ahead, stride)
     first = fitted[0].down
     measured_feet = []
     for k, foot_fit in enumerate(fitted):
@@ -193,7 +195,7 @@ def measure_stride(
     )
 
 
-def _fitted(
+def _fitted_contacts(
     phase: Floats, ahead: Floats, stride: float
 ) -> tuple[list[Contact], tuple[float, float]]:
     """Contacts of feet (T, 4), NaN where not seen, and the shape of their ways in the air."""
@@ -235,7 +237,7 @@ def model_ahead(stride: Stride, foot: int, phase: Floats) -> Floats:
     )
 
 
-def _bridged(points: Floats, time_s: Floats) -> Floats:
+def _bridged_points(points: Floats, time_s: Floats) -> Floats:
     """Points (T, P, 2); missing ones are interpolated in time."""
     filled = np.array(points, float)
     for k in range(filled.shape[1]):
@@ -267,7 +269,7 @@ def _frequency_hz(ahead: Floats, rate_hz: float) -> float:
         return left
 
     low = 1.0 / time_s[-1]
-    tried = np.arange(low, _MOST_HZ * rate_hz, 0.25 * low)
+    tried = np.arange(low, _MOST_CYCLES_PER_FRAME * rate_hz, 0.25 * low)
     if len(tried) == 0:
         raise InputError(f"{len(ahead)} frames are too few for a stride; give a longer film")
     costs = [unexplained(f) for f in tried]
@@ -296,9 +298,9 @@ def _turns(
     """Turn of each girdle to either side, from the headings of the spine's segments."""
     step = spine[:, :-1] - spine[:, 1:]
     cross = travel[:, None, 0] * step[..., 1] - travel[:, None, 1] * step[..., 0]
-    heading = np.arctan2(cross, _over(step, travel))
+    heading = np.arctan2(cross, _components(step, travel))
     wave = np.exp(-1j * TURN * phase)
-    complete_cycles = _whole(phase)
+    complete_cycles = _in_whole_cycles(phase)
     amplitude = 2.0 * (heading[complete_cycles] * wave[complete_cycles, None]).mean(axis=0)
     # the tail swings more than the hind girdle moves it: its segments do not show the girdle
     ahead_of_tail = places[1:] <= girdle_places[1] + 1e-9
@@ -309,12 +311,12 @@ def _turns(
     return float(abs(solution[0])), float(abs(solution[1]))
 
 
-def _whole(phase: Floats) -> Bools:
+def _in_whole_cycles(phase: Floats) -> Bools:
     """Frames of as many whole cycles as there are."""
     return np.asarray(phase - phase[0] < np.floor(phase[-1] - phase[0]))
 
 
-def _smoothed(points: Floats, window: int) -> Floats:
+def _smoothed_points(points: Floats, window: int) -> Floats:
     """Mean (T, 2) over a window of frames; the window is smaller at the ends."""
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(points, axis=0)])
     k = np.arange(len(points))
@@ -326,6 +328,6 @@ def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 
-def _over(vectors: Floats, direction: Floats) -> Floats:
+def _components(vectors: Floats, direction: Floats) -> Floats:
     """Parts (T, K) of vectors (T, K, 2) along directions (T, 2)."""
     return np.asarray((vectors * direction[:, None]).sum(axis=-1))

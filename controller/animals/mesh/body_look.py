@@ -17,7 +17,7 @@ from snakewalk.controller.run.results import ANIMAL
 from snakewalk.controller.runlog.record import Header
 from snakewalk.sim.rendering.looks import SkinLook
 
-_PLAIN = "snake"
+_DEFAULT_ANIMAL = "snake"
 """Animal of a run whose recording holds no widths."""
 
 
@@ -98,5 +98,5 @@ def animal(track: str) -> str:
     try:
         read_silhouettes(Path(track))
     except InputError:
-        return _PLAIN
+        return _DEFAULT_ANIMAL
     return track

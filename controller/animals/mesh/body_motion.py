@@ -64,7 +64,7 @@ def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, B
     time_s, points = _in_space(skin, source)
     if len(time_s) < 2:
         raise InputError(f"{source}: has one frame; a motion needs two")
-    rows = np.arange(len(time_s)) if fps is None else _thinned(time_s, fps)
+    rows = np.arange(len(time_s)) if fps is None else _thinned_frames(time_s, fps)
     motion = from_points(points[rows], time_s[rows])
     return skin.sized(motion.length_m), motion
 
@@ -105,7 +105,7 @@ def _robot_skin(skin: Skin, record: RunRecord, fps: float, source: str) -> tuple
     time_s, qpos = body_qpos(record)
     if len(time_s) < 2:
         raise InputError(f"{source}: the log has fewer than two poses; choose a longer log")
-    rows = _thinned(time_s, fps)
+    rows = _thinned_frames(time_s, fps)
     robot = record.header.robot
     in_water = isinstance(record.header.world.ground, Water)
     motion = from_poses(robot, time_s[rows], qpos[rows])
@@ -136,7 +136,7 @@ def from_poses(robot: RobotConfig, time_s: Floats, qpos: Floats) -> BoneMotion:
     return BoneMotion(time_s - time_s[0], front, rotation, bone_m)
 
 
-def _thinned(time_s: Floats, fps: float) -> Ints:
+def _thinned_frames(time_s: Floats, fps: float) -> Ints:
     even = np.arange(time_s[0], time_s[-1] + 0.5 / fps, 1.0 / fps)
     middle = 0.5 * (time_s[1:] + time_s[:-1])
     return np.unique(np.searchsorted(middle, even)).astype(np.int64)

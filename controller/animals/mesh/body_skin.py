@@ -35,7 +35,7 @@ from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 
 SKINS = shipped("skins")
 """Names of the shipped skins."""
-_PLAIN = "snake"
+_DEFAULT_ANIMAL = "snake"
 """Whose colours a body without a picture wears."""
 
 
@@ -78,7 +78,7 @@ def body_skin(name: str, how: Cut | None = None) -> BodySkin:
     """
     how = Cut() if how is None else how
     if Path(name).suffix.lower() in MESH_ENDINGS:
-        return _given(Path(name), how)
+        return _skin_of_mesh(Path(name), how)
     if holds_fish(Path(name)):
         return shipped_skin(fish_skin(Path(name)), how)
     if is_skin(name):
@@ -101,9 +101,9 @@ def model_skin(
     ``around``: the texture shows the whole skin, not its upper half.
     """
     sections = ellipses(model, curves=how.curves)
-    plain = load(locate("skins", _PLAIN), SkinConfig)
+    plain = load(locate("skins", _DEFAULT_ANIMAL), SkinConfig)
     worn = _paint(plain, model) if texture is None else texture
-    skin = _covered(sections, how.order)[1]
+    skin = _covered_sections(sections, how.order)[1]
     if around:
         mesh, source = picture_around(skin.mesh)
         skin = replace(skin, mesh=mesh, along=skin.along[source])
@@ -114,7 +114,7 @@ def shipped_skin(config: SkinConfig, how: Cut) -> BodySkin:
     """Cover the sections of a skin's file, with its fins."""
     model, lift = skin_model(config)
     sections = ellipses(model, lift, how.curves)
-    tube, _ = _covered(sections, how.order)
+    tube, _ = _covered_sections(sections, how.order)
     skin = pde_skin(sections, tube, fins(tube, config.all_fins))
     facts: dict[str, object] = {"curves": how.curves, "fins": len(config.all_fins)}
     return BodySkin(config.name, skin, _paint(config, model), False, facts)
@@ -156,7 +156,7 @@ def _fin(plain: FinConfig, higher: float, pectoral: float) -> FinConfig:
     return plain.model_copy(update={"span": longer * plain.span, "sweep": longer * plain.sweep})
 
 
-def _given(file: Path, how: Cut) -> BodySkin:
+def _skin_of_mesh(file: Path, how: Cut) -> BodySkin:
     """Cut the curves from a mesh, cover them, and hang the mesh on that surface."""
     given = read_mesh(file, how.forward, how.up)
     low, high = given.mesh.vertices.min(axis=0), given.mesh.vertices.max(axis=0)
@@ -164,7 +164,7 @@ def _given(file: Path, how: Cut) -> BodySkin:
     given.solid.apply_translation(-start)
     mesh = replace(given.mesh, vertices=given.mesh.vertices - start)
     sections = cut(given.solid, how.curves, str(file))
-    tube, surface = _covered(sections, how.order)
+    tube, surface = _covered_sections(sections, how.order)
     side = tube.spine_m(sections.stations)[:, 1] / sections.length_m
     facts: dict[str, object] = {
         "forward": given.forward,
@@ -174,12 +174,12 @@ def _given(file: Path, how: Cut) -> BodySkin:
         "spine_off_axis_most": round(float(np.abs(side).max()), 5),
     }
     if how.surface:
-        worn = None if given.texture is None else _copied(mesh, given.texture, tube)
+        worn = None if given.texture is None else _copied_colours(mesh, given.texture, tube)
         return BodySkin(file.stem, surface, worn, False, facts)
     return BodySkin(file.stem, carried(mesh, surface), given.texture, True, facts)
 
 
-def _copied(mesh: Mesh, texture: Image, tube: Tube) -> Image:
+def _copied_colours(mesh: Mesh, texture: Image, tube: Tube) -> Image:
     """Strip for a tube, in the colours of the nearest corners of the mesh that it replaces."""
     s = np.interp(np.arange(ALONG) / (ALONG - 1), [0.0, 1.0], tube.stations[[0, -1]])
     over = np.arccos(np.linspace(1.0, -1.0, ACROSS))
@@ -190,7 +190,7 @@ def _copied(mesh: Mesh, texture: Image, tube: Tube) -> Image:
     return np.asarray(texture[rows, columns])
 
 
-def _covered(sections: CrossSections, order: int) -> tuple[Tube, Skin]:
+def _covered_sections(sections: CrossSections, order: int) -> tuple[Tube, Skin]:
     tube = Tube.through(sections.curves_m, sections.stations, order)
     return tube, pde_skin(sections, tube)
 

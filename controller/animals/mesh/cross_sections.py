@@ -24,7 +24,7 @@ AROUND = 32
 """Points of a curve."""
 _TIP = 5
 """Curves that round each tip."""
-_FIRST = 0.002
+_FIRST_CUT = 0.002
 """Share of the length between the ends of a mesh and its first and last cut."""
 _TRIALS = 101
 """Number of planes that separate the body from fins."""
@@ -111,7 +111,7 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
         raise InputError(f"curves: a skin needs 4 or more, not {curves}")
     x = np.asarray(solid.vertices, dtype=float)[:, 0]
     length = float(np.ptp(x))
-    trial = np.linspace(_FIRST, 1.0 - _FIRST, _TRIALS)
+    trial = np.linspace(_FIRST_CUT, 1.0 - _FIRST_CUT, _TRIALS)
     loops_of_trial = [_section_loops(solid, -s * length) for s in trial]
     sizes = [max((_area(loop) for loop in loops), default=0.0) for loops in loops_of_trial]
     thickest = int(np.argmax(sizes))
@@ -128,7 +128,7 @@ def cut(solid: Any, curves: int = CURVES, name: str = "mesh") -> CrossSections:
     s = trial[first] + (trial[last] - trial[first]) * even
     inner = np.clip(s[1:-1], s[0] + 0.02 * np.ptp(s) / curves, s[-1] - 0.02 * np.ptp(s) / curves)
     rings = [
-        _ring(_around(_section_loops(solid, -place * length), body), -place * length)
+        _ring(_loop_around(_section_loops(solid, -place * length), body), -place * length)
         for place in inner
     ]
     ends = []
@@ -145,39 +145,39 @@ def _section_loops(solid: Any, x: float) -> list[Floats]:
     path = solid.section(plane_origin=[x, 0.0, 0.0], plane_normal=[1.0, 0.0, 0.0])
     loops = [] if path is None else [np.asarray(loop, dtype=float)[:, 1:] for loop in path.discrete]
     closed = [loop[:-1] for loop in loops if len(loop) > 3 and np.allclose(loop[0], loop[-1])]
-    return [loop if _signed(loop) > 0.0 else loop[::-1] for loop in closed]
+    return [loop if _signed_area(loop) > 0.0 else loop[::-1] for loop in closed]
 
 
 def _reach(loops_of_sections: list[list[Floats]], start: Floats) -> int:
     """How many of these planes in a row cut the body."""
     loop = start
     for k, loops in enumerate(loops_of_sections):
-        inside = [enclosing for enclosing in loops if _inside(enclosing, loop.mean(axis=0))]
+        inside = [enclosing for enclosing in loops if _is_inside_loop(enclosing, loop.mean(axis=0))]
         if not inside:
             return k - 1
         loop = max(inside, key=_area)
     return len(loops_of_sections) - 1
 
 
-def _around(loops: list[Floats], body: Floats) -> Floats:
-    inside = [loop for loop in loops if _inside(loop, body.mean(axis=0))]
+def _loop_around(loops: list[Floats], body: Floats) -> Floats:
+    inside = [loop for loop in loops if _is_inside_loop(loop, body.mean(axis=0))]
     return max(inside or loops, key=_area)
 
 
-def _inside(loop: Floats, point: Floats) -> bool:
+def _is_inside_loop(loop: Floats, point: Floats) -> bool:
     """Whether a loop goes around a point."""
     angle = np.arctan2(*(loop - point).T[::-1])
     turned = np.diff(np.unwrap(np.append(angle, angle[0])))
     return bool(abs(turned.sum()) > np.pi)
 
 
-def _signed(loop: Floats) -> float:
+def _signed_area(loop: Floats) -> float:
     after = np.roll(loop, -1, axis=0)
     return 0.5 * float(np.sum(loop[:, 0] * after[:, 1] - after[:, 0] * loop[:, 1]))
 
 
 def _area(loop: Floats) -> float:
-    return abs(_signed(loop))
+    return abs(_signed_area(loop))
 
 
 def _ring(loop: Floats, x: float) -> Floats:

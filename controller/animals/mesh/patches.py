@@ -74,7 +74,7 @@ class Tube:
 
     def points_m(self, s: Floats, v: Floats) -> Floats:
         """(S, V, 3) at places along the body (S,) in 0 to 1 and around it (V,)."""
-        patch, u = self._inside(s)
+        patch, u = self._patch_and_u(s)
         out = np.empty((len(s), len(v), 3))
         for k in np.unique(patch):
             out[patch == k] = self.patches[k].points_m(u[patch == k], v)
@@ -87,10 +87,10 @@ class Tube:
 
     def spine_m(self, s: Floats) -> Floats:
         """(S, 3) the zeroth term of the patches."""
-        patch, u = self._inside(s)
+        patch, u = self._patch_and_u(s)
         return np.array([self.patches[k].spine_m(x)[0] for k, x in zip(patch, u, strict=True)])
 
-    def _inside(self, s: Floats) -> tuple[Ints, Floats]:
+    def _patch_and_u(self, s: Floats) -> tuple[Ints, Floats]:
         """Patch and its u of places (S,)."""
         place = np.interp(s, self.stations, np.arange(len(self.stations)))
         patch = np.minimum(place.astype(np.int64), len(self.patches) - 1)

@@ -191,8 +191,10 @@ def _basis(u: Floats, rate: float | Floats, order: int, along: int) -> Floats:
     if np.ndim(rate) == 0 and rate == 0.0:
         return np.stack([_power(u, k, along) for k in range(2 * order)], axis=1)
     sign = -1.0 if along % 2 else 1.0
-    rising = [sign * _faded(1.0 - u, rate, k, along) for k in range(order)]
-    return np.stack([*rising, *(_faded(u, rate, k, along) for k in range(order))], axis=-1)
+    rising = [sign * _fading_derivatives(1.0 - u, rate, k, along) for k in range(order)]
+    return np.stack(
+        [*rising, *(_fading_derivatives(u, rate, k, along) for k in range(order))], axis=-1
+    )
 
 
 def _power(u: Floats, k: int, times: int) -> Floats:
@@ -200,7 +202,7 @@ def _power(u: Floats, k: int, times: int) -> Floats:
     return np.zeros_like(u) if times > k else perm(k, times) * u ** (k - times)
 
 
-def _faded(u: Floats, rate: float | Floats, k: int, times: int) -> Floats:
+def _fading_derivatives(u: Floats, rate: float | Floats, k: int, times: int) -> Floats:
     """``u^k e^(-w u)``, differentiated by Leibniz' rule."""
     parts = [
         comb(times, j) * (-rate) ** (times - j) * _power(u, k, j) for j in range(min(times, k) + 1)

@@ -22,9 +22,9 @@ VIEWS: Final = {"left": 0.0, "top": 0.5 * math.pi, "right": math.pi, "below": -0
 """Directions from the body to the camera, angles around the body: 0 is its left side."""
 _GRAZING: Final = math.cos(math.radians(75.0))
 """Least cosine between the skin and the camera at which a photograph shows it (ours)."""
-_COMPARED: Final = math.cos(math.radians(65.0))
+_LEAST_COMPARED_COSINE: Final = math.cos(math.radians(65.0))
 """Least cosine at which brightnesses are compared (ours)."""
-_LEAST: Final = 200
+_LEAST_COMMON_POINTS: Final = 200
 """Least number of points that two photographs show, to compare their brightness (ours)."""
 _TONES: Final = (8.0, 247.0)
 """Values that are neither black nor overexposed."""
@@ -76,7 +76,7 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
     colours = []
     cosines = []
     for photograph in photographs:
-        across, cosine = _seen_from(photograph.turn_rad, turn[:, None], wide, high)
+        across, cosine = _place_in_view(photograph.turn_rad, turn[:, None], wide, high)
         colours.append(
             colours_across(photograph.image, photograph.points_px, photograph.radius_px, across)
         )
@@ -90,7 +90,7 @@ def blend(photographs: Sequence[Photograph], model: BodyModel) -> PictureAround:
     mean = np.einsum("krc,krcx->rcx", weight, colour * factor[:, None, None])
     area = np.hypot(wide * np.sin(turn)[:, None], high * np.cos(turn)[:, None])
     seen_share = float((area * (total > 0.0)).sum() / area.sum())
-    picture = np.clip(np.rint(_filled(mean, total)), 0, 255).astype(np.uint8)
+    picture = np.clip(np.rint(_filled_colours(mean, total)), 0, 255).astype(np.uint8)
     return PictureAround(picture, seen_share, gains)
 
 
@@ -100,7 +100,7 @@ def row_turn_rad() -> Floats:
     return 2.0 * np.pi * (share - 0.25)
 
 
-def _seen_from(
+def _place_in_view(
     camera_rad: float, turn: Floats, wide: Floats, high: Floats
 ) -> tuple[Floats, Floats]:
     """Place across the body in a picture, 1 on the left of its heading, and cosine of the view."""
@@ -116,14 +116,16 @@ def _seen_from(
 def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] | None, ...]:
     """Factors that make photographs (K, R, C, 3) equally bright where two show the same skin."""
     count = len(colour)
-    usable = (cosine > _COMPARED) & ((colour > _TONES[0]) & (colour < _TONES[1])).all(axis=-1)
+    usable = (cosine > _LEAST_COMPARED_COSINE) & ((colour > _TONES[0]) & (colour < _TONES[1])).all(
+        axis=-1
+    )
     rows = []
     differences = []
     joined = np.eye(count, dtype=bool)
     for i in range(count):
         for k in range(i + 1, count):
             both = usable[i] & usable[k]
-            if both.sum() < _LEAST:
+            if both.sum() < _LEAST_COMMON_POINTS:
                 continue
             row = np.zeros(count)
             row[i], row[k] = 1.0, -1.0
@@ -147,7 +149,7 @@ def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] |
     )
 
 
-def _filled(mean: Floats, total: Floats) -> Floats:
+def _filled_colours(mean: Floats, total: Floats) -> Floats:
     """Colours (R, C, 3) of weighted sums: seen, else mirrored, else of the nearest row."""
     row = np.arange(AROUND)
     back_and_belly = (AROUND // 2 - 1 - row) % AROUND

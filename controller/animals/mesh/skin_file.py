@@ -23,7 +23,7 @@ MOST_BONES: Final = 256
 """Bones count in bytes."""
 Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _ROOT_QUATERNION = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
-_STILL_M = 1e-6
+_STILL_SHARE = 1e-6
 """Share of the body's length: a bone that moves less relative to the one before does not slide."""
 
 
@@ -156,11 +156,11 @@ def _animation(
     out: "_Builder", rig: Rig, motion: BoneMotion, local: Floats, name: str
 ) -> pygltflib.Animation:
     """Append the turns of all bones, and the places of those that slide."""
-    turn, place = _carried(motion, rig.parent)
+    turn, place = _motion_in_parents(motion, rig.parent)
     time = out.add(motion.time_s, "SCALAR", None, bounds=True)
     samplers: list[pygltflib.AnimationSampler] = []
     channels: list[pygltflib.AnimationChannel] = []
-    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_M * motion.length_m
+    slides = np.abs(place - local).max(axis=(0, 2)) > _STILL_SHARE * motion.length_m
     for k in range(len(motion.bone_m)):
         paths: list[tuple[str, Floats, str]] = [("rotation", turn[:, k], "VEC4")]
         if slides[k] or rig.parent[k] < 0:
@@ -174,7 +174,7 @@ def _animation(
     return pygltflib.Animation(name=name, samplers=samplers, channels=channels)
 
 
-def _carried(motion: BoneMotion, parent: Ints) -> tuple[Floats, Floats]:
+def _motion_in_parents(motion: BoneMotion, parent: Ints) -> tuple[Floats, Floats]:
     """Quaternions (T, K, 4), x y z w, and places (T, K, 3) of bones in those that carry them."""
     frames, bones = motion.front_m.shape[:2]
     rotation = motion.rotation.copy()

@@ -9,7 +9,7 @@ from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length
 ALONG, ACROSS = 512, 64
 """Pixels of the strip."""
 _EYE_RGB = (0.05, 0.05, 0.05)
-_MIXED_PX = 0.75  # at the boundary pixels are partly background
+_MIXED_EDGE_PX = 0.75  # at the boundary pixels are partly background
 
 
 def unroll(image: Image, points_px: Floats, radius_px: Floats) -> Image:
@@ -61,7 +61,7 @@ def colours_across(
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
     centre = np.stack([np.interp(station, along, even[:, k]) for k in range(2)], axis=-1)
     radius = np.interp(station, arc / arc[-1], radius_px)
-    pure = np.maximum(radius - _MIXED_PX, 0.5 * radius)
+    pure = np.maximum(radius - _MIXED_EDGE_PX, 0.5 * radius)
     off = across * pure if squeezed else np.clip(across * radius, -pure, pure)
     forward = -np.gradient(centre, axis=0)
     forward /= np.hypot(*forward.T)[:, None]

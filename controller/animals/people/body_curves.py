@@ -109,7 +109,7 @@ def body_parts(skeleton: PersonSkeleton, girth: float) -> tuple[BodyPart, ...]:
     arm = _arm(girth, on_trunk)
     shoe = _shoe(girth)
     sides = [
-        part for side_parts in (leg, arm, shoe) for part in (side_parts, _mirrored(side_parts))
+        part for side_parts in (leg, arm, shoe) for part in (side_parts, _mirrored_part(side_parts))
     ]
     size = skeleton.stature_m
     return tuple(
@@ -126,7 +126,7 @@ def _trunk(girth: float) -> BodyPart:
         x = middle + slim * deep * np.cos(_V) + nose
         curves.append(np.stack([x, slim * wide * np.sin(_V), np.full(AROUND, height)], axis=-1))
         shares.append(_spine_shares(height))
-    return BodyPart("trunk", np.array(curves), _stations(curves), *_attached(shares))
+    return BodyPart("trunk", np.array(curves), _stations(curves), *_bones_of_curves(shares))
 
 
 def _spine_shares(height: float) -> dict[str, float]:
@@ -163,10 +163,10 @@ def _leg(girth: float, on_trunk: Floats) -> BodyPart:
             shares.append({"left foot": -upper, "left shank": 1.0 + upper})
     # the crease of the groin rises from the crotch to the side
     rise = (top - LEG[0][0]) * (0.6 + 0.4 * np.sin(_V)[:, None])
-    root = _onto(curves[0] + rise * [0.0, 0.0, 1.0], on_trunk)
+    root = _nearest_on_surface(curves[0] + rise * [0.0, 0.0, 1.0], on_trunk)
     curves.insert(0, root)
     shares.insert(0, {"pelvis": 1.0})
-    return BodyPart("leg", np.array(curves), _stations(curves), *_attached(shares))
+    return BodyPart("leg", np.array(curves), _stations(curves), *_bones_of_curves(shares))
 
 
 def _arm(girth: float, on_trunk: Floats) -> BodyPart:
@@ -190,9 +190,9 @@ def _arm(girth: float, on_trunk: Floats) -> BodyPart:
     ring = shoulder + np.stack(
         [0.040 * np.cos(_V), 0.012 * np.sin(_V), 0.034 * np.sin(_V)], axis=-1
     )
-    curves.insert(0, _onto(ring, on_trunk))
+    curves.insert(0, _nearest_on_surface(ring, on_trunk))
     shares.insert(0, {"chest": 1.0})
-    return BodyPart("arm", np.array(curves), _stations(curves), *_attached(shares))
+    return BodyPart("arm", np.array(curves), _stations(curves), *_bones_of_curves(shares))
 
 
 def _shoe(girth: float) -> BodyPart:
@@ -206,10 +206,10 @@ def _shoe(girth: float) -> BodyPart:
         curves.append(np.stack([np.full(AROUND, ahead), side, z], axis=-1))
         toes = float(np.interp(ahead, (0.058, BALL, 0.095), (0.0, 0.5, 1.0)))
         shares.append({"left foot": 1.0 - toes, "left toes": toes})
-    return BodyPart("shoe", np.array(curves), _stations(curves), *_attached(shares))
+    return BodyPart("shoe", np.array(curves), _stations(curves), *_bones_of_curves(shares))
 
 
-def _onto(curve: Floats, surface: Floats) -> Floats:
+def _nearest_on_surface(curve: Floats, surface: Floats) -> Floats:
     """(AROUND, 3) the curve on a surface's points that are nearest."""
     points = surface.reshape(-1, 3)
     return points[cKDTree(points).query(curve)[1]]
@@ -222,7 +222,7 @@ def _stations(curves: Sequence[Floats]) -> Floats:
     return np.asarray(far / far[-1])
 
 
-def _attached(shares: Sequence[dict[str, float]]) -> tuple[Ints, Floats]:
+def _bones_of_curves(shares: Sequence[dict[str, float]]) -> tuple[Ints, Floats]:
     """(K, 3) bones and shares of the curves."""
     bones = np.zeros((len(shares), 3), dtype=np.int64)
     weights = np.zeros((len(shares), 3))
@@ -234,7 +234,7 @@ def _attached(shares: Sequence[dict[str, float]]) -> tuple[Ints, Floats]:
     return bones, weights
 
 
-def _mirrored(part: BodyPart) -> BodyPart:
+def _mirrored_part(part: BodyPart) -> BodyPart:
     """Return the right side's part; its curves still turn to the left."""
     turned = (-np.arange(AROUND)) % AROUND
     curves = part.curves_m[:, turned] * [1.0, -1.0, 1.0]

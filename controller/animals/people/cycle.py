@@ -310,8 +310,8 @@ def _turns(
     half = Rotation.from_matrix(chest).as_rotvec() * 0.4
     turn[:, INDEX["neck"]] = Rotation.from_rotvec(half).as_matrix()
     for k, side in enumerate(("left", "right")):
-        turn[:, INDEX[f"{side} foot"]] = _pitched(pitch[:, k])
-        turn[:, INDEX[f"{side} toes"]] = _pitched(toes[:, k])
+        turn[:, INDEX[f"{side} foot"]] = _pitch_rotations(pitch[:, k])
+        turn[:, INDEX[f"{side} toes"]] = _pitch_rotations(toes[:, k])
         for name, arm_turn in zip(
             ("upper arm", "forearm", "hand"), _arm(gait, phase, k), strict=True
         ):
@@ -359,7 +359,7 @@ def _arm(gait: PersonGait, phase: Floats, side: int) -> tuple[Floats, Floats, Fl
     return upper.as_matrix(), fore.as_matrix(), hand.as_matrix()
 
 
-def _pitched(angle: Floats) -> Floats:
+def _pitch_rotations(angle: Floats) -> Floats:
     """(T, 3, 3) turns about the left axis; above 0 the front rises."""
     return Rotation.from_euler("Y", -angle[:, None]).as_matrix()
 

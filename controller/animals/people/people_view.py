@@ -21,7 +21,7 @@ FILM_PX: Final = (960, 540)
 STAGE_PX: Final = (460, 600)
 STAGES: Final = 8
 """Pictures of a cycle."""
-_ASIDE: Final = 0.36
+_DISTANCE_ASIDE: Final = 0.36
 """Distance of person and mesh from the middle plane, in shares of the stature."""
 _CLOTH: Final = (128, 132, 146)
 """Colour of a mesh without a texture."""
@@ -47,7 +47,7 @@ class PersonView:
         self._worn = worn
         size = person.skeleton.stature_m
         robot = as_long_robot(load_robot("yaw16"), size)
-        look = _look(person, worn, texture)
+        look = _joined_look(person, worn, texture)
         self._view = FigureView(look, robot, load_world("flat"), size_px)
 
     def draw(
@@ -57,18 +57,18 @@ class PersonView:
         bones = motion.bones
         corners = self._person.solved_m(bones.front_m[frame], bones.rotation[frame])
         worn = None if self._worn is None else posed_m(self._worn, bones, frame)
-        return self._view.draw(self._beside(corners, worn), camera, caption)
+        return self._view.draw(self._side_by_side(corners, worn), camera, caption)
 
     def rest(self, camera: OrbitCamera) -> Image:
         """Draw the person at rest."""
         worn = None if self._worn is None else self._worn.mesh.vertices
-        return self._view.draw(self._beside(self._person.rig.mesh.vertices, worn), camera)
+        return self._view.draw(self._side_by_side(self._person.rig.mesh.vertices, worn), camera)
 
-    def _beside(self, corners_m: Floats, worn_m: Floats | None) -> Floats:
+    def _side_by_side(self, corners_m: Floats, worn_m: Floats | None) -> Floats:
         """Join the person's corners and those of the mesh, which stands to the left."""
         if worn_m is None:
             return corners_m
-        aside = np.array([0.0, _ASIDE * self._person.skeleton.stature_m, 0.0])
+        aside = np.array([0.0, _DISTANCE_ASIDE * self._person.skeleton.stature_m, 0.0])
         return np.concatenate([corners_m - aside, worn_m + aside])
 
     def close(self) -> None:
@@ -131,7 +131,7 @@ def film_person(
     return frames
 
 
-def _look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
+def _joined_look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
     """Join the two meshes and their textures, the person's above."""
     mesh = person.rig.mesh
     picture = person.texture
@@ -140,7 +140,7 @@ def _look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
     faces = mesh.faces
     if worn is not None:
         cloth = np.full((128, 8, 3), _CLOTH, np.uint8) if texture is None else texture
-        picture = _stacked(picture, cloth)
+        picture = _stacked_textures(picture, cloth)
         share = person.texture.shape[0] / picture.shape[0]
         outer_uv = uv * [1.0, share] + [0.0, 1.0 - share]
         other = np.clip(worn.mesh.uv, 0.02, 0.98) * [1.0, 1.0 - share]
@@ -160,7 +160,7 @@ def _look(person: Person, worn: Rig | None, texture: Image | None) -> SkinLook:
     )
 
 
-def _stacked(above: Image, below: Image) -> Image:
+def _stacked_textures(above: Image, below: Image) -> Image:
     """Put one texture above another of the same width."""
     columns = np.arange(above.shape[1]) * below.shape[1] // above.shape[1]
     return np.concatenate([above, below[:, columns]])

@@ -11,7 +11,7 @@ from snakewalk.controller.animals.mesh.skin import Weights
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.images.mesh import Mesh
 
-_TRIED = 24
+_CANDIDATES = 24
 _AGREE = 0.17
 """Number of near corners that are tried, and the least cosine between the normals (ours)."""
 
@@ -44,6 +44,6 @@ def worn_mesh(person: Person, mesh: Mesh) -> Rig:
 
 def _facing(place: Floats, normals: Floats, surface: Mesh) -> Ints:
     """(V,) the nearest corner of a surface whose normal is within 80 degrees of the given one."""
-    candidates = np.asarray(cKDTree(surface.vertices).query(place, k=_TRIED)[1], np.int64)
+    candidates = np.asarray(cKDTree(surface.vertices).query(place, k=_CANDIDATES)[1], np.int64)
     agree = np.einsum("vkx,vx->vk", surface.normals[candidates], normals) > _AGREE
     return np.asarray(candidates[np.arange(len(place)), agree.argmax(axis=1)])

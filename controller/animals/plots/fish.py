@@ -14,7 +14,7 @@ from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.images.video import open_footage
 
-_SHOWN = 6
+_PANELS = 6
 
 
 def draw_match(
@@ -42,7 +42,7 @@ def draw_match(
             bottom = figure
         else:
             top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.9, tall])[:, 0]
-            panels = top.subplots(2, _SHOWN // 2, squeeze=False).ravel()
+            panels = top.subplots(2, _PANELS // 2, squeeze=False).ravel()
             _frames(list(panels), matched, footage)
         rows = bottom.subplots(
             postures.angles_rad.shape[1], 1, sharex=True, sharey=True, squeeze=False

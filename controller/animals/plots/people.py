@@ -56,14 +56,14 @@ def _picture(axes: Axes, image: Image, title: str) -> None:
 def _curves(axes: Axes, person: Person) -> None:
     """Draw the boundary curves at rest."""
     for curve in (curve_m for part in person.parts for curve_m in part.curves_m):
-        axes.plot(*_seen(np.vstack([curve, curve[:1]])).T, color=BLUE, linewidth=0.7)
+        axes.plot(*_projected_points(np.vstack([curve, curve[:1]])).T, color=BLUE, linewidth=0.7)
     _frame(axes, person, "boundary curves")
 
 
 def _skeleton(axes: Axes, person: Person) -> None:
     """Draw the bones, and the handles of the feet."""
     bones = person.skeleton
-    place = _seen(person.skeleton.joint_m)
+    place = _projected_points(person.skeleton.joint_m)
     for k, parent in enumerate(bones.parent):
         if parent >= 0:
             axes.plot(*place[[parent, k]].T, color=INK, linewidth=1.4)
@@ -73,7 +73,7 @@ def _skeleton(axes: Axes, person: Person) -> None:
     _frame(axes, person, "joints, and handles (red)")
 
 
-def _seen(points_m: Floats) -> Floats:
+def _projected_points(points_m: Floats) -> Floats:
     """(P, 2) points (P, 3) seen from ahead, right and above, without perspective."""
     turn = np.radians(40.0)
     up = np.radians(8.0)

@@ -238,8 +238,9 @@ class SnakeSynthesis:
             self.prepared.planner,
         )
         curves = _Curves(
-            self._over(how.sliding, how.sliding_along, most),
-            self._over(how.pulse_m_s, how.pulse_along, most) + self._varied(most),
+            self._values_along_body(how.sliding, how.sliding_along, most),
+            self._values_along_body(how.pulse_m_s, how.pulse_along, most)
+            + self._varied_amplitude(most),
             curve_at(how.head_held, np.arange(most) * self.dt_s),
             curve_at(how.calm_tail, np.arange(most) * self.dt_s),
         )
@@ -378,11 +379,11 @@ class SnakeSynthesis:
         unit_m = self.how.length_unit_m
         return SpeedLaw(how.viscous, how.coulomb * unit_m, how.bend * unit_m, how.turn * unit_m)
 
-    def _over(self, curve: Curve, along: Along, frames: int) -> Floats:
+    def _values_along_body(self, curve: Curve, along: Along, frames: int) -> Floats:
         """(frames, N) values of a curve over time and along the body."""
         return curve_at(curve, np.arange(frames) * self.dt_s)[:, None] * along_body(along, POINTS)
 
-    def _varied(self, frames: int) -> Floats | float:
+    def _varied_amplitude(self, frames: int) -> Floats | float:
         how = self.how
         if how.pulse_spread_m_s == 0.0:
             return 0.0

@@ -175,7 +175,7 @@ def synthesise(
         speed[t] = law.step_m_s(float(speed[t - 1]), bend, turn, dt_s)
         pulse = np.maximum(speed[t] + at_frame(how.pulse_m_s, t), 0.0) * dt_s / segment_m
         shift = np.broadcast_to(pulse * (1.0 - at_frame(how.sliding, t)), n.shape)
-        ahead = _shifted(ahead, shift)
+        ahead = _shifted_places(ahead, shift)
         np.subtract(ahead, n + 1.0, out=place[t])
         _serve(track, float(place[t].max()), grow, points[t - 1])
         angles[t], leader = _posture(track.at_rad(place[t]) + heading_rad, how, t)
@@ -222,7 +222,7 @@ _VALUES = readonly_array()
 
 
 @compiled(f"float64[::1]({_VALUES}, {_VALUES})")
-def _shifted(ahead: Floats, shift: Floats) -> Floats:
+def _shifted_places(ahead: Floats, shift: Floats) -> Floats:
     """Places ahead (N,) after a shift: a point shows what the point ``shift`` before it showed.
 
     A constant stays one, bit for bit.
@@ -336,15 +336,15 @@ class Targets:
         D_n is measured from the mass centre.
         """
         centre = points_m.sum(axis=0) / len(points_m)
-        while self.index < self.count and self._reached(centre):
+        while self.index < self.count and self._has_reached_waypoint(centre):
             self.index += 1
         self.current.append(self.index)
-        self.distance_m.append(hypot(*(self.points_m[self._at] - centre)))
+        self.distance_m.append(hypot(*(self.points_m[self._frame_number] - centre)))
         return self.index == self.count
 
     def printed_aim_rad(self, points_m: Floats) -> float:
         """D_o of [PT] 2.6.2: direction from the mass centre to the target in force."""
-        return _direction_rad(self.points_m[self._at] - points_m.mean(axis=0))
+        return _direction_rad(self.points_m[self._frame_number] - points_m.mean(axis=0))
 
     def aim_rad(self, points_m: Floats, heading_rad: float) -> float:
         """Direction from the head, where the next state begins, to a point ahead on the path.
@@ -356,7 +356,7 @@ class Targets:
         head = points_m[0]
         length_m = float(np.hypot(*np.diff(points_m, axis=0).T).sum())
         s_m = self._along_m(head)
-        waypoint = self._at + int(np.argmax(self.required[self._at :]))
+        waypoint = self._frame_number + int(np.argmax(self.required[self._frame_number :]))
         passed = s_m > self._marks_m[waypoint] + length_m and self.index < self.count
         if passed and self._replan is not None:
             self.missed += 1
@@ -390,10 +390,10 @@ class Targets:
         return np.array([np.cos(end_rad), np.sin(end_rad)])
 
     @property
-    def _at(self) -> int:
+    def _frame_number(self) -> int:
         return min(self.index, self.count - 1)
 
-    def _reached(self, centre_m: Floats) -> bool:
+    def _has_reached_waypoint(self, centre_m: Floats) -> bool:
         k = self.index
         off = centre_m - self.points_m[k]
         distance = hypot(off[0], off[1])

@@ -33,8 +33,8 @@ RADIUS = 0.0018
 _RGB = 191, 26, 38
 _ROWS = 8
 """Rows that the texture gets for the tongue's colour."""
-_AROUND = 8
-_HIDDEN = 2.0
+_RING_CORNERS = 8
+_HIDDEN_TONGUE = 2.0
 """Distance of the drawn-in tongue's tip behind the head's, over its radius."""
 _FORK = 0.35
 """Share of the length that is forked."""
@@ -47,8 +47,8 @@ def rig_with_tongue(rig: Rig, length_m: float, texture: Image | None) -> tuple[R
     """
     mesh = rig.mesh
     bone = len(rig.rest_m)
-    corners, faces = _forked(LENGTH * length_m, RADIUS * length_m)
-    corners = corners + rig.rest_m[0] - [_HIDDEN * RADIUS * length_m, 0.0, 0.0]
+    corners, faces = _forked_tongue(LENGTH * length_m, RADIUS * length_m)
+    corners = corners + rig.rest_m[0] - [_HIDDEN_TONGUE * RADIUS * length_m, 0.0, 0.0]
     uv = mesh.uv
     colour = np.array([0.5, 0.5])
     if texture is not None:
@@ -84,9 +84,9 @@ def bones_with_tongue(bones: BoneMotion, heights: Floats) -> BoneMotion:
     )
 
 
-def _forked(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
+def _forked_tongue(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
     """Corners (V, 3) and faces of a stem along -x and two tips that end at x = 0."""
-    turn = np.arange(_AROUND) * TURN / _AROUND
+    turn = np.arange(_RING_CORNERS) * TURN / _RING_CORNERS
     vertices = []
     faces = []
     count = 0
@@ -99,7 +99,7 @@ def _forked(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
         rings = [
             np.stack(
                 [
-                    np.full(_AROUND, x),
+                    np.full(_RING_CORNERS, x),
                     thick_m * (off + radius * np.cos(turn)),
                     thick_m * radius * np.sin(turn),
                 ],
@@ -108,8 +108,8 @@ def _forked(long_m: float, thick_m: float) -> tuple[Floats, np.ndarray]:
             for x, off, radius in zip(ends, aside, radii, strict=True)
         ]
         vertices += [*rings, *(ring.mean(axis=0, keepdims=True) for ring in rings)]
-        faces.append(tube_faces(2, _AROUND) + count)
-        count += 2 * _AROUND + 2
+        faces.append(tube_faces(2, _RING_CORNERS) + count)
+        count += 2 * _RING_CORNERS + 2
     return np.concatenate(vertices), np.concatenate(faces)
 
 

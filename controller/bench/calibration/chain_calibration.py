@@ -107,7 +107,7 @@ def find_servos(
         servos |= scan()
     if not servos:
         _reject_another_make(port, latency_s, feetech=feetech)
-    shared = [str(servo_id) for servo_id in sorted(servos) if not _is_alone(bus, servo_id)]
+    shared = [str(servo_id) for servo_id in sorted(servos) if not _has_unique_id(bus, servo_id)]
     if shared:
         raise InputError(
             f"{port.name}: replies of ID {', '.join(shared)} come doubled or damaged: two servos "
@@ -146,7 +146,7 @@ def _reject_another_make(port: BytePort, latency_s: float, *, feetech: bool) -> 
         )
 
 
-def _is_alone(bus: DynamixelBus, servo_id: int) -> bool:
+def _has_unique_id(bus: DynamixelBus, servo_id: int) -> bool:
     probes = (bus.probe(servo_id) for _ in range(_PROBES))
     return any(probe.answered and not probe.doubled and not probe.damaged for probe in probes)
 
@@ -239,7 +239,7 @@ def calibrate(
         journal.note(zeros_rad=straight_rad)
     if settings.sweep:
         steps.sweep(unknown.servo_ids)
-    return _found(like, name, unknown, journal.known, sweep=settings.sweep)
+    return _composed_calibration(like, name, unknown, journal.known, sweep=settings.sweep)
 
 
 @dataclass
@@ -305,7 +305,7 @@ class _Steps:
             self.bench.retried(push_each, lambda: len(stops))
 
 
-def _found(
+def _composed_calibration(
     like: RobotConfig,
     name: str,
     unknown: RobotConfig,
@@ -337,10 +337,13 @@ def _found(
             ]
             if stops and min(stops) - MARGIN_RAD < limit - 0.02:
                 limit = round(min(stops) - MARGIN_RAD, 3)
-                notes.append(f"{said}: stops at {_both(ranges[joint])}: its limit is {limit:g} rad")
+                notes.append(
+                    f"{said}: stops at {_range_text(ranges[joint])}: its limit is {limit:g} rad"
+                )
             elif joint in stopless and len(stopless) <= len(ranges) // 2:
                 notes.append(
-                    f"{said}: stops at {_both(ranges[joint])}: no stop where other joints have one"
+                    f"{said}: stops at {_range_text(ranges[joint])}: "
+                    "no stop where other joints have one"
                 )
         if limit < LEAST_LIMIT_RAD:
             faults.append(f"{said}: only {limit + MARGIN_RAD:.2f} rad to its stop: free it")
@@ -364,6 +367,6 @@ def _found(
     return ChainCalibration(robot, tuple(ranges), tuple(notes))
 
 
-def _both(joint_range: JointRange) -> str:
+def _range_text(joint_range: JointRange) -> str:
     ends = (joint_range.low_rad, joint_range.high_rad)
     return " and ".join("none" if end is None else f"{end:+.2f} rad" for end in ends)

@@ -245,10 +245,10 @@ class CalibrationBench:
             try:
                 held_rad = np.array(link.enable().position_rad)
             except ChainError as error:
-                raise self._explained(error) from error
+                raise self._start_error(error) from error
             yield link, held_rad
 
-    def _explained(self, error: ChainError) -> Exception:
+    def _start_error(self, error: ChainError) -> Exception:
         """Error of a start: silence may be repeated, an alarm has advice."""
         faults = () if self._chain.inspection is None else self._chain.inspection.faults
         causes = {fault.cause for fault in faults}
@@ -274,7 +274,7 @@ class CalibrationBench:
                     break
                 state = self._read(link)
             if link.tripped is not None:
-                raise self._tripped(link.tripped, state)
+                raise self._trip_error(link.tripped, state)
             self._state = state
             yield tick.deadline_s - start_s, state
 
@@ -286,7 +286,7 @@ class CalibrationBench:
                 raise LineLostError(str(error)) from error
             raise
 
-    def _tripped(self, reason: str, state: JointState) -> Exception:
+    def _trip_error(self, reason: str, state: JointState) -> Exception:
         overloaded = np.flatnonzero(state.hardware_error & Alarm.OVERLOAD)
         if len(overloaded):
             ids = ", ".join(str(self._robot.servo_ids[row]) for row in overloaded)

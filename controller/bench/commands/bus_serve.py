@@ -146,8 +146,8 @@ def serve(
     refuse_to_overwrite([link], force=True)
     with ExitStack() as stack:
         served = stack.enter_context(body.make(baud)) if body.is_given else None
-        what, line, traffic, make_decoder, player = _served(
-            play, baud, partial(_simulated, servos, served, imu, baud, faults)
+        what, line, traffic, make_decoder, player = _served_line(
+            play, baud, partial(_simulated_line, servos, served, imu, baud, faults)
         )
         console = _console(line, player, as_json) if with_console else None
         line.usb_latency_s = latency * 1e-3
@@ -236,7 +236,9 @@ def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
         )
 
 
-def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served]") -> "Served":
+def _served_line(
+    play: Path | None, baud: int | None, simulated: "Callable[[], Served]"
+) -> "Served":
     """Name of the line, the line, its taps, the decoder of its packets, and its faults."""
     if play is None:
         return simulated()
@@ -245,14 +247,14 @@ def _served(play: Path | None, baud: int | None, simulated: "Callable[[], Served
     return spec, line, LiveTable(list), Decoder, None
 
 
-def _simulated(
+def _simulated_line(
     servos: str | None,
     served: ServedRobot | None,
     imu: str | None,
     baud: int | None,
     faults: Path | None,
 ) -> "Served":
-    """Simulated servos, as ``_served`` has them."""
+    """Simulated servos, as ``_served_line`` has them."""
     spec = parse_chain(servos or "1-4")
     if served is None:
         line = bench_line(spec, baud or DEFAULT_BAUD, imu=None if imu is None else parse_imu(imu))

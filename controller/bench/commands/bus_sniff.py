@@ -34,7 +34,7 @@ def receive(device: str, baud: int, for_s: float | None) -> Iterator[tuple[float
 
     """
     clock = WallClock()
-    with _opened(device, baud) as port:
+    with _open_device(device, baud) as port:
         while for_s is None or clock.now_s() < for_s:
             data = port.read(max(1, port.in_waiting))
             if data:
@@ -52,7 +52,7 @@ def stand_between(device: str, baud: int, for_s: float | None) -> Iterator[tuple
     master, slave = os.openpty()
     tty.setraw(slave)
     try:
-        with _opened(device, baud) as port:
+        with _open_device(device, baud) as port:
             print(f"port {os.ttyname(slave)}", file=sys.stderr, flush=True)
             while for_s is None or clock.now_s() < for_s:
                 ready, _, _ = select.select([master, port.fileno()], [], [], WAIT_S)
@@ -69,7 +69,7 @@ def stand_between(device: str, baud: int, for_s: float | None) -> Iterator[tuple
         os.close(slave)
 
 
-def _opened(device: str, baud: int) -> serial.Serial:
+def _open_device(device: str, baud: int) -> serial.Serial:
     try:
         return serial.Serial(device, baud, timeout=WAIT_S)
     except (serial.SerialException, ValueError) as error:

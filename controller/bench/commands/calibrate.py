@@ -92,7 +92,7 @@ def calibrate(
     with (
         open_port(device, baud or like.servo.baud) as line,
         StopButton(out.stem, device) as button,
-        _saved(answers),
+        _answers_kept(answers),
     ):
         if (
             backup is not None and not keeps_backup
@@ -154,7 +154,7 @@ def _with_homing(
 ) -> tuple[RobotConfig, dict[str, object]]:
     """Write the zeros into the servos, after a question; returns the robot, and facts to show."""
     offsets = plan_homing(bus, described)
-    written = yes or _confirmed(offsets, backup)
+    written = yes or _confirm_registers(offsets, backup)
     if written:
         described = without_zeros(described)
         there = "The zeros are in the servos, in Homing Offset."
@@ -169,7 +169,7 @@ def _with_homing(
 
 
 @contextmanager
-def _saved(answers: ProgressFile) -> Iterator[None]:
+def _answers_kept(answers: ProgressFile) -> Iterator[None]:
     """Report after an interruption where the answers are, and how to continue."""
     try:
         yield
@@ -187,7 +187,7 @@ def _write(out: Path, text: str) -> None:
     write_result(out, text)
 
 
-def _confirmed(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
+def _confirm_registers(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
     """Show the servos' registers as they would be, and ask."""
     for offset in offsets:
         typer.echo(

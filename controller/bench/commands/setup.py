@@ -27,7 +27,7 @@ def setup(
     """
     if not sys.stdin.isatty():
         raise InputError("setup: asks before each step, but a terminal is missing")
-    guide = GuidedSetup(folder, port, _asked, run_command)
+    guide = GuidedSetup(folder, port, _ask_person, run_command)
     guide.carry_on()
     files = guide.files
     typer.echo(
@@ -37,7 +37,7 @@ def setup(
     )
 
 
-def _asked(question: str) -> str:
+def _ask_person(question: str) -> str:
     """Return the answer of a person; the input's end stops the setup."""
     typer.echo(f"{question}: ", nl=False)
     try:

@@ -26,10 +26,10 @@ _INCH_M: Final = 0.0254
 _DRAWN: Final = 6, 24  # px per cell of the print fitted to a picture, least and most
 _STEPS: Final = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
 _SMOOTH: Final = 3  # px of the smoothing before a print is fitted
-_FURTHEST: Final = 0.5  # of a cell: largest correction of a corner (ours)
+_FURTHEST_CORNER: Final = 0.5  # of a cell: largest correction of a corner (ours)
 _AGREE_PX: Final = 1.5  # largest residual of a marker that moved with the picture (ours)
 _FEWEST_MOVED: Final = 3  # markers seen before and now, for the picture's move
-_TURNED_PX: Final = 0.5  # largest residual of a purely rotated camera (ours)
+_TURNED_CAMERA_PX: Final = 0.5  # largest residual of a purely rotated camera (ours)
 _LEAST_SPREAD: Final = 0.05  # of markers' places: less is a line
 Markers = Mapping[int, Floats]
 """Corners (4, 2) of each marker by its number, pixels, the upper left of the print first."""
@@ -139,13 +139,13 @@ def find_markers(picture: Image) -> dict[int, Floats]:
         (np.asarray(corner, dtype=float).reshape(4, 2) + 0.5) / _LARGER - 0.5 for corner in corners
     ]
     return {
-        name: _aligned(grey, name, place)
+        name: _aligned_corners(grey, name, place)
         for name, place in zip(names, places, strict=True)
         if names.count(name) == 1
     }
 
 
-def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
+def _aligned_corners(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
     """Corners by fitting the whole print: gain and saturation do not move them."""
     cells_px = float(np.hypot(*(corners[1] - corners[0]))) / _CELLS
     cell = int(np.clip(cells_px, *_DRAWN))
@@ -168,7 +168,7 @@ def _aligned(grey: NDArray[Any], number: int, corners: Floats) -> Floats:
         return corners
     turned = ends @ np.asarray(move[:, :2], dtype=float).T + move[:, 2]
     better = projected(np.asarray(there, dtype=float), turned)
-    return better if np.abs(better - corners).max() < _FURTHEST * cells_px else corners
+    return better if np.abs(better - corners).max() < _FURTHEST_CORNER * cells_px else corners
 
 
 def fit_floor(
@@ -192,7 +192,7 @@ def fit_floor(
             f"{len(used)} of {len(places_m)} markers are seen, {FEWEST} are needed; not seen: "
             f"{missing}: in the picture, lit, at least 14 px wide?"
         )
-    px = {name: _plain(markers[name], lens) for name in used}
+    px = {name: _undistorted(markers[name], lens) for name in used}
     middles = np.array([middle_of(px[name]) for name in used])
     floor = np.array([places_m[name] for name in used], dtype=float)
     for what, places in (("the picture", middles), ("markers_m", floor)):
@@ -241,7 +241,7 @@ def picture_move(
 
     """
     before_px, two = (
-        {name: _plain(px, lens) for name, px in markers.items()} for markers in (then, now)
+        {name: _undistorted(px, lens) for name, px in markers.items()} for markers in (then, now)
     )
     names = sorted(set(before_px) & set(two))
     if len(names) < _FEWEST_MOVED:
@@ -249,23 +249,25 @@ def picture_move(
     rest = list(names)
     left_out = list[int]()
     while len(rest) >= _FEWEST_MOVED:
-        move = _turned(matrix, before_px, two, rest)
+        move = _turned_camera(matrix, before_px, two, rest)
         off_px = _residual_px(move, before_px, two, rest)
         if off_px <= _AGREE_PX:
-            if off_px > _TURNED_PX:
-                move = _carried(matrix, floor_from_px, before_px, two, rest)
+            if off_px > _TURNED_CAMERA_PX:
+                move = _moved_camera(matrix, floor_from_px, before_px, two, rest)
             return PictureMove(move, _bump(move, matrix, tuple(sorted(left_out))))
         if 2 * (len(left_out) + 1) >= len(names):
             break
-        worst = min(rest, key=lambda name: _without(name, matrix, before_px, two, rest))
+        worst = min(rest, key=lambda name: _error_without(name, matrix, before_px, two, rest))
         rest.remove(worst)
         left_out.append(worst)
-    move = _carried(matrix, floor_from_px, before_px, two, names)
-    undone = len(names) >= FEWEST and _residual_px(move, before_px, two, names) <= _TURNED_PX
+    move = _moved_camera(matrix, floor_from_px, before_px, two, names)
+    undone = len(names) >= FEWEST and _residual_px(move, before_px, two, names) <= _TURNED_CAMERA_PX
     return PictureMove(move, replace(_bump(move, matrix, ()), undone=undone))
 
 
-def _turned(matrix: Floats, before_px: Markers, two: Markers, names: Sequence[int]) -> Floats:
+def _turned_camera(
+    matrix: Floats, before_px: Markers, two: Markers, names: Sequence[int]
+) -> Floats:
     """(3, 3) for a rotated camera: Wahba's problem by SVD."""
     rays = []
     for markers in (before_px, two):
@@ -277,7 +279,7 @@ def _turned(matrix: Floats, before_px: Markers, two: Markers, names: Sequence[in
     return np.asarray(matrix @ turn @ np.linalg.inv(matrix))
 
 
-def _carried(
+def _moved_camera(
     matrix: Floats, floor_from_px: Floats, before_px: Markers, two: Markers, names: Sequence[int]
 ) -> Floats:
     """(3, 3) for a rotated and shifted camera: its poses over the floor, then and now."""
@@ -290,11 +292,11 @@ def _carried(
     return np.asarray(move / move[2, 2])
 
 
-def _without(
+def _error_without(
     name: int, matrix: Floats, before_px: Markers, two: Markers, names: Sequence[int]
 ) -> float:
     rest = [other for other in names if other != name]
-    return _residual_px(_turned(matrix, before_px, two, rest), before_px, two, rest)
+    return _residual_px(_turned_camera(matrix, before_px, two, rest), before_px, two, rest)
 
 
 def _residual_px(move: Floats, before_px: Markers, two: Markers, names: Sequence[int]) -> float:
@@ -335,7 +337,7 @@ def middle_of(corners: Floats) -> Floats:
     return np.asarray(a + along[0] * (c - a))
 
 
-def _plain(px: Floats, lens: Lens | None) -> Floats:
+def _undistorted(px: Floats, lens: Lens | None) -> Floats:
     return px if lens is None else lens.undistorted(px)
 
 

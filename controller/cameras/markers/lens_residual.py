@@ -20,7 +20,7 @@ from snakewalk.controller.cameras.markers.floor_markers import FEWEST, Markers, 
 _CORNER_PX: Final = 0.3  # standard deviation of a corner (ours)
 _PLACE_M: Final = 0.004  # of a marker's measured place, per coordinate (ours)
 _SIDE: Final = 0.02  # of the side of all prints, as a share (ours)
-_SURE: Final = 3.0  # standard deviations of the coefficient from 0 (ours)
+_SURE_SIGMAS: Final = 3.0  # standard deviations of the coefficient from 0 (ours)
 _STARTS: Final = 0.0, 0.1  # of the coefficient: strong distortion has a second minimum (ours)
 _GRID: Final = 9  # points across the picture for the error
 _SQUARE: Final = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
@@ -43,7 +43,7 @@ class Distortion:
     @property
     def is_certain(self) -> bool:
         """Whether the lens distorts noticeably and significantly."""
-        return abs(self.coefficient) > _SURE * self.sigma and self.error_m > NOTICEABLE_M
+        return abs(self.coefficient) > _SURE_SIGMAS * self.sigma and self.error_m > NOTICEABLE_M
 
     @property
     def covariance(self) -> Floats:

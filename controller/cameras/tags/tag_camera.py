@@ -68,13 +68,13 @@ class DrawnTags:
             squares.append((tag.id, body.link_m[tag.link] + corners))
         width, height = self._view.lens.size_px
         shown = np.full((height, width), _BACKGROUND, dtype=np.float32)
-        for number, corners in sorted(squares, key=self._far):
+        for number, corners in sorted(squares, key=self._distance_m):
             self._draw(shown, number, corners)
         shown = np.asarray(cv2.GaussianBlur(shown, (0, 0), _BLUR_PX))
         noise = self._random.normal(0.0, _NOISE, shown.shape)
         return np.clip(shown + noise, 0.0, 255.0).astype(np.uint8)
 
-    def _far(self, tag: tuple[int, Floats]) -> float:
+    def _distance_m(self, tag: tuple[int, Floats]) -> float:
         return -float(np.linalg.norm(tag[1].mean(axis=0) - self._view.place_m))
 
     def _draw(self, shown: Any, number: int, corners: Floats) -> None:
@@ -130,7 +130,7 @@ def _window(to_picture: Floats, side_px: int, shape: tuple[int, ...]) -> tuple[i
     return int(left), int(top), int(right), int(low)
 
 
-_LOOK_S: Final = 0.02
+_POLL_S: Final = 0.02
 
 
 class TagPictures(Protocol):
@@ -264,7 +264,7 @@ def first_picture(pictures: TagPictures, clock: Clock) -> TagPicture:
             pictures_with_tags += 1
             if picture.corners_px:
                 return picture
-        clock.sleep_until_s(clock.now_s() + _LOOK_S)
+        clock.sleep_until_s(clock.now_s() + _POLL_S)
     if not pictures_with_tags:
         raise InputError(f"pose tags: no picture within {PATIENCE_S:g} s; check the camera")
     raise InputError(

@@ -12,7 +12,7 @@ from snakewalk.config.errors import InputError
 
 Corners = Mapping[int, Floats]
 """Corners (4, 2) of each tag by its number, pixels: upper left of the print first, clockwise."""
-_LEAST_PX: Final = 8.0
+_LEAST_SIDE_PX: Final = 8.0
 """Tags with a shorter side are left out: their numbers are guesses (ours)."""
 
 
@@ -73,7 +73,7 @@ class TagDetector:
             corners_px = np.asarray(square, dtype=float).reshape(4, 2)
             if (
                 number not in self._known
-                or np.hypot(*(corners_px - np.roll(corners_px, 1, 0)).T).min() < _LEAST_PX
+                or np.hypot(*(corners_px - np.roll(corners_px, 1, 0)).T).min() < _LEAST_SIDE_PX
             ):
                 continue
             if int(number) in corners_by_id:

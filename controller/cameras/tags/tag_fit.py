@@ -24,7 +24,7 @@ from snakewalk.controller.pose.sample import turned
 from snakewalk.drivers.attitude import rotation_by
 from snakewalk.drivers.types import BodyPose
 
-_TRIED: Final = 3
+_TRIED_TAGS: Final = 3
 """Tags whose poses are tried, the largest in the picture first (ours)."""
 _MISFIT: Final = 6.0
 """A tag farther off than this many standard deviations is left out (ours)."""
@@ -32,7 +32,7 @@ _AMBIGUOUS: Final = 2.0
 """Poses whose errors differ by a smaller factor are ambiguous (ours)."""
 _ROUNDS: Final = 3
 _ROBUST_ROUNDS: Final = 10
-_NEAR_M: Final = 0.02
+_LEAST_DEPTH_M: Final = 0.02
 """Least distance ahead of the lens (ours)."""
 _JOINT_SD_M, _JOINT_SD_RAD = 1e-3, 5e-3
 """Error of the chain that all corners share: backlash and mounting (ours)."""
@@ -55,7 +55,7 @@ class HeadFit:
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
+class _Sighting:
     """Corners of tags in the head's axes and in the picture."""
 
     tags: tuple[int, ...]
@@ -64,10 +64,10 @@ class _Seen:
     pixels: Floats
     """(4 k, 2) without distortion."""
 
-    def only(self, keep: Bools) -> "_Seen":
+    def only(self, keep: Bools) -> "_Sighting":
         tags = tuple(tag for tag, is_kept in zip(self.tags, keep, strict=True) if is_kept)
         corners = np.repeat(keep, 4)
-        return _Seen(tags, self.points_m[corners], self.pixels[corners])
+        return _Sighting(tags, self.points_m[corners], self.pixels[corners])
 
 
 class TagFit:
@@ -88,16 +88,16 @@ class TagFit:
         ``joint_rad`` (J,) are those at the picture's time; ``before`` (3, 3) is an earlier attitude
         of the head, if known.
         """
-        sighting = self._seen(corners_px, joint_rad)
+        sighting = self._sighting(corners_px, joint_rad)
         while sighting.tags:
             start = self._start(sighting, before)
             if start is None:
                 return None
-            robust = self._refined(sighting, *start, weighted=True)
+            robust = self._refined_pose(sighting, *start, weighted=True)
             good = self._per_tag_px(sighting, *robust) <= _MISFIT * self._tags.noise_px
             if good.all():
-                pose = self._refined(sighting, *robust)
-                error_px = float(np.sqrt((self._off_px(sighting, *pose) ** 2).mean()))
+                pose = self._refined_pose(sighting, *robust)
+                error_px = float(np.sqrt((self._corner_errors_px(sighting, *pose) ** 2).mean()))
                 return self._result(sighting, *pose, error_px)
             sighting = sighting.only(good)
         return None
@@ -107,17 +107,17 @@ class TagFit:
 
         A tag has two poses; the more upright one is returned.
         """
-        for number in self._seen(corners_px, np.zeros(len(self._spine.half_m) - 1)).tags:
+        for number in self._sighting(corners_px, np.zeros(len(self._spine.half_m) - 1)).tags:
             mount = self._mounts[number]
             points = tag_corners(mount, self._tags.side_m)
             pixels = self.view.lens.undistorted(corners_px[number])
-            sighting = _Seen((number,), points, pixels)
+            sighting = _Sighting((number,), points, pixels)
             start = self._start(sighting, None)
             if start is not None:
                 return mount.link, self._result(sighting, *start, 0.0)
         return None
 
-    def _seen(self, corners_px: Corners, joint_rad: Floats) -> _Seen:
+    def _sighting(self, corners_px: Corners, joint_rad: Floats) -> _Sighting:
         body = self._spine.in_world(BodyPose(0.0, np.zeros(3), np.eye(3)), joint_rad)
         numbers = [number for number in corners_px if number in self._mounts]
         area = {
@@ -126,19 +126,19 @@ class TagFit:
         }
         numbers.sort(key=lambda number: -area[number])
         if not numbers:
-            return _Seen((), np.zeros((0, 3)), np.zeros((0, 2)))
+            return _Sighting((), np.zeros((0, 3)), np.zeros((0, 2)))
         points = [
             body.link_m[tag.link] + tag_corners(tag, self._tags.side_m) @ body.rotation[tag.link].T
             for tag in (self._mounts[number] for number in numbers)
         ]
         pixels = self.view.lens.undistorted(np.concatenate([corners_px[n] for n in numbers]))
-        return _Seen(tuple(numbers), np.concatenate(points), pixels)
+        return _Sighting(tuple(numbers), np.concatenate(points), pixels)
 
-    def _start(self, sighting: _Seen, before: Floats | None) -> tuple[Floats, Floats] | None:
+    def _start(self, sighting: _Sighting, before: Floats | None) -> tuple[Floats, Floats] | None:
         """Return the best pose from single tags, in the camera's axes."""
         starts = []
         for turn, place_m in self._candidates(sighting):
-            off = self._off_px(sighting, turn, place_m)
+            off = self._corner_errors_px(sighting, turn, place_m)
             starts.append((float(np.sqrt((off**2).mean())), turn, place_m))
         if not starts:
             return None
@@ -155,9 +155,9 @@ class TagFit:
         ]
         return close[int(np.argmax(likely))][1:]
 
-    def _candidates(self, sighting: _Seen) -> Iterator[tuple[Floats, Floats]]:
+    def _candidates(self, sighting: _Sighting) -> Iterator[tuple[Floats, Floats]]:
         flat = square(self._tags.side_m)
-        for k in range(min(_TRIED, len(sighting.tags))):
+        for k in range(min(_TRIED_TAGS, len(sighting.tags))):
             rows = slice(4 * k, 4 * k + 4)
             count, turns, shifts, _ = cv2.solvePnPGeneric(
                 flat,
@@ -171,13 +171,13 @@ class TagFit:
                 rotation = cv2.Rodrigues(turn)[0] @ axes.T
                 yield rotation, shift.ravel() - rotation @ middle
 
-    def _refined(
-        self, sighting: _Seen, turn: Floats, place_m: Floats, *, weighted: bool = False
+    def _refined_pose(
+        self, sighting: _Sighting, turn: Floats, place_m: Floats, *, weighted: bool = False
     ) -> tuple[Floats, Floats]:
         """Fit all corners; ``weighted``: outlying tags count less (Cauchy's weights)."""
         scale_px = _MISFIT * self._tags.noise_px
         for _ in range(_ROBUST_ROUNDS if weighted else _ROUNDS):
-            off = self._off_px(sighting, turn, place_m).ravel()
+            off = self._corner_errors_px(sighting, turn, place_m).ravel()
             slope = self._slope(sighting, turn, place_m)
             if weighted:
                 share = 1.0 / (1.0 + (self._per_tag_px(sighting, turn, place_m) / scale_px) ** 2)
@@ -189,22 +189,22 @@ class TagFit:
             turn = rotation_by(step[3:]) @ turn
         return turn, place_m
 
-    def _per_tag_px(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
-        off = self._off_px(sighting, turn, place_m).reshape(len(sighting.tags), 8)
+    def _per_tag_px(self, sighting: _Sighting, turn: Floats, place_m: Floats) -> Floats:
+        off = self._corner_errors_px(sighting, turn, place_m).reshape(len(sighting.tags), 8)
         return np.asarray(np.sqrt((off**2).mean(axis=1)))
 
-    def _off_px(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
+    def _corner_errors_px(self, sighting: _Sighting, turn: Floats, place_m: Floats) -> Floats:
         """Errors (4 k, 2) of the corners."""
         places = sighting.points_m @ turn.T + place_m
-        ahead = np.maximum(places[:, 2:], _NEAR_M)
+        ahead = np.maximum(places[:, 2:], _LEAST_DEPTH_M)
         shown = places[:, :2] / ahead @ self.view.lens.matrix[:2, :2].T
         return shown + self.view.lens.matrix[:2, 2] - sighting.pixels
 
-    def _slope(self, sighting: _Seen, turn: Floats, place_m: Floats) -> Floats:
+    def _slope(self, sighting: _Sighting, turn: Floats, place_m: Floats) -> Floats:
         """Derivatives (8 k, 6) by position and rotation, in the camera's axes."""
         arm = sighting.points_m @ turn.T
         x, y, z = (arm + place_m).T
-        z = np.maximum(z, _NEAR_M)
+        z = np.maximum(z, _LEAST_DEPTH_M)
         zero = np.zeros_like(x)
         shown = np.stack(
             [np.stack([1.0 / z, zero, -x / z**2], 1), np.stack([zero, 1.0 / z, -y / z**2], 1)], 1
@@ -216,7 +216,9 @@ class TagFit:
         )
         return np.concatenate([by_place, by_place @ by_turn], axis=2).reshape(-1, 6)
 
-    def _result(self, sighting: _Seen, turn: Floats, place_m: Floats, error_px: float) -> HeadFit:
+    def _result(
+        self, sighting: _Sighting, turn: Floats, place_m: Floats, error_px: float
+    ) -> HeadFit:
         slope = self._slope(sighting, turn, place_m)
         noise_px = max(self._tags.noise_px, error_px)
         inner = noise_px**2 * np.linalg.inv(slope.T @ slope)

@@ -59,7 +59,7 @@ class TagView:
                 )
         if camera.place_m is None or camera.aim_m is None:
             return cls(lens, np.full(3, np.nan), np.full((3, 3), np.nan))
-        return cls(lens, *_aimed(camera))
+        return cls(lens, *_aimed_axes(camera))
 
     @property
     def is_placed(self) -> bool:
@@ -110,7 +110,7 @@ class TagView:
         return replace(self, place_m=-axes.T @ shifts[0].ravel(), rotation=axes.T)
 
 
-def _aimed(camera: CameraConfig) -> tuple[Floats, Floats]:
+def _aimed_axes(camera: CameraConfig) -> tuple[Floats, Floats]:
     """Place and axes of a camera that looks at a place; the picture's top is up."""
     place = np.array(camera.place_m)
     aim = np.array(camera.aim_m)

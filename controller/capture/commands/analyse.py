@@ -115,8 +115,10 @@ def _show(facts: dict[str, Any]) -> None:
         "frequency x wavelength": no_wave or f"{facts['wave_speed_body_lengths_s']} body lengths/s",
         "travel": no_travel
         or f"{facts['travel']} of the pulse speed; sliding weight w_d {facts['sliding_weight']}",
-        "angle amplitude": _along(facts["angle_amplitude_rad"], "rad"),
-        "sideways amplitude": _along(facts["lateral_amplitude_body_lengths"], "body lengths"),
+        "angle amplitude": _profile_text(facts["angle_amplitude_rad"], "rad"),
+        "sideways amplitude": _profile_text(
+            facts["lateral_amplitude_body_lengths"], "body lengths"
+        ),
         "bend K": f"{facts['bend_k_rad']} rad",
         "in 7 coefficients": f"{facts['energy_kept']:.2%} of the shapes' energy, "
         f"{facts['energy_kept_least']:.2%} of the worst",
@@ -139,5 +141,5 @@ def _show(facts: dict[str, Any]) -> None:
     console.print(table)
 
 
-def _along(values: list[float], unit: str) -> str:
+def _profile_text(values: list[float], unit: str) -> str:
     return f"{', '.join(map(str, values))} {unit} (head, 1/4, 1/2, 3/4, tail)"

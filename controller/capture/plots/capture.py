@@ -20,8 +20,8 @@ from snakewalk.controller.track.frame_status import FrameStatus
 _BODY = (60, 200, 255)
 _HEAD = (80, 255, 80)
 _TEXT = (255, 255, 255)
-_BAD = (80, 80, 255)
-_BACK = 32
+_BAD_COLOUR = (80, 80, 255)
+_BACKGROUND_GREY = 32
 _TILE_PX = 200
 _LINE_PX = 14
 _LETTERS = 32  # of the text on a tile
@@ -34,7 +34,7 @@ def drawn(
     image: DeepImage, points_px: Floats, status: FrameStatus, wide_px: int, high_px: int
 ) -> Image:
     """(high, wide, 3) the frame enlarged or shrunk to fit, the skeleton, its head, its status."""
-    canvas = np.full((high_px, wide_px, 3), _BACK, dtype=np.uint8)
+    canvas = np.full((high_px, wide_px, 3), _BACKGROUND_GREY, dtype=np.uint8)
     factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
     size = (max(1, round(image.shape[1] * factor)), max(1, round(image.shape[0] * factor)))
     how = cv2.INTER_AREA if factor < 1.0 else cv2.INTER_NEAREST
@@ -58,12 +58,14 @@ def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.
     return np.asarray(line, dtype=np.int32)
 
 
-def _words(canvas: Image, text: str, good: bool, line: int = 0) -> None:
+def _write_line(canvas: Image, text: str, good: bool, line: int = 0) -> None:
     """Write a line of text; ``line`` counts from the lower edge."""
     low = canvas.shape[0] - _LINE_PX * line
-    canvas[low - _LINE_PX - 4 : low] = np.minimum(canvas[low - _LINE_PX - 4 : low], _BACK)
+    canvas[low - _LINE_PX - 4 : low] = np.minimum(
+        canvas[low - _LINE_PX - 4 : low], _BACKGROUND_GREY
+    )
     place = (4, low - 5)
-    tint = _TEXT if good else _BAD
+    tint = _TEXT if good else _BAD_COLOUR
     cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, tint, 1, cv2.LINE_AA)
 
 
@@ -91,9 +93,9 @@ def contact_sheet(
             reason = "" if status is FrameStatus.GOOD else f": {status}"
             name = f"animal {k + 1}, " if len(animals) > 1 else ""
             for line, text in enumerate(wrap(f"{name}{number}{reason}", _LETTERS)[::-1]):
-                _words(tile, text, status is FrameStatus.GOOD, line)
+                _write_line(tile, text, status is FrameStatus.GOOD, line)
             tiles[k].append(tile)
-    empty = np.full((_TILE_PX, _TILE_PX, 3), _BACK, dtype=np.uint8)
+    empty = np.full((_TILE_PX, _TILE_PX, 3), _BACKGROUND_GREY, dtype=np.uint8)
     wide = min(columns, max(len(row) for row in tiles))
     placed = [tile for row in tiles for tile in [*row, *[empty] * (-len(row) % wide)]]
     sheet = np.vstack([np.hstack(placed[k : k + wide]) for k in range(0, len(placed), wide)])
@@ -140,12 +142,12 @@ def trail_picture(
 def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:
     """The animal and a little around it; all of a frame in which it was not found."""
     if status.has_points:
-        rows, columns, points_px = _around(points_px)
+        rows, columns, points_px = _window_of_animal(points_px)
         image = image[rows, columns]
     return drawn(image, points_px, status, _TILE_PX, _TILE_PX)
 
 
-def _around(points_px: Floats) -> tuple[slice, slice, Floats]:
+def _window_of_animal(points_px: Floats) -> tuple[slice, slice, Floats]:
     """Rows and columns of the animal and a little around it; its points (n, 2) within them."""
     reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
     left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
@@ -172,7 +174,7 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     x, y = (int(v) for v in body.origin_px)
     high, wide = body.mask.shape
     mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
-    rows, columns, points_px = _around(points_px)
+    rows, columns, points_px = _window_of_animal(points_px)
     image = image[rows, columns]
     mask = mask[rows, columns]
     high, wide = image.shape[:2]
@@ -187,7 +189,7 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     cv2.polylines(axis, [line], False, _BODY, 2, cv2.LINE_AA, 4)
     for number, (u, v) in enumerate(line.tolist()):
         size = 4 if number % 10 == 0 else 2
-        cv2.circle(chords, (u, v), size * 16, _BAD, -1, cv2.LINE_AA, 4)
+        cv2.circle(chords, (u, v), size * 16, _BAD_COLOUR, -1, cv2.LINE_AA, 4)
     skeleton_picture = drawn(image, points_px, FrameStatus.GOOD, *tile_px)
     named = {
         "image": bare,
@@ -197,8 +199,8 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
         "skeleton, head": skeleton_picture,
     }
     for name, tile in named.items():
-        _words(tile, name, good=True)
-    gap = np.full((tile_px[1], 8, 3), _BACK, dtype=np.uint8)
+        _write_line(tile, name, good=True)
+    gap = np.full((tile_px[1], 8, 3), _BACKGROUND_GREY, dtype=np.uint8)
     sheet = np.hstack([part for tile in named.values() for part in (tile, gap)][:-1])
     with atomic_write(path) as part:
         if not _written(part, sheet):
@@ -259,7 +261,7 @@ def _film_frame(
     if len(animals) == 1:
         status = animals[0].status[number]
         canvas = drawn(image, animals[0].points_px[number], status, *size)
-        _words(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
+        _write_line(canvas, f"{number}: {status}", status is FrameStatus.GOOD)
         return canvas
     canvas = drawn(image, np.zeros((0, 2)), FrameStatus.NOTHING, *size)
     used = 0
@@ -270,5 +272,5 @@ def _film_frame(
             place = (int(line[0, 0]) // 16 + 6, int(line[0, 1]) // 16 - 6)
             text = str(name)
             cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, _TEXT, 1, cv2.LINE_AA)
-    _words(canvas, f"{number}: {used} of {len(animals)} animals", used == len(animals))
+    _write_line(canvas, f"{number}: {used} of {len(animals)} animals", used == len(animals))
     return canvas

@@ -12,7 +12,7 @@ from snakewalk.controller.figures.body_map import body_map
 from snakewalk.controller.figures.style import TIMES, WIDTH_IN, save_picture, style
 from snakewalk.controller.track.track import Track
 
-_SHOWN = 24  # midlines over a recording: more run together
+_SHOWN_FRAMES = 24  # midlines over a recording: more run together
 
 
 def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
@@ -39,7 +39,7 @@ def draw(tracks: list[tuple[Track, str]], file: Path) -> None:
 
 def midlines(axes: Axes, track: Track) -> LineCollection:
     """Draw bodies in place, light ones first, with heads as dots; return the lines."""
-    some = np.unique(np.linspace(0, track.frames - 1, _SHOWN).astype(int))
+    some = np.unique(np.linspace(0, track.frames - 1, _SHOWN_FRAMES).astype(int))
     bodies = track.points[some]
     scale, unit = (1.0, "body lengths") if track.length_m is None else (1e3, "mm")
     bodies = (bodies - bodies.reshape(-1, 2).mean(axis=0)) * scale

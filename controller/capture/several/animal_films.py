@@ -26,11 +26,11 @@ from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DIRT = 0.05  # of the usual area: smaller objects are not mentioned
-_AROUND = 1.2  # of the length of a blob, around it: a faint tail goes on beyond the blob
-_LEAST_AROUND_PX = 24
-_UNSEEN = -1
-_MERGED = -2
-_MISSING = {_UNSEEN: FrameStatus.NOTHING, _MERGED: FrameStatus.MERGED}
+_WINDOW_LENGTHS = 1.2  # of the length of a blob, around it: a faint tail goes on beyond the blob
+_LEAST_WINDOW_PX = 24
+_UNSEEN_FRAME = -1
+_MERGED_FRAME = -2
+_MISSING = {_UNSEEN_FRAME: FrameStatus.NOTHING, _MERGED_FRAME: FrameStatus.MERGED}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def share_of_several(
         return 0.0
     least = SMALLEST * usual_area(blob_frames)
     total = sum(
-        _detected(frame, ground, detector, blobs, int(number))[1].skeleton.status
+        _detected_animal(frame, ground, detector, blobs, int(number))[1].skeleton.status
         is FrameStatus.GOOD
         for frame, ground, blobs in zip(frames, grounds, blob_frames, strict=True)
         for number in np.flatnonzero(blobs.area_px >= least)[:count]
@@ -209,17 +209,17 @@ def capture_animals(
             if index in _MISSING:
                 film.skip(_MISSING[index])
                 continue
-            shown, detection = _detected(frame, ground, detector, blobs, index)
+            shown, detection = _detected_animal(frame, ground, detector, blobs, index)
             film.add(shown, detection)
         if on_progress is not None:
             on_progress()
     return [
-        _captured(*identity_and_film)
+        _captured_animal(*identity_and_film)
         for identity_and_film in zip(animals_found.identities, films, strict=True)
     ]
 
 
-def _captured(identity: Identity, film: FilmParts) -> CapturedAnimal:
+def _captured_animal(identity: Identity, film: FilmParts) -> CapturedAnimal:
     try:
         return CapturedAnimal(film.done(), identity)
     except InputError as error:
@@ -229,29 +229,31 @@ def _captured(identity: Identity, film: FilmParts) -> CapturedAnimal:
 def _plan(identity: Identity, count: int) -> SignedInts:
     """(T,) the animal's blob in each frame, or why it is missing: a key of ``_MISSING``."""
     first, last = identity.tracklets[0], identity.tracklets[-1]
-    out = np.full(count, _UNSEEN, dtype=np.int32)
+    out = np.full(count, _UNSEEN_FRAME, dtype=np.int32)
     if first.begins_in is not None:
-        out[: first.frames[0]] = _MERGED
+        out[: first.frames[0]] = _MERGED_FRAME
     if last.ends_in is not None:
-        out[last.frames[-1] + 1 :] = _MERGED
+        out[last.frames[-1] + 1 :] = _MERGED_FRAME
     touched = False
     next_frame = first.frames[0]
     for tracklet in identity.tracklets:
         touched = touched or (tracklet is not first and tracklet.begins_in is not None)
         if touched:
-            out[next_frame : tracklet.frames[0]] = _MERGED
+            out[next_frame : tracklet.frames[0]] = _MERGED_FRAME
         next_frame = tracklet.frames[-1] + 1
         touched = tracklet.ends_in is not None
         out[tracklet.frames[0] : next_frame] = tracklet.blobs
     return out
 
 
-def _detected(
+def _detected_animal(
     frame: DeepImage, ground: DeepImage, detector: BodyDetector, blobs: Blobs, number: int
 ) -> tuple[DeepImage, Detection]:
     """The frame with this animal alone, and the animal in it."""
     length, width = np.exp(blobs.shape[number][:2])
-    window = own_window(blobs, number, max(_LEAST_AROUND_PX, round(_AROUND * float(length))))
+    window = own_window(
+        blobs, number, max(_LEAST_WINDOW_PX, round(_WINDOW_LENGTHS * float(length)))
+    )
     part = frame[window].copy()
     covered = others_mask(blobs, number, window, round(0.5 * float(width)) + 3)
     part[covered] = ground[window][covered]

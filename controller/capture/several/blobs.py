@@ -15,9 +15,9 @@ from snakewalk.controller.images.silhouette import body_threshold, connected_par
 
 SMALLEST = 0.3
 """Area of a blob over the usual area of an animal; smaller ones are dirt."""
-_AS_LARGE = 0.97  # of the largest area of all animals: with it a background shows all of them
+_LEAST_AREA = 0.97  # of the largest area of all animals: with it a background shows all of them
 _SURFACE = "a smooth surface through each frame"
-_WHOLE = 1.25  # times the area against a fixed background: it contains parts of the animals
+_AREA_GAIN = 1.25  # times the area against a fixed background: it contains parts of the animals
 FEATURES = ("length", "width", "contrast")
 """Columns of ``Blobs.shape``."""
 
@@ -75,13 +75,15 @@ def blobs_of(
     number[kept] = np.arange(1, len(kept) + 1)
     boxes = stats[kept, :4].astype(int)
     label = number[label]
-    measured = [_measured(label, contrast_image, k, box) for k, box in enumerate(boxes, start=1)]
+    measured = [
+        _measured_blob(label, contrast_image, k, box) for k, box in enumerate(boxes, start=1)
+    ]
     middle = np.array([middle_px for middle_px, _ in measured]).reshape(-1, 2)
     shape = np.array([features for _, features in measured]).reshape(-1, len(FEATURES))
     return Blobs(label, boxes, area[kept], middle, shape)
 
 
-def _measured(
+def _measured_blob(
     label: NDArray[np.int32], contrast_image: DeepImage, number: int, box: Ints
 ) -> tuple[Floats, Floats]:
     """Centroid of a blob, and its shape: the rectangle of equal area and perimeter."""
@@ -164,7 +166,7 @@ def detector_of_several(
     nearest = min(away for _, away, _ in tried)
     tried = [trial for trial in tried if trial[1] == nearest]
     largest = max(area for _, _, area in tried)
-    fixed = next(detector for detector, _, area in tried if area >= _AS_LARGE * largest)
+    fixed = next(detector for detector, _, area in tried if area >= _LEAST_AREA * largest)
     surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
     return surface if _shows_more(surface, fixed, frames) else fixed
 
@@ -181,7 +183,7 @@ def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[Dee
         labels = np.unique(blobs.label[changed.label > 0])
         areas = blobs.area_px[labels[labels > 0] - 1]
         moving.append(areas[areas >= least])
-    if sum(areas_px.sum() for areas_px in moving) < _WHOLE * sum(
+    if sum(areas_px.sum() for areas_px in moving) < _AREA_GAIN * sum(
         part.area_px.sum() for part in parts
     ):
         return False
@@ -190,11 +192,11 @@ def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[Dee
     least = SMALLEST * usual_area(parts)
     pieces = np.concatenate([part.area_px[part.area_px >= least] for part in parts])
     steadier = np.std(counts) < np.std([int((part.area_px >= least).sum()) for part in parts])
-    more_alike = _unlike(np.concatenate(moving)) < _unlike(pieces)
+    more_alike = _relative_deviation(np.concatenate(moving)) < _relative_deviation(pieces)
     return bool(steadier and more_alike and np.median(counts) >= 0.5 * count)
 
 
-def _unlike(areas: Floats) -> float:
+def _relative_deviation(areas: Floats) -> float:
     """Median deviation of areas from their median, over the median."""
     usual = float(np.median(areas))
     return float(np.median(np.abs(areas - usual))) / usual

@@ -22,15 +22,15 @@ _MOTION_FRAMES = 8  # frames of a tracklet next to a gap that say how the animal
 _PLACE = 0.06  # of the length: error of a predicted place, in addition to that of its motion
 _TURNS = 0.3  # of the distance travelled in the gap: error of a predicted place
 _LEAST_SPREAD = (0.03, 0.05, 0.03)  # of the logarithms of length, width and contrast
-_CORRELATED = 10.0  # frames whose shapes differ from the animal's usual one in the same way
+_CORRELATED_FRAMES = 10.0  # frames whose shapes differ from the animal's usual one in the same way
 _MOST_GAP = 30  # frames for which an animal without a crossing may be unseen
 _REACH = 1.0  # body lengths that it may move while it is unseen
-_FAR = 60.0  # cost of ending a tracklet that was not seen to enter a crossing
+_LARGEST_COST = 60.0  # cost of ending a tracklet that was not seen to enter a crossing
 _CROSSING = 1e4  # cost of leaving a tracklet of a crossing without a successor
 _ROUNDS = 3
 _PERSISTS = 0.5  # of the film: how long an animal must be followed
-_ALONE = 0.25  # of the film: how long one must be alone that is in contact for the rest
-_ENOUGH = 2000  # frames that show an animal's shape
+_LEAST_SPAN = 0.25  # of the film: how long one must be alone that is in contact for the rest
+_MOST_FRAMES = 2000  # frames that show an animal's shape
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Identity:
         """
         first, last = self.tracklets[0], self.tracklets[-1]
         span = self.span
-        if span >= _ALONE * frames:
+        if span >= _LEAST_SPAN * frames:
             if last.ends_in is not None and first.begins_in is None:
                 span = frames - first.frames[0]
             elif first.begins_in is not None and last.ends_in is None:
@@ -112,15 +112,15 @@ def _links(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> list[_Link]
     out = []
     for olds, news in _groups(cost):
         some = np.array([[cost[old].get(new, np.inf) for new in news] for old in olds])
-        least = min(_FAR, _CROSSING)
+        least = min(_LARGEST_COST, _CROSSING)
         alone = np.array([_CROSSING if tracklets[k].ends_in is not None else least for k in olds])
-        for row, column in _assigned(some, alone):
-            margin = _margin(some, row, column, _assigned(some, alone), alone)
+        for row, column in _assigned_pairs(some, alone):
+            margin = _margin(some, row, column, _assigned_pairs(some, alone), alone)
             out.append(_Link(int(olds[row]), int(news[column]), margin))
     return out
 
 
-def _assigned(cost: Floats, alone: Floats) -> list[tuple[int, int]]:
+def _assigned_pairs(cost: Floats, alone: Floats) -> list[tuple[int, int]]:
     """Pairs (row, column) of least cost; a row may stay alone at a cost of its own."""
     rows, columns = cost.shape
     padded_cost = np.full((rows, columns + rows), 1e9)
@@ -214,7 +214,7 @@ def _costs(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> _Costs:
             + np.sum((later - gap * velocity_later - place) ** 2)
         ) / 2.0
         (mean, number), (mean_later, number_later) = before[i], after[j]
-        variance = spread**2 * _CORRELATED * (1.0 / number + 1.0 / number_later)
+        variance = spread**2 * _CORRELATED_FRAMES * (1.0 / number + 1.0 / number_later)
         variance = np.minimum(variance, 4.0 * spread**2) + np.square(_LEAST_SPREAD)
         shape = float(np.sum((mean - mean_later) ** 2 / variance))
         cost.setdefault(i, {})[j] = float(off) / error**2 + shape
@@ -259,7 +259,7 @@ def _shape_along(
 ) -> tuple[Floats, int]:
     shapes = [tracklets[k].shapes]
     number = len(tracklets[k].frames)
-    while k in following and number < _ENOUGH:
+    while k in following and number < _MOST_FRAMES:
         k = following[k]
         shapes.append(tracklets[k].shapes)
         number += len(tracklets[k].frames)

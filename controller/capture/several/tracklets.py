@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.controller.capture.several.blobs import Blobs
 
-_SHARED = 0.15  # of the smaller blob's pixels: the blobs show the same animal
-_SAME = 0.5  # of the smaller blob's pixels: for sure the same, whatever else is shared
-_ALONE = (0.65, 1.5)  # of the tracklet's area: the blob is still that animal alone
-_JOINED = 1.6  # of the usual area: the blob is more than one animal
+_LEAST_OVERLAP = 0.15  # of the smaller blob's pixels: the blobs show the same animal
+_SAME_OVERLAP = 0.5  # of the smaller blob's pixels: for sure the same, whatever else is shared
+_SINGLE_AREA_RATIO = (0.65, 1.5)  # of the tracklet's area: the blob is still that animal alone
+_JOINED_AREA = 1.6  # of the usual area: the blob is more than one animal
 _PART = 0.6  # of the usual area: the blob is a part of an animal
 _REACH = 0.6  # of the body's length: how far a blob without shared pixels may have moved
 _MOST_SHAPES = 2000  # of a tracklet that are kept
@@ -98,25 +98,25 @@ class TrackletBuilder:
     tracklets: list[Tracklet] = field(default_factory=list)
     _parents: list[int] = field(default_factory=list)
     _nodes: list[_Node] = field(default_factory=list)
-    _before: Blobs | None = None
+    _previous_frame: Blobs | None = None
     _frame: int = 0
 
     def add(self, blobs: Blobs) -> None:
         """Link the blobs of the next frame to those of the frame before."""
         count = len(blobs.area_px)
         nodes: list[_Node | None] = [None] * count
-        if self._before is not None and len(self._nodes):
-            links = self._links(self._before, blobs)
+        if self._previous_frame is not None and len(self._nodes):
+            links = self._links(self._previous_frame, blobs)
             for olds, news in _components(links):
                 self._link(olds, news, blobs, nodes)
         for number in range(count):
             if nodes[number] is None:
-                nodes[number] = self._appeared(blobs, number)
+                nodes[number] = self._new_blob(blobs, number)
         self._nodes = [kept_node for kept_node in nodes if kept_node is not None]
         for number, node in enumerate(self._nodes):
             if isinstance(node, Tracklet):
                 node.add(self._frame, blobs, number)
-        self._before = blobs
+        self._previous_frame = blobs
         self._frame += 1
 
     def done(self) -> list[Tracklet]:
@@ -127,7 +127,7 @@ class TrackletBuilder:
             ends = tracklet.ends_in
             short = len(tracklet.frames) < _FEWEST
             if short and begins is not None and ends is not None:
-                self._joined([begins, ends])
+                self._joined_crossing([begins, ends])
             elif not short or begins is not None or ends is not None:
                 kept.append(tracklet)
         for kept_tracklet in kept:
@@ -144,14 +144,16 @@ class TrackletBuilder:
         shared = _shared_pixels(before.label, blobs.label, len(before.area_px), len(blobs.area_px))
         smaller = np.minimum(before.area_px[:, None], blobs.area_px[None, :])
         part = shared / np.maximum(smaller, 1.0)
-        links = part > _SHARED
+        links = part > _LEAST_OVERLAP
         for old, node in enumerate(self._nodes):
             if not isinstance(node, Tracklet) or not links[old].any():
                 continue
             new = int(np.argmax(part[old]))
-            alone = _ALONE[0] < blobs.area_px[new] / node.area_px < _ALONE[1]
-            if alone and part[old, new] > _SAME and int(np.argmax(part[:, new])) == old:
-                near = part > _SAME
+            alone = (
+                _SINGLE_AREA_RATIO[0] < blobs.area_px[new] / node.area_px < _SINGLE_AREA_RATIO[1]
+            )
+            if alone and part[old, new] > _SAME_OVERLAP and int(np.argmax(part[:, new])) == old:
+                near = part > _SAME_OVERLAP
                 links[old] &= near[old] | (np.arange(links.shape[1]) == new)
                 links[:, new] &= near[:, new] | (np.arange(links.shape[0]) == old)
         lost = np.asarray(~links.any(axis=1))
@@ -177,14 +179,17 @@ class TrackletBuilder:
             new = int(news[0])
             area = float(blobs.area_px[new])
             if isinstance(node, Tracklet):
-                if area < _ALONE[1] * max(node.area_px, 1.0) or area < _ALONE[1] * self.usual_px:
+                if (
+                    area < _SINGLE_AREA_RATIO[1] * max(node.area_px, 1.0)
+                    or area < _SINGLE_AREA_RATIO[1] * self.usual_px
+                ):
                     nodes[new] = node
                     return
             elif node.count > 1 or area < _PART * self.usual_px:
                 nodes[new] = node
                 return
         count = sum(1 if isinstance(old_node, Tracklet) else old_node.count for old_node in before)
-        crossing = self._joined(
+        crossing = self._joined_crossing(
             [old_node.number for old_node in before if isinstance(old_node, _Crossing)]
         )
         for old_node in before:
@@ -193,7 +198,7 @@ class TrackletBuilder:
         for new, share in zip(news, self._shares(blobs.area_px[news], count), strict=True):
             is_whole = blobs.area_px[new] >= _PART * self.usual_px
             if share == 1 and is_whole:
-                nodes[int(new)] = self._new(crossing)
+                nodes[int(new)] = self._new_tracklet(crossing)
             else:
                 nodes[int(new)] = _Crossing(crossing, share)
 
@@ -207,24 +212,24 @@ class TrackletBuilder:
         """How many animals each of some blobs shows, ``count`` in all; at least one each."""
         shares = np.ones(len(areas), dtype=int)
         if len(areas) == 1:
-            return [max(count, 1 if areas[0] < _JOINED * self.usual_px else 2)]
+            return [max(count, 1 if areas[0] < _JOINED_AREA * self.usual_px else 2)]
         for _ in range(count - len(areas)):
             shares[int(np.argmax(areas / self.usual_px - shares))] += 1
         return [int(share) for share in shares]
 
-    def _appeared(self, blobs: Blobs, number: int) -> _Node:
+    def _new_blob(self, blobs: Blobs, number: int) -> _Node:
         """A blob that shows nothing of the frame before."""
         times = float(blobs.area_px[number]) / self.usual_px
-        if times < _JOINED:
-            return self._new(None)
-        return _Crossing(self._joined([]), round(times))
+        if times < _JOINED_AREA:
+            return self._new_tracklet(None)
+        return _Crossing(self._joined_crossing([]), round(times))
 
-    def _new(self, crossing: int | None) -> Tracklet:
+    def _new_tracklet(self, crossing: int | None) -> Tracklet:
         tracklet = Tracklet(crossing)
         self.tracklets.append(tracklet)
         return tracklet
 
-    def _joined(self, crossings: Sequence[int]) -> int:
+    def _joined_crossing(self, crossings: Sequence[int]) -> int:
         """The number of some crossings that are one; of a new one without any."""
         roots = {self._root(crossing) for crossing in crossings}
         if not roots:

@@ -12,8 +12,8 @@ from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
 
 LONGEST_PX = 120.0
 """Bodies up to this length are fitted."""
-_AROUND = 0.3  # of the length, kept on each side
-_LEAST_AROUND_PX = 12.0
+_MARGIN_LENGTHS = 0.3  # of the length, kept on each side
+_LEAST_MARGIN_PX = 12.0
 _SOFTEN = 0.4  # working px, before pixels are left out
 _OWN_BLUR = 0.5  # working px: with that of going between pixels
 _WORKING_PX = 48.0  # length of the body while it is fitted, at most
@@ -39,7 +39,7 @@ class Crop:
 def crop_body(image: DeepImage, ground: DeepImage, points_px: Floats) -> Crop:
     """Cut the body of (P, 2) points out; the crop contains views of both images."""
     length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
-    reach = max(_AROUND * length, _LEAST_AROUND_PX)
+    reach = max(_MARGIN_LENGTHS * length, _LEAST_MARGIN_PX)
     left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
     right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
     window = (slice(int(top), int(bottom)), slice(int(left), int(right)))

@@ -25,18 +25,18 @@ from snakewalk.controller.capture.small_body.ribbon import (
 )
 
 _ROUNDS = 14
-_SETTLED = 1e-4  # of the cost
+_LEAST_GAIN = 1e-4  # of the cost
 _LEARNING = 4  # rounds in which the noise is estimated
 _LEAST_NOISE2 = 1.0
-_LEVEL = 0.35  # prior standard deviation of the log of the mean width
-_EVEN = 0.3  # of second differences of the logs of the widths
+_LEVEL_SIGMA = 0.35  # prior standard deviation of the log of the mean width
+_EVEN_SIGMA = 0.3  # of second differences of the logs of the widths
 _TIP = (-0.55, 0.3)  # of the log of the width at a tip against the next: a round cap
 _BLUR = 0.5  # of the log of the blur
 _STIFF = 1.0  # rad, of second differences of the bends
 _CONTRAST = 0.15  # of the contrast of one frame against the film's
 _DIRECTIONS = 8
-_AWAY = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
-_LOOKED_AT = 12  # frames
+_STARTING_SHIFTS = (0.5, 1.0, 1.8, 3.0)  # of the greatest half width
+_FITTED_FRAMES = 12  # frames
 _WORTH = 30.0  # least gain of the fit, in squares of the noise
 _UNSEEN = 1e-6  # of a parameter that no pixel shows: an error of 1,000
 
@@ -94,15 +94,15 @@ def _frame_prior(contrast: float) -> tuple[Floats, Floats]:
 def _body_prior(start: Floats, size: int) -> tuple[Floats, Floats]:
     stations = len(STATIONS)
     even = np.zeros((stations - 4, size))
-    even[:, 2:BODY] = np.diff(np.eye(stations), 2, axis=0)[1:-1] / _EVEN
+    even[:, 2:BODY] = np.diff(np.eye(stations), 2, axis=0)[1:-1] / _EVEN_SIGMA
     rows = np.zeros((4, size))
-    rows[0, 2:BODY] = 1.0 / stations / _LEVEL
+    rows[0, 2:BODY] = 1.0 / stations / _LEVEL_SIGMA
     rows[1, 1] = 1.0 / _BLUR
     rows[2, [2, 3]] = rows[3, [BODY - 1, BODY - 2]] = np.array([1.0, -1.0]) / _TIP[1]
     target = np.concatenate(
         [
             np.zeros(stations - 4),
-            [start[2:BODY].mean() / _LEVEL, start[1] / _BLUR],
+            [start[2:BODY].mean() / _LEVEL_SIGMA, start[1] / _BLUR],
             [_TIP[0] / _TIP[1]] * 2,
         ]
     )
@@ -139,7 +139,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
             noise2 = max(squares / used_px, _LEAST_NOISE2)
         cost = squares / noise2 + float(soft @ soft)
         if cost < best:
-            done = best - cost < _SETTLED * cost
+            done = best - cost < _LEAST_GAIN * cost
             if turn < _LEARNING:  # the residual is noise only near the end
                 noise2 = max(squares / used_px, _LEAST_NOISE2)
                 cost = squares / noise2 + float(soft @ soft)
@@ -211,7 +211,7 @@ def film_body(
         softness = float(soft_body @ soft_body) + sum(float(v @ v) for v in softs)
         cost = squares / noise2 + softness
         if cost < best:
-            done = best - cost < _SETTLED * cost and turn > _LEARNING
+            done = best - cost < _LEAST_GAIN * cost and turn > _LEARNING
             if turn < 2 * _LEARNING:
                 noise2 = max(squares / used_px, _LEAST_NOISE2)
                 cost = squares / noise2 + softness
@@ -240,7 +240,7 @@ def film_body(
             contrast = float(np.median([frame[2 + BENDS] for frame in frames]))
         else:
             damp *= 10.0
-        step, steps = _eliminated(hss, gs, blocks, damp)
+        step, steps = _eliminated_step(hss, gs, blocks, damp)
         body = kept_body + np.clip(step, -0.7, 0.7) * np.where(
             np.arange(size) == 0, max(1.0, 0.05 * start[0]), 1.0
         )
@@ -268,7 +268,7 @@ def _rows(ribbon: Ribbon, frame: Floats, body: Floats, patch: Patch) -> Floats:
     return rows.reshape(len(rows), -1)
 
 
-def _eliminated(
+def _eliminated_step(
     hss: Floats, gs: Floats, blocks: list[tuple[Floats, Floats, Floats]], damp: float
 ) -> tuple[Floats, list[Floats]]:
     """Step of the shared and of each frame's parameters."""
@@ -304,14 +304,14 @@ def _shadow(body: FilmBody, frames: Sequence[Floats], patches: Sequence[Patch]) 
     soft = float(np.log(np.hypot(spot, 0.7 + 0.3 * wide)))
     tried = [
         np.array([1.0, away * wide * np.cos(angle), away * wide * np.sin(angle), soft])
-        for away in _AWAY
+        for away in _STARTING_SHIFTS
         for angle in np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     ]
     gain = np.zeros(len(tried))
     norm = np.zeros(len(tried))
     squares = 0.0
     count = 0.0
-    every = max(1, len(frames) // _LOOKED_AT)
+    every = max(1, len(frames) // _FITTED_FRAMES)
     for frame, patch in zip(frames[::every], patches[::every], strict=True):
         shape = patch.picture.shape
         shown, slopes = ribbon.picture(frame, body.values, shape)

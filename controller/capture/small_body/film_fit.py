@@ -37,23 +37,25 @@ from snakewalk.controller.track.frame_status import FrameStatus
 ROUGH = 0.01
 """Share of the length: a frame of larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
-_FEWEST = 8
-_MOST = 40
+_FEWEST_SAMPLES = 8
+_MOST_SAMPLES = 40
 _PASSES = 2
 _FORM = 0.004  # of the length: possible error of the model of the tips
-_UNLIKE = 10.0  # times misfit and blur: error of the shared parameters; measured on rendered films
+_UNLIKE_MISFIT = (
+    10.0  # times misfit and blur: error of the shared parameters; measured on rendered films
+)
 _SHARP = 62.0  # times the blur: the medial axis of a longer body is as good
-_LONG = 50.0
-_WIDE = 2.4  # times the blur: as is that of a wide body, by length and half width
+_LONG_BODY = 50.0
+_WIDE_BODY = 2.4  # times the blur: as is that of a wide body, by length and half width
 _BY_BLUR = 0.6  # of the blur of all of the body, the blur at its edges: ``edge_blur_px``
 _LOST = 2.0  # times the median noise: the picture shows something else
-_FOUND = 1.5  # the same for a frame that had no skeleton
-_ALIKE = 0.3  # of the usual contrast
+_MOST_NOISE = 1.5  # the same for a frame that had no skeleton
+_CONTRAST_TOLERANCE = 0.3  # of the usual contrast
 _DOUBT = 0.35  # margin of the ends under which both directions are tried
-_NEAR = 3  # frames for which the margin of the ends counts: one may have no body
+_NEIGHBOUR_FRAMES = 3  # frames for which the margin of the ends counts: one may have no body
 _EVIDENCE = 9.0  # squares of the noise: three standard deviations of the grey values
-_TRIED = 5  # frames of a stretch between doubts
-_FREE = 0.03  # of the body's cover: less is ground
+_TRIED_FRAMES = 5  # frames of a stretch between doubts
+_LEAST_COVER = 0.03  # of the body's cover: less is ground
 _WITHOUT_TIPS = 0.85  # of the error of a medial axis: its tips are measured
 _PRIOR_FRAMES = 2.0  # weight of the surroundings of a place, in frames
 
@@ -103,7 +105,7 @@ def fit_film(
         blur = space.blur_px(float(np.exp(body.values[1])))
         wide = float(np.exp(body.values[2:BODY].max())) / space.scale
         if turn == 0 and (
-            length > _SHARP * blur or (length > _LONG * blur and wide > _WIDE * blur)
+            length > _SHARP * blur or (length > _LONG_BODY * blur and wide > _WIDE_BODY * blur)
         ):
             errors_px = expected_px.copy()
             errors_px[good] = axis_error_px(_BY_BLUR * blur, length)
@@ -124,7 +126,7 @@ def fit_film(
     out = list(skeletons)
     expected = expected_px.copy()
     usual = float(np.median([fit.noise for fit in fits.values()]))
-    unlike_px = _UNLIKE * misfit(list(fits.values()), body) * float(np.exp(body.values[1]))
+    unlike_px = _UNLIKE_MISFIT * misfit(list(fits.values()), body) * float(np.exp(body.values[1]))
     for k, fit in fits.items():
         if fit.noise > _LOST * usual:
             out[k] = replace(out[k], status=FrameStatus.ROUGH) if k in good else out[k]
@@ -232,8 +234,8 @@ def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
     misfits = []
     for fit in fits:
         cover = ribbon.cover(fit.frame, body.values, fit.residual.shape)
-        near = cover > _FREE
-        is_beside = (cover < _FREE / 3.0) & (fit.residual != 0.0)
+        near = cover > _LEAST_COVER
+        is_beside = (cover < _LEAST_COVER / 3.0) & (fit.residual != 0.0)
         if near.any() and is_beside.any():
             squares = fit.residual**2
             more = float(squares[near].mean() - squares[is_beside].mean())
@@ -247,7 +249,7 @@ def _reverse_wrong_stretches(
     """Reverse stretches whose grey values fit the reversed body better."""
     stretches: list[list[int]] = []
     for k in sorted(fits):
-        joined = stretches and k - stretches[-1][-1] <= _NEAR and margin[k] >= _DOUBT
+        joined = stretches and k - stretches[-1][-1] <= _NEIGHBOUR_FRAMES and margin[k] >= _DOUBT
         if joined:
             stretches[-1].append(k)
         else:
@@ -256,7 +258,7 @@ def _reverse_wrong_stretches(
         return
     for stretch in stretches:
         worse = []
-        for k in stretch[:: max(1, len(stretch) // _TRIED)]:
+        for k in stretch[:: max(1, len(stretch) // _TRIED_FRAMES)]:
             other = fit_frame(patches[k], reversed_body(fits[k].frame), body)
             squares = float((other.residual**2).sum() - (fits[k].residual ** 2).sum())
             worse.append(squares / max(fits[k].noise, 1e-9) ** 2)
@@ -288,14 +290,14 @@ def _recover_lost(
             first = near.copy()
             first[:2] += np.subtract(views[k + step].first, view.first)
             fit = fit_frame(Patch(view.picture, view.use), first, body, rounds=16)
-            strange = abs(fit.frame[2 + BENDS] / body.contrast - 1.0) > _ALIKE
-            if fit.noise < _FOUND * usual and not strange:
+            strange = abs(fit.frame[2 + BENDS] / body.contrast - 1.0) > _CONTRAST_TOLERANCE
+            if fit.noise < _MOST_NOISE * usual and not strange:
                 fits[k], views[k] = fit, view
 
 
 def _spread(good: list[int], views: Mapping[int, View]) -> list[int]:
     picture_px = float(np.median([views[k].picture.size for k in good]))
-    most = int(np.clip(_SAMPLE_PX / picture_px, _FEWEST, _MOST))
+    most = int(np.clip(_SAMPLE_PX / picture_px, _FEWEST_SAMPLES, _MOST_SAMPLES))
     place = np.linspace(0, len(good) - 1, min(most, len(good)))
     return [good[round(k)] for k in place]
 
@@ -342,7 +344,7 @@ class FilmGround:
             shape = view.picture.shape
             cover = ribbon.cover(fit.frame, body.values, shape)
             shown, _ = ribbon.picture(fit.frame, body.values, shape, shared=False)
-            free = (cover < _FREE) * view.use
+            free = (cover < _LEAST_COVER) * view.use
             x, y = np.subtract(view.first, low)
             window = (slice(y, y + shape[0]), slice(x, x + shape[1]))
             total[window] += free * (view.picture - shown)

@@ -27,7 +27,7 @@ BODY = 2 + len(STATIONS)
 """Parameters of a body without a shadow: length, log of the blur, log half widths."""
 SHADOW = 4
 """Further ones of a shadow: contrast, x, y relative to the body, log of its blur."""
-_APART = 1.2  # of the blur: distance of spots
+_SPACING_WIDTHS = 1.2  # of the blur: distance of spots
 _ROWS = 7
 
 
@@ -41,7 +41,7 @@ class Grid:
     @classmethod
     def of(cls, body: Floats) -> "Grid":
         """Choose a grid as fine as the blur of ``body`` needs."""
-        spacing = _APART * float(np.exp(body[1]))
+        spacing = _SPACING_WIDTHS * float(np.exp(body[1]))
         wide = 2.0 * float(np.exp(body[2:BODY].max()))
         along = int(np.clip(np.ceil(float(body[0]) / spacing), 24, 120))
         return cls(along, int(np.clip(np.ceil(wide / spacing), 1, _ROWS)))

@@ -18,26 +18,26 @@ from snakewalk.controller.images.cross_profile import (
     seen_across,
 )
 
-_HIGH, _LOW = 0.3, 0.06  # of the usual sum: between these the profile falls towards 0
-_MOST_LOW = 0.2
+_HIGH, _LOW_LEVEL = 0.3, 0.06  # of the usual sum: between these the profile falls towards 0
+_HIGHEST_LOW_LEVEL = 0.2
 _NOISE = 3.0  # standard deviations of the profile beyond the body
 _FINEST_PX = 0.5
 _STEPS = 20  # step along the profile: this, or a part of the width if larger
-_INSIDE = 1.5
-_BEYOND = 3.0  # widths of the profile inside the tip, and beyond it
+_INSIDE_WIDTHS = 1.5
+_BEYOND_WIDTHS = 3.0  # widths of the profile inside the tip, and beyond it
 _LEAST_BEYOND_PX = 10.0
-_ACROSS = 0.9
-_ACROSS_PX = 2.5  # widths and px on each side that are summed
+_ACROSS_WIDTHS = 0.9
+_ACROSS_MARGIN_PX = 2.5  # widths and px on each side that are summed
 _RIM = 0.75  # of the reach on each side: beyond is ground
 _CALM = 95.0  # percentile of the ground: higher values are signal
-_USUAL = (0.3, 0.6)  # of the length: where the sum is the usual one
+_MIDDLE_PART = (0.3, 0.6)  # of the length: where the sum is the usual one
 _ROUND_PX = 1.5
 _BY_BLUR = 2.0
-_LEAST_PX = 3.0  # so far a round tip's profile goes beyond it
+_LEAST_ROUND_PX = 3.0  # so far a round tip's profile goes beyond it
 _LEAST_BLUR_PX = 0.7
 _MOST_DOUBT_PX = 2.0
-_INNER = 4  # chords from a tip: its direction
-_SURE = 0.7  # standard deviation of a tip, of its distance from the end of its profile
+_INNER_POINT = 4  # chords from a tip: its direction
+_SIGMA_SHARE = 0.7  # standard deviation of a tip, of its distance from the end of its profile
 # (constants measured on rendered films)
 NO_ENDS: Final = np.full((2, 3), np.nan)
 """Ends of a frame without a body."""
@@ -60,13 +60,13 @@ def profile_ends(
     wide = max(2.0 * float(np.median(radius_px)), 1.5)
     step = max(_FINEST_PX, wide / _STEPS)
     even = even_line(line, arc_lengths(line), step)
-    first, last = (round(v * len(even)) for v in _USUAL)
+    first, last = (round(v * len(even)) for v in _MIDDLE_PART)
     usual = 0.0
     if last - first > 2:
         usual = float(np.median(_sums(even[first:last], level, wide, step)))
     if usual <= 0.0:
         return NO_ENDS.copy()
-    round_px = max(_LEAST_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
+    round_px = max(_LEAST_ROUND_PX, _ROUND_PX + _BY_BLUR * max(blur_px, _LEAST_BLUR_PX))
     ends = [_end(line_end, level, wide, step, usual, round_px) for line_end in (even[::-1], even)]
     return np.stack(ends)
 
@@ -78,7 +78,7 @@ def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
     order.
     """
     tips = points_px[[0, -1]]
-    ahead = tips - points_px[[_INNER, -1 - _INNER]]
+    ahead = tips - points_px[[_INNER_POINT, -1 - _INNER_POINT]]
     ahead = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     ways = (ends_px, ends_px[::-1])
     near = min(ways, key=lambda path: float(np.hypot(*(path[:, :2] - tips).T).sum()))
@@ -87,7 +87,7 @@ def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
 
 def tips_error_px(beyond_px: Floats) -> float:
     """Expected mean error of the points of a body, from ``beyond_tips_px`` (2, 2)."""
-    return 0.5 * _SURE * float(np.linalg.norm(beyond_px))
+    return 0.5 * _SIGMA_SHARE * float(np.linalg.norm(beyond_px))
 
 
 def _end(
@@ -101,19 +101,23 @@ def _end(
     """Zero of the profile of a line of equal steps, less a round tip, and the doubt."""
     back = min(max(2, round(max(0.5 * wide, 3.0) / step)), len(line) - 1)
     ahead = end_direction(line, back)
-    reach = min(max(_BEYOND * wide, _LEAST_BEYOND_PX), 0.25 * step * len(line) + _LEAST_BEYOND_PX)
+    reach = min(
+        max(_BEYOND_WIDTHS * wide, _LEAST_BEYOND_PX), 0.25 * step * len(line) + _LEAST_BEYOND_PX
+    )
     beyond = np.arange(1, round(reach / step) + 1)[:, None] * step * ahead
-    end = min(round(_INSIDE * wide / step), len(line) - 1)
+    end = min(round(_INSIDE_WIDTHS * wide / step), len(line) - 1)
     path = np.vstack([line[-1 - end :], line[-1] + beyond])
     profile = gaussian_filter1d(_sums(path, level, wide, step) / usual, 1.0 / step)
     lag = max(1, round(2.0 / step))
     rest = profile[end + len(beyond) // 3 :]
     noise = 1.4826 * float(np.median(np.abs(rest[lag:] - rest[:-lag]))) / np.sqrt(2.0)
-    low = float(np.clip(_NOISE * noise, _LOW, _MOST_LOW))
+    low = float(np.clip(_NOISE * noise, _LOW_LEVEL, _HIGHEST_LOW_LEVEL))
     from_px, to_px = (_crossing(profile, share) * step for share in (_HIGH, low))
     hidden_px = (to_px - from_px) * low / (_HIGH - low)
     far_px = to_px - end * step + hidden_px - round_px
-    doubt_px = np.clip(hidden_px - round_px * _LOW / (_HIGH - _LOW), 0.0, _MOST_DOUBT_PX)
+    doubt_px = np.clip(
+        hidden_px - round_px * _LOW_LEVEL / (_HIGH - _LOW_LEVEL), 0.0, _MOST_DOUBT_PX
+    )
     return np.append(line[-1] + far_px * ahead, doubt_px)
 
 
@@ -128,7 +132,7 @@ def _crossing(profile: Floats, share: float) -> float:
 
 def _sums(path: Floats, level: NDArray[np.float32], wide: float, step: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
-    reach = _ACROSS * wide + _ACROSS_PX
+    reach = _ACROSS_WIDTHS * wide + _ACROSS_MARGIN_PX
     across = np.arange(-reach, reach + 0.5 * step, step)
     levels = seen_across(path, level, across)
     rim = levels[:, np.abs(across) > _RIM * reach]

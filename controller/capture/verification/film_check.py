@@ -61,7 +61,7 @@ def crossings(points: Floats) -> Ints:
 REJECTED = {FrameStatus.EMPTY, FrameStatus.KNOT, FrameStatus.LENGTH}
 """Statuses of frames whose skeleton this module rejects."""
 _SAMPLE = 60  # frames from which the usual contrast is learnt
-_USUAL = 75.0  # percentile of the frames: some may lie on empty ground
+_USUAL_PERCENTILE = 75.0  # percentile of the frames: some may lie on empty ground
 _LEAST_LEVELS = 2.0  # grey levels between the body and the ground on either side, in the mean
 _SHARE = 0.3  # of the usual contrast, in the mean on either side
 _NOISE = 3.0  # standard errors of the ground's noise
@@ -69,8 +69,8 @@ _FAINT = 0.15  # of the usual contrast there: the body does not stand out
 _STRETCH = 5  # stations that are averaged
 _ONE_SIDE = 25
 _BOTH_SIDES = 10  # stations of a stretch that does not stand out
-_KNOWN = 0.4  # of the stations: with fewer on ground a side is not judged
-_BEYOND = 0.5  # of the contrast at a tip: with more beyond the tip the body continues
+_LEAST_KNOWN = 0.4  # of the stations: with fewer on ground a side is not judged
+_LEVEL_BEYOND_TIP = 0.5  # of the contrast at a tip: with more beyond the tip the body continues
 _FAINT_SAMPLE = 40
 _FEWEST_FAINT = 6  # frames in which faint parts beyond a tip are searched
 _FAINT_BEYOND = 0.035  # of the usual contrast: least contrast of a faint part beyond a tip
@@ -79,7 +79,7 @@ _LENGTH = 0.08
 _SPREADS = 6.0  # of the usual length; standard deviations
 _FEWEST = 5
 _CONTRADICTS = 0.2  # margin of the ends from which one frame determines them
-_NEAR = 3  # largest number of frames between compared ends
+_NEIGHBOUR_FRAMES = 3  # largest number of frames between compared ends
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +166,7 @@ def agreeing_ends(skeletons: Sequence[Skeleton]) -> list[Skeleton]:
     sign = np.ones(len(skeletons), dtype=int)
     for before, k in pairwise(used):
         against = margin_of(skeletons[k], skeletons[before]) < -_CONTRADICTS
-        sign[k] = -sign[before] if against and k - before <= _NEAR else sign[before]
+        sign[k] = -sign[before] if against and k - before <= _NEIGHBOUR_FRAMES else sign[before]
     wrong = -1 if sign[used].sum() >= 0 else 1
     return [
         skeleton.reversed() if skeleton.status.has_points and sign[k] == wrong else skeleton
@@ -205,7 +205,7 @@ def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
         warnings.simplefilter("ignore", RuntimeWarning)
         along = np.array([np.nanmean(profile.sides, axis=0) @ direction for profile in profiles])
         level = np.nanmean(along, axis=1)
-    best = along[level >= np.nanpercentile(level, _USUAL) * 0.5]
+    best = along[level >= np.nanpercentile(level, _USUAL_PERCENTILE) * 0.5]
     if not len(best):
         return None
     contrast = np.nanmedian(best, axis=0)
@@ -218,27 +218,29 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
     expected = float(usual.contrast.mean())
     for side in sides:
         is_known = np.isfinite(side)
-        if is_known.mean() < _KNOWN:
+        if is_known.mean() < _LEAST_KNOWN:
             continue
         standard_error = profile.noise / np.sqrt(max(1.0, 0.25 * is_known.sum()))
         least = max(_LEAST_LEVELS, _SHARE * expected, _NOISE * standard_error)
         if float(side[is_known].mean()) < least:
             return FrameStatus.EMPTY
     is_visible = np.maximum(usual.contrast, 0.0) > max(_LEAST_LEVELS, 3.0 * profile.noise)
-    faint = [_averaged(side) < _FAINT * usual.contrast for side in sides]
-    if _longest(faint[0] & faint[1] & is_visible) >= _BOTH_SIDES:
+    faint = [_averaged_stations(side) < _FAINT * usual.contrast for side in sides]
+    if _longest_run(faint[0] & faint[1] & is_visible) >= _BOTH_SIDES:
         return FrameStatus.EMPTY
-    if any(_longest(faint_side & is_visible) >= _ONE_SIDE for faint_side in faint):
+    if any(_longest_run(faint_side & is_visible) >= _ONE_SIDE for faint_side in faint):
         return FrameStatus.EMPTY
     for tip, rings in enumerate(profile.rings @ usual.direction):
         near = usual.contrast[5:16] if tip == 0 else usual.contrast[-16:-5]
         strongest = np.nan_to_num(np.nanmax(np.nan_to_num(rings, nan=-np.inf), axis=1), neginf=0.0)
-        if float(strongest.min()) > max(_BEYOND * float(near.mean()), 4.0 * profile.noise):
+        if float(strongest.min()) > max(
+            _LEVEL_BEYOND_TIP * float(near.mean()), 4.0 * profile.noise
+        ):
             return FrameStatus.PART
     return FrameStatus.GOOD
 
 
-def _averaged(side: Floats) -> Floats:
+def _averaged_stations(side: Floats) -> Floats:
     """(101,) averaged over a few stations; infinite without ground."""
     is_known = np.isfinite(side)
     weight = uniform_filter1d(is_known.astype(float), _STRETCH, mode="nearest")
@@ -246,7 +248,7 @@ def _averaged(side: Floats) -> Floats:
     return np.where(is_known & (weight > 0.5), total / np.maximum(weight, 1e-9), np.inf)
 
 
-def _longest(mask: Bools) -> int:
+def _longest_run(mask: Bools) -> int:
     """Length of the longest run."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -7,8 +7,8 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.image_file import ImageFile, StoredImage
 
-_AROUND = 0.3  # of the body's length, kept on each side
-_LEAST_AROUND_PX = 16.0
+_MARGIN_LENGTHS = 0.3  # of the body's length, kept on each side
+_LEAST_MARGIN_PX = 16.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class FrameStore:
 
     def put(self, number: int, frame: DeepImage, points_px: Floats, length_px: float) -> None:
         """Keep the surroundings of some points (P, 2) of a frame (H, W[, C])."""
-        reach = max(_AROUND * length_px, _LEAST_AROUND_PX)
+        reach = max(_MARGIN_LENGTHS * length_px, _LEAST_MARGIN_PX)
         left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
         right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
         part = np.ascontiguousarray(frame[top:bottom, left:right])

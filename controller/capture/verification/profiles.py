@@ -11,11 +11,11 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.verification.frame_store import CutOut
 from snakewalk.controller.images.medial_axis import Skeleton
 
-_ON = 0.5  # of the half width on both sides of the line: the body
-_BESIDE_PX = 1.5  # off the boundary and half of the half width: the ground begins
-_ACROSS = 6  # samples of the ground on each side
-_OWN_PX = 2.0  # nearer to another part of the body than its half width and this: no ground
-_APART = 3.0  # half widths along the body from which a part is another one
+_INNER_HALF_WIDTH = 0.5  # of the half width on both sides of the line: the body
+_FIRST_GAP_PX = 1.5  # off the boundary and half of the half width: the ground begins
+_SAMPLES_ACROSS = 6  # samples of the ground on each side
+_BODY_MARGIN_PX = 2.0  # nearer to another part of the body than its half width and this: no ground
+_LEAST_HALF_WIDTHS_AWAY = 3.0  # half widths along the body from which a part is another one
 _RINGS = 6  # distances beyond a tip
 _RING_FROM, _RING_TO = (1.0, 1.5), (2.5, 3.0)  # widths and px from a tip
 _FAN = np.radians(np.linspace(-70.0, 70.0, 29))
@@ -43,16 +43,18 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
     along = np.gradient(line, axis=0)
     along = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
     side = np.column_stack([-along[:, 1], along[:, 0]])
-    inner = np.linspace(-_ON, _ON, 3)
-    on = _seen(image, line[:, None] + (inner * half[:, None])[..., None] * side[:, None]).mean(1)
-    first = 1.5 * half + _BESIDE_PX
-    reach = first[:, None] + np.linspace(0.0, 1.0, _ACROSS) * np.maximum(half, 2.0)[:, None]
+    inner = np.linspace(-_INNER_HALF_WIDTH, _INNER_HALF_WIDTH, 3)
+    on = _grey_values(
+        image, line[:, None] + (inner * half[:, None])[..., None] * side[:, None]
+    ).mean(1)
+    first = 1.5 * half + _FIRST_GAP_PX
+    reach = first[:, None] + np.linspace(0.0, 1.0, _SAMPLES_ACROSS) * np.maximum(half, 2.0)[:, None]
     grounds = []
     noise = []
     for sign in (1.0, -1.0):
         places = line[:, None] + sign * reach[..., None] * side[:, None]
-        levels = _seen(image, places)
-        levels[_own(places, line, half)] = np.nan
+        levels = _grey_values(image, places)
+        levels[_lies_on_same_body(places, line, half)] = np.nan
         noise.append(np.diff(levels, axis=0).ravel())
         grounds.append(_mean(levels))
     steps = np.concatenate(noise)
@@ -73,14 +75,14 @@ def _mean(levels: Floats) -> Floats:
     return np.where(2 * count >= levels.shape[1], total / np.maximum(count, 1), np.nan)
 
 
-def _own(places: Floats, line: Floats, half: Floats) -> Floats:
+def _lies_on_same_body(places: Floats, line: Floats, half: Floats) -> Floats:
     """(P, A) whether places next to the line lie on another part of the same body."""
     chord = float(np.hypot(*np.diff(line, axis=0).T).mean())
-    away = max(2, int(np.ceil(_APART * float(half.max()) / max(chord, 1e-9))) + 4)
+    away = max(2, int(np.ceil(_LEAST_HALF_WIDTHS_AWAY * float(half.max()) / max(chord, 1e-9))) + 4)
     square = _squares(places, line)
     number = np.arange(len(line))
     other = np.abs(number[:, None] - number) >= away
-    near = square < (half + _OWN_PX) ** 2
+    near = square < (half + _BODY_MARGIN_PX) ** 2
     return np.asarray((near & other[:, None]).any(axis=-1))
 
 
@@ -99,9 +101,9 @@ def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floa
     angle = np.arctan2(outward[1], outward[0]) + _FAN
     unit = np.column_stack([np.cos(angle), np.sin(angle)])
     places = line[0] + away[:, None, None] * unit
-    levels = _seen(image, places)
+    levels = _grey_values(image, places)
     square = _squares(places, line[_AT_TIP.stop :])
-    levels[(square < (half[_AT_TIP.stop :] + _OWN_PX) ** 2).any(axis=-1)] = np.nan
+    levels[(square < (half[_AT_TIP.stop :] + _BODY_MARGIN_PX) ** 2).any(axis=-1)] = np.nan
     is_known = np.asarray(np.isfinite(levels).all(axis=-1))
     out = np.full(levels.shape, np.nan)
     for k, ring in enumerate(levels):
@@ -112,7 +114,7 @@ def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floa
     return out
 
 
-def _seen(image: NDArray[np.float32], places: Floats) -> Floats:
+def _grey_values(image: NDArray[np.float32], places: Floats) -> Floats:
     """(..., C) grey values at places (A, B, 2); NaN outside the image."""
     x, y = np.moveaxis(places, -1, 0).astype(np.float32)
     shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -16,8 +16,8 @@ from snakewalk.controller.images.body_detector import BodyDetector, make_detecto
 
 _FRAMES: Final = 20
 _THRESHOLDS: Final = (0.4, 0.6, 1.6)  # of the contrast at the boundary
-_MORE: Final = 0.25  # of the frames: this share more must show a whole animal
-_MOST: Final = 0.5  # of the frames, at least
+_LEAST_GAIN: Final = 0.25  # of the frames: this share more must show a whole animal
+_LEAST_SHARE: Final = 0.5  # of the frames, at least
 
 
 def remedy(options: CaptureOptions, film: OpenedFilm, detector: BodyDetector) -> str | None:
@@ -31,11 +31,11 @@ def remedy(options: CaptureOptions, film: OpenedFilm, detector: BodyDetector) ->
     """
     frames = film.some[:_FRAMES]
     before = whole_share(detector, frames)
-    tried = list(_tried(options, film, detector, frames))
+    tried = list(_tried_options(options, film, detector, frames))
     if not tried:
         return None
     words, share = max(tried, key=lambda trial: trial[1])
-    if share < max(_MOST, before + _MORE):
+    if share < max(_LEAST_SHARE, before + _LEAST_GAIN):
         return None
     command = shlex.join(
         ["snakewalk", "animal", "capture", str(options.recording), "-o", str(options.output)]
@@ -46,7 +46,7 @@ def remedy(options: CaptureOptions, film: OpenedFilm, detector: BodyDetector) ->
     )
 
 
-def _tried(
+def _tried_options(
     options: CaptureOptions,
     film: OpenedFilm,
     detector: BodyDetector,

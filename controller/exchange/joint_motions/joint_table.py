@@ -24,7 +24,7 @@ _TIME: Final = {
     **dict.fromkeys(("time_ns", "t_ns", "timestamp_ns"), "ns"),
 }
 """Names of the column of time, and the unit that each states."""
-_OTHERS: Final = {"frame", "point", "frame_idx", "scorer"}
+_MIDLINE_COLUMNS: Final = {"frame", "point", "frame_idx", "scorer"}
 _UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
 
 
@@ -39,9 +39,12 @@ class JointTable:
         except (UnicodeDecodeError, IndexError):
             return False
         cells = re.split(r"[,;\t]", line)
-        names = [_plain(cell.strip(' "')) for cell in cells]
+        names = [_plain_name(cell.strip(' "')) for cell in cells]
         return (
-            len(cells) > 1 and names[0] in _TIME and not {*names} & _OTHERS and b"\x00" not in head
+            len(cells) > 1
+            and names[0] in _TIME
+            and not {*names} & _MIDLINE_COLUMNS
+            and b"\x00" not in head
         )
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
@@ -63,13 +66,13 @@ class JointTable:
         unit = _unit_of(path, units, request)
         hint = "or end the names of columns in _rad or _deg"
         angles = radians(f"{path}:", values[:, 1:], unit, hint)
-        time_s = values[:, 0] * _second(path, cells[0], request, values[:, 0])
+        time_s = values[:, 0] * _time_unit_s(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, angles)
 
 
-def _second(path: Path, column: str, request: JointRequest, time: Floats) -> float:
+def _time_unit_s(path: Path, column: str, request: JointRequest, time: Floats) -> float:
     """Return the size in seconds of the unit that the column of time or the user states."""
-    unit = _TIME[_plain(column)]
+    unit = _TIME[_plain_name(column)]
     if unit is not None and request.time_unit not in (None, unit):
         raise InputError(
             f"--time-unit {request.time_unit}: {path} states {unit}; leave the option out"
@@ -77,7 +80,7 @@ def _second(path: Path, column: str, request: JointRequest, time: Floats) -> flo
     return second(path, time, column, unit or request.time_unit)
 
 
-def _plain(name: str) -> str:
+def _plain_name(name: str) -> str:
     """Return a column's name in lower case, ``time [s]`` as ``time_s``."""
     return re.sub(r"[\s_]*[\[(](\w+)[\])]", r"_\1", name.strip().lower())
 

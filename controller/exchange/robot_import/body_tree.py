@@ -16,7 +16,7 @@ _ON_AXIS: Final = 0.2
 """Distance of a wheel's centre of mass from its axis over its distance from the link's (ours)."""
 
 
-_STRAIGHT: Final = 0.9
+_STRAIGHT_SHARE: Final = 0.9
 """Distance of a spine's ends over the way along its joints (ours)."""
 
 
@@ -115,19 +115,21 @@ def _root(model: mujoco.MjModel, data: mujoco.MjData) -> MovingBody:
             f"body {element_name(model, 'body', first)}: is bolted to the world; a robot's first "
             "body has a freejoint, or slides"
         )
-    moving_bodies = {first: MovingBody(element_name(model, "body", first), _welded(model, first))}
+    moving_bodies = {
+        first: MovingBody(element_name(model, "body", first), _welded_bodies(model, first))
+    }
     for body in range(first + 1, model.nbody):
         above = int(weld[model.body_parentid[body]])
         if weld[body] != body or above not in moving_bodies:
             continue
-        moving_body = MovingBody(element_name(model, "body", body), _welded(model, body))
+        moving_body = MovingBody(element_name(model, "body", body), _welded_bodies(model, body))
         moving_body.parent, moving_body.hinges = moving_bodies[above], _hinges(model, data, body)
         moving_bodies[above].children.append(moving_body)
         moving_bodies[body] = moving_body
     return moving_bodies[first]
 
 
-def _welded(model: mujoco.MjModel, body: int) -> list[int]:
+def _welded_bodies(model: mujoco.MjModel, body: int) -> list[int]:
     return [int(b) for b in np.flatnonzero(model.body_weldid == body)]
 
 
@@ -214,9 +216,11 @@ def _spine(root: MovingBody) -> list[MovingBody]:
         while path[-1].parent is not None:
             path.append(path[-1].parent)
         paths.append(path[::-1])
-    paths.sort(key=lambda path: (not _is_straight(path), -sum(len(b.hinges) for b in path)))
+    paths.sort(key=lambda path: (not _is_straight_path(path), -sum(len(b.hinges) for b in path)))
     for path in paths:
-        if len(path) > 1 and all(_is_pair(_others(branch_body, path)) for branch_body in path):
+        if len(path) > 1 and all(
+            _is_pair(_bodies_off_path(branch_body, path)) for branch_body in path
+        ):
             return path
     fork = next((body for body in _walk(root) if not _is_pair(body.children[1:])), root)
     names = ", ".join(child.name for child in fork.children)
@@ -226,14 +230,14 @@ def _spine(root: MovingBody) -> list[MovingBody]:
     )
 
 
-def _is_straight(path: list[MovingBody]) -> bool:
+def _is_straight_path(path: list[MovingBody]) -> bool:
     """Whether the joints of a path lie on about one line."""
     anchors = [hinge.anchor_m for body in path for hinge in body.hinges]
     steps = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(anchors))
-    return steps == 0.0 or float(np.linalg.norm(anchors[-1] - anchors[0])) > _STRAIGHT * steps
+    return steps == 0.0 or float(np.linalg.norm(anchors[-1] - anchors[0])) > _STRAIGHT_SHARE * steps
 
 
-def _others(body: MovingBody, path: list[MovingBody]) -> list[MovingBody]:
+def _bodies_off_path(body: MovingBody, path: list[MovingBody]) -> list[MovingBody]:
     return [child for child in body.children if child not in path]
 
 
@@ -267,7 +271,7 @@ def _with_branches(path: list[MovingBody], wheels: list[list[int]]) -> BodyTree:
         number[id(body)] = len(groups) - 1
     branches = []
     for body in path:
-        for child in _others(body, path):
+        for child in _bodies_off_path(body, path):
             chain = list(_walk(child))
             branches.append(
                 Branch(

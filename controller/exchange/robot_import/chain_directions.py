@@ -74,7 +74,7 @@ def chain_directions(
             f"joint {hinges[0].name}: its axis lies along the body; joints yaw or pitch"
         )
     forward = (-1.0 if reverse else 1.0) * forward / size
-    up = _up(first, across, forward, hinges[0].name, notes)
+    up = _up_direction(first, across, forward, hinges[0].name, notes)
     up = up - (up @ forward) * forward
     up /= np.linalg.norm(up)
     first_is_yaw = abs(float(first @ up)) > math.sqrt(0.5)
@@ -95,7 +95,7 @@ def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
         kind = kinds[-1] != turns
         if deviation <= ROUNDED_RAD and kind:
             across = hinge.axis if across is None else across
-            deviation = max(deviation, _off(hinge.axis, across, len(kinds)))
+            deviation = max(deviation, _angle_off(hinge.axis, across, len(kinds)))
         if deviation > ROUNDED_RAD:
             raise InputError(
                 f"joint {hinge.name}: its axis is {math.degrees(off):.3g} degrees from that of "
@@ -116,7 +116,7 @@ def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
     return kinds
 
 
-def _off(axis: Floats, across: Floats, steps: int) -> float:
+def _angle_off(axis: Floats, across: Floats, steps: int) -> float:
     return math.acos(min(abs(float(axis @ across)), 1.0)) / max(steps, 1)
 
 
@@ -125,7 +125,7 @@ def _mean_axis(axes: list[Floats]) -> Floats:
     return np.asarray(total / np.linalg.norm(total))
 
 
-def _up(
+def _up_direction(
     first: Floats, across: Floats | None, forward: Floats, name: str, notes: list[str]
 ) -> Floats:
     axes = [first] if across is None else [first, across]

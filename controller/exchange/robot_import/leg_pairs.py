@@ -14,10 +14,10 @@ from snakewalk.controller.exchange.robot_import.body_tree import BodyTree, Branc
 from snakewalk.controller.exchange.robot_import.chain_directions import ROUNDED_RAD, ChainDirections
 from snakewalk.controller.exchange.robot_import.link_figures import LinkFigures
 
-_ASIDE: Final = 0.02
+_LEG_TOLERANCE: Final = 0.02
 """Share of a leg's reach that a joint may be off the straight leg (ours)."""
 _MOST_JOINTS: Final = 4
-_MOST_RAD: Final = 3.05
+_LARGEST_RANGE_RAD: Final = 3.05
 _FOOT_M: Final = 0.012
 """Radius of a foot that no shape states: that of a robot file."""
 
@@ -128,7 +128,7 @@ def _leg(
             for v in model.jnt_range[hinge.joint]
         )
         limited = bool(model.jnt_limited[hinge.joint])
-        limits.append(min(-low, high, _MOST_RAD) if limited else _MOST_RAD)
+        limits.append(min(-low, high, _LARGEST_RANGE_RAD) if limited else _LARGEST_RANGE_RAD)
         if limits[-1] <= 0.05:
             raise InputError(
                 f"joint {hinge.name}: its range, {low:.3g} to {high:.3g} rad, leaves less than "
@@ -160,7 +160,7 @@ def _check_straight(
             continue
         middle = spine_up if axis == "r" else places[0][0]
         for place, name in places:
-            if abs(place - middle) > _ASIDE * reach_m:
+            if abs(place - middle) > _LEG_TOLERANCE * reach_m:
                 raise InputError(
                     f"joint {name} of leg {branch.name}: is {abs(place - middle):.3g} m off the "
                     "straight leg at zero angles; a leg stands straight out to the side there, at "
@@ -203,7 +203,7 @@ def _pair(
     left, right = legs
     name = tree.names[link]
     same = left.axes == right.axes and all(
-        abs(a - b) <= _ASIDE * sum(left.segments_m)
+        abs(a - b) <= _LEG_TOLERANCE * sum(left.segments_m)
         for a, b in zip(
             [left.hip_m, *left.segments_m], [right.hip_m, *right.segments_m], strict=True
         )

@@ -13,13 +13,13 @@ from snakewalk.controller.exchange.robot_import.body_tree import BodyTree
 from snakewalk.controller.exchange.robot_import.chain_directions import ChainDirections
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 
-_ASIDE: Final = 1e-3
+_LINE_TOLERANCE: Final = 1e-3
 """Share of the body's length that a joint may be off the line of the others (ours)."""
-_SHORTEST_M: Final = 0.005
+_SHORTEST_LINK_M: Final = 0.005
 """Length of a link that a robot file accepts."""
-_ALIKE: Final = 2e-3
+_SHAPE_TOLERANCE: Final = 2e-3
 """Difference of two links' shapes, over their length, that counts as the same shape (ours)."""
-_EVEN: Final = 1e-6
+_LENGTH_TOLERANCE: Final = 1e-6
 """Difference of two lengths that a cylinder's centre and inertia state (ours)."""
 _SPREAD: Final = 0.2
 """Difference of an inertia that is reported (ours)."""
@@ -113,12 +113,12 @@ class ChainFigures:
             for hinge, offset_m in zip(some, offsets_m, strict=True):
                 off_m = abs(offset_m - middle_m)
                 worst_m = max(worst_m, off_m)
-                if off_m > max(_ASIDE, 0.05 / len(hinges)) * span_m:
+                if off_m > max(_LINE_TOLERANCE, 0.05 / len(hinges)) * span_m:
                     raise InputError(
                         f"joint {hinge.name}: lies {off_m:.4g} m from the line of the others at "
                         "zero angles; a chain needs straight links, straight at zero angles"
                     )
-        if worst_m > _ASIDE * span_m:
+        if worst_m > _LINE_TOLERANCE * span_m:
             self.notes.append(
                 f"joints lie up to {worst_m:.2g} m from one line at zero angles; the robot's "
                 "file puts them on the line"
@@ -134,7 +134,7 @@ class ChainFigures:
     def _links(self) -> list[LinkFigures]:
         inner_m = [-float(step) for step in np.diff(self.joints_m)]
         lengths_m = [0.0, *(length if length > 1e-6 else 0.0 for length in inner_m), 0.0]
-        known_links = [k for k in range(1, len(lengths_m) - 1) if lengths_m[k] > _SHORTEST_M]
+        known_links = [k for k in range(1, len(lengths_m) - 1) if lengths_m[k] > _SHORTEST_LINK_M]
         last = len(lengths_m) - 1
         ends = {k: self._end_m(k, lengths_m, known_links) for k in (0, last)}
         for k, (length_m, why) in ends.items():
@@ -142,10 +142,10 @@ class ChainFigures:
             end = "head" if k == 0 else "tail"
             self.notes.append(f"{end} {self._tree.names[k]}: {length_m:.4g} m long, {why}")
         for k, length_m in enumerate(lengths_m):
-            if 0.0 < length_m <= _SHORTEST_M:
+            if 0.0 < length_m <= _SHORTEST_LINK_M:
                 raise InputError(
                     f"{self._tree.names[k]}: is {length_m:.3g} m long; a link is longer than "
-                    f"{_SHORTEST_M:g} m, or has no length: --scale enlarges"
+                    f"{_SHORTEST_LINK_M:g} m, or has no length: --scale enlarges"
                 )
         radii_m = self._radii_m(lengths_m)
         return [self._link(k, lengths_m[k], radii_m[k]) for k in range(last + 1)]
@@ -154,20 +154,20 @@ class ChainFigures:
         """Length of the head or the tail, and what states it."""
         name = self._tree.names[k]
         key = f"{name}.length_m"
-        given = self._assumed.given(key, _SHORTEST_M, 100.0)
+        given = self._assumed.given(key, _SHORTEST_LINK_M, 100.0)
         if given is not None:
             return given, "by option"
         sign = 1.0 if k == 0 else -1.0
         joint_m = self.joints_m[0] if k == 0 else self.joints_m[-1]
-        even_m = self._even_m(k, sign, joint_m)
+        even_m = self._even_length_m(k, sign, joint_m)
         if even_m is not None:
             return even_m, "as its centre of mass and inertia state (an even cylinder)"
         reach_m = self._reach_m(k, sign, joint_m)
-        if reach_m is not None and reach_m > _SHORTEST_M:
+        if reach_m is not None and reach_m > _SHORTEST_LINK_M:
             for other in sorted(known_links, key=lambda link: abs(link - k)):
                 its_joint_m = self.joints_m[other] if k == 0 else self.joints_m[other - 1]
                 its_reach_m = self._reach_m(other, sign, its_joint_m)
-                if its_reach_m is None or abs(its_reach_m - reach_m) > _ALIKE * reach_m:
+                if its_reach_m is None or abs(its_reach_m - reach_m) > _SHAPE_TOLERANCE * reach_m:
                     continue
                 beyond_m = lengths_m[other] - its_reach_m
                 if abs(beyond_m) < 1e-9:
@@ -185,11 +185,11 @@ class ChainFigures:
                 f"as its neighbour {self._tree.names[nearest]}: it has no shape of its own",
             )
         centre_m = 2.0 * sign * (float(self._masses[k].centre @ self._directions.forward) - joint_m)
-        if centre_m > _SHORTEST_M:
+        if centre_m > _SHORTEST_LINK_M:
             return centre_m, "twice the distance of its centre of mass from its joint"
         length_m = self._assumed.number(
             key,
-            _SHORTEST_M,
+            _SHORTEST_LINK_M,
             100.0,
             f"link {name}: states no length: it has no shape, no neighbour with a length, and its "
             "centre of mass is at its joint",
@@ -197,7 +197,7 @@ class ChainFigures:
         )
         return length_m, "by option"
 
-    def _even_m(self, k: int, sign: float, joint_m: float) -> float | None:
+    def _even_length_m(self, k: int, sign: float, joint_m: float) -> float | None:
         """Length of an even cylinder, if mass centre and inertia state the same one."""
         mass = self._masses[k]
         directions = self._directions
@@ -207,9 +207,11 @@ class ChainFigures:
         along = float(directions.forward @ mass.inertia @ directions.forward)
         across = float(directions.left @ mass.inertia @ directions.left)
         square = 12.0 * (across - 0.5 * along) / mass.kg
-        if length_m <= _SHORTEST_M or square <= 0.0:
+        if length_m <= _SHORTEST_LINK_M or square <= 0.0:
             return None
-        return length_m if abs(math.sqrt(square) - length_m) <= _EVEN * length_m else None
+        return (
+            length_m if abs(math.sqrt(square) - length_m) <= _LENGTH_TOLERANCE * length_m else None
+        )
 
     def _reach_m(self, k: int, sign: float, joint_m: float) -> float | None:
         """How far a link's shape reaches from a joint, forward (1) or back (-1)."""

@@ -40,7 +40,7 @@ _NOT_READ: Final = frozenset(
 )
 _SILENT: Final = frozenset({"option", "size", "visual", "statistic"})
 """Elements that do not describe the robot."""
-_OLD: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
+_OLD_ATTRIBUTES: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
 """Attributes of older MuJoCo versions that this one does not know."""
 _FILES: Final = ("file",)
 _MOST_INCLUDES: Final = 50
@@ -124,7 +124,7 @@ def _drop_unread(source: ModelSource) -> None:
                 several = child.tag in ("sensor", "actuator", "contact", "keyframe", "custom")
                 dropped += [child.tag] * (max(len(child), 1) if several else 1)
     for element in source.root.iter():
-        for name in ("material", *_OLD.get(element.tag, ())):
+        for name in ("material", *_OLD_ATTRIBUTES.get(element.tag, ())):
             if element.attrib.pop(name, None) is not None and name not in (
                 "material",
                 "coordinate",
@@ -185,7 +185,7 @@ def _resolve_meshes(
     root = source.root
     missing = _find_meshes(root, path)
     if missing:
-        source.notes.append(_without(root, missing, defaults, assumed))
+        source.notes.append(_replace_missing_meshes(root, missing, defaults, assumed))
 
 
 def _find_meshes(root: LineElement, path: Path) -> dict[str, str]:
@@ -214,7 +214,7 @@ def _find_meshes(root: LineElement, path: Path) -> dict[str, str]:
     return missing
 
 
-def _without(
+def _replace_missing_meshes(
     root: LineElement, missing: dict[str, str], defaults: _Defaults, assumed: Assumptions
 ) -> str:
     """Replace the shapes of missing meshes; return what was done."""

@@ -24,7 +24,7 @@ from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 _MOST_MEMORY_BYTES = 2_000_000_000
 _MOST_CPU_S = 10
 """Limits of MuJoCo's compiler and of xacro: memory and CPU time (ours)."""
-_SAID: Final = 3
+_REPORTED_EXIT: Final = 3
 _LIMITS: Final = """
 import sys
 *words, memory_bytes, cpu_s = sys.argv[1:]
@@ -43,7 +43,7 @@ try:
     mujoco.mj_saveModel(mujoco.MjModel.from_xml_path(source), made, None)
 except (ValueError, RuntimeError, MemoryError) as error:
     print(error or type(error).__name__)
-    sys.exit({_SAID})
+    sys.exit({_REPORTED_EXIT})
 """
 _XACRO: Final = f"""{_LIMITS}
 import xacro
@@ -64,7 +64,7 @@ def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelS
     if replaced:
         notes.append(f"{replaced} characters are not UTF-8; names that hold them differ")
     if any(element.tag.startswith("xacro:") for element in root.iter()):
-        root, _ = parse(path, name="expanded xacro", text=_expanded(path))
+        root, _ = parse(path, name="expanded xacro", text=_expanded_xacro(path))
         notes.append("xacro was run with its default arguments; lines are those of its output")
     check_parts(path, root)
     if root.tag == "sdf":
@@ -76,31 +76,31 @@ def load_model(path: Path, assumed: Assumptions) -> tuple[mujoco.MjModel, ModelS
         )
     if root.tag == "mujoco":
         source = prepare_mjcf(root, path, assumed)
-        model, fault = _compiled(source)
+        model, fault = _compiled_model(source)
     else:
-        copy = _copied(root)
+        copy = _copied_element(root)
         source = prepare_urdf(root, path)
-        model, fault = _compiled(source)
+        model, fault = _compiled_model(source)
         if model is None and any(mesh.get("filename") for mesh in root.iter("mesh")):
             source = prepare_urdf(copy, path, meshes=False)  # one that MuJoCo cannot use
-            model, fault = _compiled(source)
+            model, fault = _compiled_model(source)
     if model is None:
         raise InputError(f"{path}: MuJoCo cannot read it: {fault}")
     source.notes[:0] = notes
     return model, source
 
 
-def _copied(element: LineElement) -> LineElement:
+def _copied_element(element: LineElement) -> LineElement:
     copy = LineElement(element.tag, dict(element.attrib))
     copy.file = element.file
     copy.line = element.line
     for child in element:
         assert isinstance(child, LineElement)
-        copy.append(_copied(child))
+        copy.append(_copied_element(child))
     return copy
 
 
-def _expanded(path: Path) -> str:
+def _expanded_xacro(path: Path) -> str:
     """URDF of a xacro file, by the xacro that is installed.
 
     Raises:
@@ -130,7 +130,7 @@ def _expanded(path: Path) -> str:
     return ended.stdout
 
 
-def _compiled(source: ModelSource) -> tuple[mujoco.MjModel | None, str]:
+def _compiled_model(source: ModelSource) -> tuple[mujoco.MjModel | None, str]:
     """Compiled model, or None and MuJoCo's message with the user's lines."""
     text, places = source.text()
     with TemporaryDirectory() as folder:
@@ -152,7 +152,7 @@ def compile_model(source: Path, compiled_file: Path) -> str | None:
     ended = run_code(
         _COMPILER, str(source), str(compiled_file), *limits, folder=source.parent
     )  # MuJoCo writes its log there
-    if ended.returncode == _SAID:
+    if ended.returncode == _REPORTED_EXIT:
         return ended.stdout
     if ended.returncode or not compiled_file.is_file():
         return (

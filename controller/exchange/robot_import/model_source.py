@@ -16,7 +16,7 @@ MOST_BYTES: Final = 20_000_000
 """Size of a model's file (ours)."""
 MOST_PARTS: Final = 1000
 """Bodies and joints of a model (ours)."""
-_MOST_NESTED: Final = 600
+_DEEPEST_NESTING: Final = 600
 """Depth of elements (ours)."""
 _DECLARATION: Final = re.compile(r"^\s*<\?xml[^>]*\?>")
 _LINE: Final = re.compile(r"\bline (\d+)")
@@ -91,7 +91,7 @@ def parse(path: Path, name: str = "", text: str | None = None) -> tuple[LineElem
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         depth += 1
-        if depth > _MOST_NESTED:
+        if depth > _DEEPEST_NESTING:
             raise InputError(f"{path}: line {parser.CurrentLineNumber}: nested too deeply")
         element = builder.start(tag, attributes)
         assert isinstance(element, LineElement)

@@ -40,13 +40,13 @@ from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
 
-_MOST_RAD: Final = 3.05
+_LARGEST_RANGE_RAD: Final = 3.05
 """Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
 _NEXT_TO_NOTHING_KG: Final = 2e-4
 """Mass of a link between two hinges of one body (ours): physics needs a mass."""
 _POSES: Final = 20
 _TORQUE_N_M = (0.1, 100.0)
-_SPEED_RAD_S = (0.1, 20.0)
+_PLAUSIBLE_SPEEDS_RAD_S = (0.1, 20.0)
 """Limits of torque and speed beyond which a stated limit is a placeholder (ours)."""
 _HELD_SHARE: Final = 2.0 / 2.3
 """Share of a servo's stall torque, up to which a run goes on: as for its current (ours)."""
@@ -125,7 +125,7 @@ def _read(
     way_m = centre_m(model, data, tree.groups[-1]) - centre_m(model, data, tree.groups[0])
     directions = chain_directions(tree.hinges, way_m, reverse, notes)
     if reverse:
-        tree = _reversed(tree)
+        tree = _reversed_tree(tree)
         directions = replace(directions, yaws=directions.yaws[::-1])
     figures = ChainFigures(model, data, tree, directions, source, assumed)
     notes += [
@@ -145,7 +145,7 @@ def _read(
     return ImportedRobot(robot, tuple(hinge.name for hinge in hinges), tuple(notes), worst_m)
 
 
-def _reversed(tree: BodyTree) -> BodyTree:
+def _reversed_tree(tree: BodyTree) -> BodyTree:
     last = len(tree.groups) - 1
     return BodyTree(
         tree.groups[::-1],
@@ -271,7 +271,7 @@ def _plan_limits(
             f"torque of a plan: the model states {min(efforts):g} N m, which no servo has; a "
             f"{servo_model} holds {held_n_m:g}"
         )
-    low, high = _SPEED_RAD_S
+    low, high = _PLAUSIBLE_SPEEDS_RAD_S
     if speeds and low <= min(speeds) <= high:
         keys["joint_speed_limit_rad_s"] = min(speeds)
         notes.append(f"joint speed of a plan: {min(speeds):g} rad/s, as the model states")
@@ -299,24 +299,25 @@ def _joints(
     endless = [hinge.name for hinge in tree.hinges if not model.jnt_limited[hinge.joint]]
     if endless:
         notes.append(
-            f"without a range in the model, {_MOST_RAD:g} rad both ways: {', '.join(endless)}"
+            f"without a range in the model, {_LARGEST_RANGE_RAD:g} rad both ways: "
+            + ", ".join(endless)
         )
     tables: list[dict[str, object]] = []
     for hinge, yaw in zip(tree.hinges, directions.yaws, strict=True):
         zero = float(model.qpos0[model.jnt_qposadr[hinge.joint]])
         low, high = (float(v) - zero for v in model.jnt_range[hinge.joint])
         if not model.jnt_limited[hinge.joint]:
-            low, high = -_MOST_RAD, _MOST_RAD
-        half = min(-low, high, _MOST_RAD)
+            low, high = -_LARGEST_RANGE_RAD, _LARGEST_RANGE_RAD
+        half = min(-low, high, _LARGEST_RANGE_RAD)
         key = f"{hinge.name}.limit_rad"
         if _DEGREES[0] < high <= _DEGREES[1]:
             missing = (
                 f"joint {hinge.name}: turns to {high:g} rad in the model, {high / math.tau:.3g} "
-                f"turns: degrees, or an endless joint (--assume {key}={_MOST_RAD:g})"
+                f"turns: degrees, or an endless joint (--assume {key}={_LARGEST_RANGE_RAD:g})"
             )
-            likely = min(math.radians(high), _MOST_RAD)
-            half = assumed.number(key, 0.05, _MOST_RAD, missing, likely)
-        elif (given := assumed.given(key, 0.05, _MOST_RAD)) is not None:
+            likely = min(math.radians(high), _LARGEST_RANGE_RAD)
+            half = assumed.number(key, 0.05, _LARGEST_RANGE_RAD, missing, likely)
+        elif (given := assumed.given(key, 0.05, _LARGEST_RANGE_RAD)) is not None:
             half = given
         elif half <= 0.05:
             raise InputError(

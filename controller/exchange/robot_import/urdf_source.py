@@ -16,7 +16,7 @@ from snakewalk.controller.exchange.robot_import.model_source import (
     parents_of,
 )
 
-_ONCE: Final = {
+_SINGLE_ELEMENTS: Final = {
     "joint": (
         "origin",
         "parent",
@@ -36,7 +36,7 @@ _ONCE: Final = {
 """Elements that urdfdom reads once: the first counts."""
 _NOT_READ: Final = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
 _MESHES: Final = (".stl", ".obj")
-_FREE: Final = ("floating", "planar")
+_FREE_JOINT_TYPES: Final = ("floating", "planar")
 """Kinds of joints that let a robot move freely in its world."""
 _SLIVER_KG: Final = 1e-9
 """Mass that MuJoCo gets for a body that states none."""
@@ -59,8 +59,8 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
     for joint in root.iter("joint"):
         if joint.find("mimic") is not None:
             raise InputError(
-                f"{path}: joint {joint.get('name')}, {_where(joint)}: mimics another; each joint "
-                "here is a servo"
+                f"{path}: joint {joint.get('name')}, {_element_place(joint)}: mimics another; "
+                "each joint here is a servo"
             )
     _drop_repeated(source)
     _check_names(root, path)
@@ -78,7 +78,7 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
     return source
 
 
-def _where(element: object) -> str:
+def _element_place(element: object) -> str:
     assert isinstance(element, LineElement)
     return element.where
 
@@ -87,7 +87,7 @@ def _drop_repeated(source: ModelSource) -> None:
     """Keep the first of elements that may occur once, as urdfdom does."""
     repeated: dict[str, list[str]] = {}
     for parent in list(source.root.iter()):
-        for tag in _ONCE.get(parent.tag, ()):
+        for tag in _SINGLE_ELEMENTS.get(parent.tag, ()):
             elements = children(parent, tag)
             if len(elements) < 2:
                 continue
@@ -141,7 +141,7 @@ def _first_link(source: ModelSource, path: Path) -> str:
 
     """
     root = source.root
-    free = [joint for joint in children(root, "joint") if joint.get("type") in _FREE]
+    free = [joint for joint in children(root, "joint") if joint.get("type") in _FREE_JOINT_TYPES]
     if free:
         _drop_base(source, free[0], path)
         return _first_link(source, path)
@@ -197,7 +197,7 @@ def _drop_base(source: ModelSource, holding: LineElement, path: Path) -> None:
     ]
     for joint in children(root, "joint"):
         is_outside = _end(joint, "child") not in kept[1:]
-        if is_outside and joint.get("type") not in ("fixed", *_FREE):
+        if is_outside and joint.get("type") not in ("fixed", *_FREE_JOINT_TYPES):
             raise InputError(
                 f"{path}: joint {joint.get('name')}, {joint.where}: moves a second body, apart "
                 f"from the one that joint {holding.get('name')} holds; one robot is read at a time"

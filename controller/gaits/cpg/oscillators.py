@@ -78,7 +78,7 @@ class Cpg:
         """(J,) eps: each oscillator's phase less that of the pattern; add to it to disturb them."""
         self._phase_rad = 0.0
         self._t_s = 0.0
-        state = _packed(self.pattern, np.zeros(self.joints))
+        state = _packed_pattern(self.pattern, np.zeros(self.joints))
         still = np.zeros(1)
         self._slow = Damped.start(state, np.zeros_like(state), state, 1.0)
         self._clock = Damped.start(still, still, still, 1.0)
@@ -94,7 +94,7 @@ class Cpg:
         turn = np.where(np.isnan(pattern.bias_rad), 0.0, pattern.bias_rad - now)
         bias = now + np.mod(turn + np.pi, TURN) - np.pi  # the shorter way round
         omega_goal = np.array([pattern.omega_rad_s])
-        self._slow = Damped.start(value, rate, _packed(pattern, bias), gain)
+        self._slow = Damped.start(value, rate, _packed_pattern(pattern, bias), gain)
         self._clock = Damped.start(omega, omega_rate, omega_goal, clock_gain or gain)
         self._t_s = 0.0
         self.pattern = pattern
@@ -174,7 +174,7 @@ class Cpg:
         )
 
 
-def _packed(pattern: Pattern, bias_rad: Floats) -> Floats:
+def _packed_pattern(pattern: Pattern, bias_rad: Floats) -> Floats:
     """(2 + 2 HARMONICS, J) biases, offsets, real and imaginary parts of the amplitudes."""
     state = np.empty((2 + 2 * HARMONICS, len(bias_rad)))
     state[0], state[1] = bias_rad, pattern.offset_rad

@@ -13,7 +13,7 @@ NEGLIGIBLE = 0.005
 """Share of the acceleration limit that harmonics must add to be counted in a check."""
 _ROWS = "float64[:, ::1]"
 _ROW = "float64[::1]"
-_GIVEN = f"{_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, {_ROW}"
+_INPUT_TYPES = f"{_ROW}, {_ROW}, {_ROWS}, {_ROWS}, {_ROWS}, float64, {_ROW}, {_ROW}"
 
 
 @compiled(
@@ -86,7 +86,7 @@ def _evaluate(
             speed[j] += along * c[j] - across * s[j]
 
 
-@compiled(f"void({_GIVEN}, float64[:, ::1], float64[:, ::1])")
+@compiled(f"void({_INPUT_TYPES}, float64[:, ::1], float64[:, ::1])")
 def trajectory(
     t_s: Floats,
     clock: Floats,
@@ -160,7 +160,9 @@ def _relevant_harmonics(
     return 0
 
 
-@compiled(f"float64({_GIVEN}, float64[::1], float64[::1], float64, float64[::1], float64[::1])")
+@compiled(
+    f"float64({_INPUT_TYPES}, float64[::1], float64[::1], float64, float64[::1], float64[::1])"
+)
 def peak_share(
     t_s: Floats,
     clock: Floats,

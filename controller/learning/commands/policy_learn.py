@@ -62,7 +62,7 @@ def learn_policy(
         robot=robot, world=world, population=population, steps=steps, seed=seed
     )
     if resume:
-        progress = _resumed(part_file, progress)
+        progress = _resumed_progress(part_file, progress)
     elif part_file.exists() and not force:
         raise InputError(
             f"{part_file}: holds an interrupted search; continue it with --resume, or start again "
@@ -89,7 +89,7 @@ def learn_policy(
     console.print(f"{out}: {policy.origin.steps} steps in all; snakewalk gait policy run {out}")
 
 
-def _resumed(file: Path, asked: SearchProgress) -> SearchProgress:
+def _resumed_progress(file: Path, asked: SearchProgress) -> SearchProgress:
     """Progress in a file.
 
     Raises:

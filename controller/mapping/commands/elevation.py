@@ -34,7 +34,7 @@ Fill = Annotated[
 Picture = Annotated[
     Path | None, typer.Option(help="draw the map with heights, holes and safe ground here")
 ]
-_LEAST, _MOST = 1e-6, 1e6
+_SMALLEST, _LARGEST = 1e-6, 1e6
 """Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 _UNITS = ("m", "cm", "mm", "km", "ft", "us-ft")
 _POINTS = ("lowest", "median", "highest")
@@ -218,8 +218,8 @@ def not_positive(options: Mapping[str, float | None]) -> list[str]:
     for option, value in options.items():
         if value is not None and not 0.0 < value < math.inf:
             faults.append(f"{option} {value:g}: must be above 0")
-        elif value is not None and not _LEAST <= value <= _MOST:
-            faults.append(f"{option} {value:g}: must be from {_LEAST:g} to {_MOST:g}")
+        elif value is not None and not _SMALLEST <= value <= _LARGEST:
+            faults.append(f"{option} {value:g}: must be from {_SMALLEST:g} to {_LARGEST:g}")
     return faults
 
 

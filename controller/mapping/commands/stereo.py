@@ -165,18 +165,18 @@ def _stand_words(terrain: "StereoGround") -> list[str]:
     return [
         f"The camera stood {stand.height_m:.3f} m above the ground, tilted down by",
         f"{math.degrees(stand.tilt_rad):.1f} degrees and rolled by "
-        f"{math.degrees(stand.roll_rad):.1f}, {_how(terrain)}.",
+        f"{math.degrees(stand.roll_rad):.1f}, {_method_text(terrain)}.",
     ]
 
 
-def _how(terrain: "StereoGround") -> str:
+def _method_text(terrain: "StereoGround") -> str:
     return "fitted to the points, which are taken for level ground" if terrain.fitted else "given"
 
 
 def _facts(terrain: "StereoGround") -> dict[str, object]:
     stand = terrain.stand
     return {
-        "camera": _how(terrain),
+        "camera": _method_text(terrain),
         "camera_height_m": round(stand.height_m, 4),
         "camera_tilt_deg": round(math.degrees(stand.tilt_rad), 2),
         "camera_roll_deg": round(math.degrees(stand.roll_rad), 2),

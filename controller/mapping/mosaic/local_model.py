@@ -48,7 +48,7 @@ class LocalModel:
         """
         least = max(0, int(np.floor(-pair.offset_px)))
         disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
-        disparity[_is_plain(pair.left)] = np.nan
+        disparity[_has_no_texture(pair.left)] = np.nan
         with np.errstate(invalid="ignore"):
             disparity[disparity + pair.offset_px < LEAST_DISPARITY_PX] = np.nan
         if np.isfinite(disparity).mean() < 0.01:
@@ -74,7 +74,7 @@ class LocalModel:
         return np.asarray(distance * self.points_m[..., 2] * per_m)
 
 
-def _is_plain(image: Image) -> Bools:
+def _has_no_texture(image: Image) -> Bools:
     """(H, W) pixels of a region without texture, such as the sky.
 
     A matcher continues its border's depths into it.

@@ -15,8 +15,8 @@ from snakewalk.controller.mapping.mosaic.poisson import continued
 from snakewalk.controller.mapping.mosaic.scale_matches import match_over_scale
 
 _TOLERANCE_RAD: Final = 0.008
-_LEAST: Final = 12
-_WIDEST: Final = 4.0
+_LEAST_MATCHES: Final = 12
+_WIDEST_PICTURES: Final = 4.0
 """Limit of the mosaic's width and height, in pictures (ours): views turned by 60 degrees fit."""
 
 
@@ -84,7 +84,7 @@ def _rotations(views: Sequence[LocalModel]) -> Floats:
 def _relative(first: LocalModel, second: LocalModel) -> Floats | None:
     """(3, 3) rotation from the second view's axes to the first one's, or None."""
     matches = match_over_scale(first, second, (1.0,), wide=1.0)
-    if len(matches.scale) < _LEAST:
+    if len(matches.scale) < _LEAST_MATCHES:
         return None
     ray_one, ray_two = (
         _rays(model.camera, places)
@@ -98,7 +98,7 @@ def _relative(first: LocalModel, second: LocalModel) -> Floats | None:
         agree = np.linalg.norm(ray_one - ray_two @ turn.T, axis=1) < _TOLERANCE_RAD
         if agree.sum() > best.sum():
             best = agree
-    if best.sum() < _LEAST:
+    if best.sum() < _LEAST_MATCHES:
         return None
     return Rotation.align_vectors(ray_one[best], ray_two[best])[0].as_matrix()
 
@@ -127,7 +127,7 @@ def _common_plane(views: Sequence[LocalModel], turns: Floats) -> tuple[Floats, t
         corners.append(rays[:, :2] / rays[:, 2:] * [first[0, 0], first[1, 1]] + first[:2, 2])
     low = np.floor(np.min(np.concatenate(corners), axis=0))
     high = np.ceil(np.max(np.concatenate(corners), axis=0))
-    half = 0.5 * _WIDEST * np.array(views[0].valid.shape[::-1])
+    half = 0.5 * _WIDEST_PICTURES * np.array(views[0].valid.shape[::-1])
     low = np.maximum(low, np.floor(first[:2, 2] - half)).astype(int)
     high = np.minimum(high, np.ceil(first[:2, 2] + half)).astype(int)
     camera = first.copy()

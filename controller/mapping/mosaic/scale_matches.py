@@ -23,9 +23,9 @@ _LEAST_CORRELATION: Final = 0.75
 _UNIQUE: Final = 0.03
 """Least lead of the best correlation over any other that is more than a patch's radius away
 (ours)."""
-_WIDE: Final = 0.35
+_WIDE_SEARCH: Final = 0.35
 """Half the width of the search region, in widths of the picture, without a guess (ours)."""
-_NARROW: Final = 0.12
+_NARROW_SEARCH: Final = 0.12
 """The same around the place that a guess of the distance predicts (ours)."""
 
 
@@ -67,7 +67,7 @@ def match_over_scale(
     second: LocalModel,
     scales: tuple[float, ...] = SCALES,
     distance_m: float | None = None,
-    wide: float = _WIDE,
+    wide: float = _WIDE_SEARCH,
 ) -> ScaleMatches:
     """Match interest points of the first picture: ``argmax corr`` over places and scales.
 
@@ -93,7 +93,7 @@ def match_over_scale(
     if distance_m is not None:
         ahead = first.points_m[rows, columns] - [0.0, 0.0, distance_m]
         centres = project(second.camera, ahead)
-        half = _NARROW
+        half = _NARROW_SEARCH
     kept = []
     for k, (column, row) in enumerate(zip(columns, rows, strict=True)):
         if not np.isfinite(centres[k]).all():
@@ -101,14 +101,14 @@ def match_over_scale(
         patch = grey_first[row - _RADIUS_PX : row + _RADIUS_PX + 1, column - _RADIUS_PX :][
             :, : 2 * _RADIUS_PX + 1
         ]
-        best = _best(patch, pyramid, centres[k], half * grey_first.shape[1])
+        best = _best_match(patch, pyramid, centres[k], half * grey_first.shape[1])
         if best is not None:
             kept.append((column, row, *best))
     table = np.array(kept, dtype=float).reshape(-1, 6)
     return ScaleMatches(table[:, :2], table[:, 2:4], table[:, 4], table[:, 5])
 
 
-def _best(
+def _best_match(
     patch: NDArray[np.float32],
     pyramid: list[tuple[float, NDArray[np.float32]]],
     centre: Floats,

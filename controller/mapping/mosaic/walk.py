@@ -70,14 +70,14 @@ def read_walk(
     total = 2 * count - 1
     models = []
     for k, position in enumerate(config.positions):
-        with _at(f"{file}: position {k + 1}"):
+        with _FaultPlace(f"{file}: position {k + 1}"):
             models.append(_model(file.parent, position, calibration, config.disparities))
         on_step(k + 1, total)
     morphs = []
     steps = []
     poses = [np.eye(3, 4)]
     for k in range(count - 1):
-        with _at(f"{file}: positions {k + 1} and {k + 2}"):
+        with _FaultPlace(f"{file}: positions {k + 1} and {k + 2}"):
             morph, step = _step(models[k], models[k + 1], config.positions[k : k + 2])
         morphs.append(morph)
         steps.append(step)
@@ -89,7 +89,7 @@ def read_walk(
     return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps))
 
 
-class _at:  # noqa: N801  reads as a clause
+class _FaultPlace:
     """Put a place in front of the faults of a block."""
 
     def __init__(self, where: str) -> None:

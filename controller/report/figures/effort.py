@@ -20,7 +20,7 @@ def effort_figure(record: RunRecord) -> Figure | None:
     figure, panels = canvas(2 if slow else 1, 5.2 if slow else 3.0)
     _current(panels[0], record)
     if slow:
-        _slow(panels[1], record)
+        _draw_slow_values(panels[1], record)
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(0.0, max(record.end_s, 1e-3))
     return figure
@@ -64,7 +64,7 @@ def _current(axes: Axes, record: RunRecord) -> None:
     legend_above(axes)
 
 
-def _slow(axes: Axes, record: RunRecord) -> None:
+def _draw_slow_values(axes: Axes, record: RunRecord) -> None:
     slow = record.slow
     time = np.append(slow.time_s, record.end_s)
     for k, joint in enumerate(slow.temperature_c.T):

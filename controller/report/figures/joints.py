@@ -22,7 +22,7 @@ def joints_figure(record: RunRecord) -> Figure | None:
     asked = cycle.asked_rad[rows]
     measured = cycle.measured_rad[rows]
     gap = np.where(cycle.valid[rows], measured - asked, np.nan)
-    span = _largest(np.concatenate([asked, measured]))
+    span = _largest_value(np.concatenate([asked, measured]))
     height = float(np.clip(0.075 * joints, 1.2, 2.6)) * 3 + 0.9
     figure, panels = canvas(3, height)
     extent = (float(grid[0]), float(grid[-1]), joints - 0.5, -0.5)
@@ -30,7 +30,7 @@ def joints_figure(record: RunRecord) -> Figure | None:
         panels,
         (asked, measured, gap),
         ("Asked", "Measured", "Measured minus asked"),
-        (span, span, _largest(gap)),
+        (span, span, _largest_value(gap)),
         strict=True,
     ):
         image = axes.imshow(
@@ -52,6 +52,6 @@ def joints_figure(record: RunRecord) -> Figure | None:
     return figure
 
 
-def _largest(values: Floats) -> float:
+def _largest_value(values: Floats) -> float:
     finite_values = np.abs(values[np.isfinite(values)])
     return max(float(np.quantile(finite_values, 0.999)), 1e-3) if finite_values.size else 1e-3

@@ -20,7 +20,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 _IN_CURVES: Final = frozenset({"Effort", "Time on the bus"})
 """Quantities that the curves of the page show as well, to be zoomed."""
-_ALL: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
+_SECTIONS: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (
         "The way",
         "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "
@@ -79,7 +79,7 @@ def drawn(record: RunRecord) -> tuple[list[Section], str]:
 def sections(record: RunRecord) -> list[Section]:
     """Draw the figures for which the log has data; those in the curves as well are folded."""
     with style():
-        drawn = [(title, caption, draw(record)) for title, caption, draw in _ALL]
+        drawn = [(title, caption, draw(record)) for title, caption, draw in _SECTIONS]
         return [
             Section(title, caption, data_uri(figure), is_folded=title in _IN_CURVES)
             for title, caption, figure in drawn

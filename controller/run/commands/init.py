@@ -15,7 +15,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 
-_USED_FIRST = ("flat-square", "jacksboro-traverse")
+_PREFERRED_RUNS = ("flat-square", "jacksboro-traverse")
 """Runs that come first among several possible starts."""
 
 _RUN = """A run: what is to be done, by which robot, where.
@@ -55,9 +55,9 @@ def init(
 ) -> None:
     """Write run, robot and world files to edit, with schemas for editors."""
     if from_ is None:
-        names = {name: load_run(name).robot for name in (*_USED_FIRST, *shipped("runs"))}
+        names = {name: load_run(name).robot for name in (*_PREFERRED_RUNS, *shipped("runs"))}
         fitting = (name for name, body in names.items() if body == (robot or "yaw16"))
-        from_ = next(fitting, _USED_FIRST[0])
+        from_ = next(fitting, _PREFERRED_RUNS[0])
     run = load_run(from_)
     run_folder = Path(from_).parent if from_.endswith(".toml") else None
     body = load_robot(run.robot if robot is None else robot, run_folder if robot is None else None)

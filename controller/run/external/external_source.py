@@ -95,7 +95,7 @@ class ExternalSource(ABC):
         def on_event(text: str) -> None:
             context.on_event("pose", text)
 
-        with closing(_Feed(opened, config.sender, on_event)) as feed:
+        with closing(_CheckedFeed(opened, config.sender, on_event)) as feed:
             pose = ExternalPose(
                 robot,
                 config,
@@ -117,7 +117,7 @@ class ExternalSource(ABC):
             yield PoseProvider(pose, pose.facts, health, pose.take_measured)
 
 
-class _Feed:
+class _CheckedFeed:
     """A feed whose ``close`` may be missing, with the poses of one host if a file names it."""
 
     def __init__(self, feed: PoseFeed, host: str | None, on_event: Callable[[str], None]) -> None:

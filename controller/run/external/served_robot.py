@@ -238,18 +238,20 @@ def _header(
         "world": world.name,
         "start_m": list(place.start_m),
         "heading_rad": place.heading_rad,
-        "joint_rad": _listed(None if place.joint_rad is None else np.array(place.joint_rad)),
+        "joint_rad": _list_of_values(
+            None if place.joint_rad is None else np.array(place.joint_rad)
+        ),
         "tracker": serving.tracker.model_dump(),
         "seed": serving.seed,
         "goal_delay_s": serving.goal_delay_s,
         "friction_along": deviation.along,
         "friction_across": deviation.across,
         "friction_law": deviation.law or world.friction.law_name,
-        "load_kg": _listed(deviation.load_kg),
-        "torque": _listed(deviation.torque),
-        "slip_rad": _listed(deviation.slip_rad),
+        "load_kg": _list_of_values(deviation.load_kg),
+        "torque": _list_of_values(deviation.torque),
+        "slip_rad": _list_of_values(deviation.slip_rad),
     }
 
 
-def _listed(values: Floats | None) -> list[float] | None:
+def _list_of_values(values: Floats | None) -> list[float] | None:
     return None if values is None else [float(value) for value in values]

@@ -70,7 +70,7 @@ _LINEAR = 0.9  # of the limit: angles up to it are played as they are
 _NO_THRUST_1_S = 0.02
 """Predicted speed, body lengths per second, below which a motion has no thrust (ours): shipped
 recordings of crawling animals have 0.1 and more."""
-_MOST = 0.995  # of the limit: the spline between frames goes a little beyond them
+_MOST_OF_RANGE = 0.995  # of the limit: the spline between frames goes a little beyond them
 
 
 def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
@@ -80,7 +80,7 @@ def clip_softly(joints: Floats, limit_rad: Floats) -> Floats:
     complete recording.
     """
     start = _LINEAR * limit_rad
-    room = (_MOST - _LINEAR) * limit_rad
+    room = (_MOST_OF_RANGE - _LINEAR) * limit_rad
     size = np.abs(joints)
     soft = start + room * np.tanh(np.maximum(size - start, 0.0) / room)
     return np.sign(joints) * np.where(size > start, soft, size)
@@ -93,22 +93,24 @@ class PlaybackRun(PathlessRun):
     @cached_property
     def joint_track(self) -> tuple[Floats, Floats]:
         """Times (T,) in the animal's time from 0, and joint angles (T, J) to play."""
-        time_s, joints = self._as_recorded
-        if self._asked.clip:
+        time_s, joints = self._recorded_angles
+        if self._asked_playback.clip:
             joints = clip_softly(joints, np.array(self.robot.limit_rad))
         return time_s, joints
 
     @cached_property
-    def _as_recorded(self) -> tuple[Floats, Floats]:
+    def _recorded_angles(self) -> tuple[Floats, Floats]:
         if self._foreign is not None:
             time_s, joints, _ = self._foreign
         else:
-            time_s, joints = recorded_joints(self.run.track, self.robot, self._asked.time_unit)
-        return time_s, self._asked.scale * joints
+            time_s, joints = recorded_joints(
+                self.run.track, self.robot, self._asked_playback.time_unit
+            )
+        return time_s, self._asked_playback.scale * joints
 
     @cached_property
     def _foreign(self) -> tuple[Floats, Floats, tuple[str, ...]] | None:
-        return foreign_joints(self.run.track, self.robot, self._asked)
+        return foreign_joints(self.run.track, self.robot, self._asked_playback)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -126,15 +128,15 @@ class PlaybackRun(PathlessRun):
         )
 
     @property
-    def _asked(self) -> PlaybackConfig:
+    def _asked_playback(self) -> PlaybackConfig:
         return self.run.playback or PlaybackConfig()
 
     @property
     def speed(self) -> float:
         """Speed of the playback over the animal's own."""
-        asked = self._asked.speed
-        most = 1.0 / self._recorded(1.0).slowed
-        if asked is not None and asked > most > 0.0 and self._recorded(asked).slowed > 1.0:
+        asked = self._asked_playback.speed
+        most = 1.0 / self._loaded_recording(1.0).slowed
+        if asked is not None and asked > most > 0.0 and self._loaded_recording(asked).slowed > 1.0:
             raise InputError(
                 f"--speed {asked:g}: the joints of {self.robot.name} follow {self.run.track} up to "
                 f"{most:.3f} times the animal's own speed; leave --speed out, or make the motion "
@@ -145,7 +147,7 @@ class PlaybackRun(PathlessRun):
     @property
     def clipped(self) -> str | None:
         """Words about clipping; None if nothing was clipped."""
-        past = np.abs(self._as_recorded[1]) - np.array(self.robot.limit_rad)
+        past = np.abs(self._recorded_angles[1]) - np.array(self.robot.limit_rad)
         if not (past > 0.0).any():
             return None
         frame, joint = (int(k) for k in np.unravel_index(np.argmax(past), past.shape))
@@ -172,7 +174,7 @@ class PlaybackRun(PathlessRun):
     @property
     def duration_s(self) -> float:
         """Duration of the playback."""
-        return self._recorded(self.speed).duration_s
+        return self._loaded_recording(self.speed).duration_s
 
     def initial_pose(self) -> InitialPose:
         """Return the first shape of the recording."""
@@ -180,13 +182,13 @@ class PlaybackRun(PathlessRun):
 
     def check_plan(self) -> PlanSummary:
         """Check range, speed and acceleration of every joint."""
-        self._recorded(self.speed)
+        self._loaded_recording(self.speed)
         return plan_without_path(self.run)
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
         """Return a fresh motion that plays the recording."""
-        if self._asked.scale != 1.0:
-            on_event("limit", f"joint angles scaled by {self._asked.scale:g}")
+        if self._asked_playback.scale != 1.0:
+            on_event("limit", f"joint angles scaled by {self._asked_playback.scale:g}")
         clipped_text = self.clipped
         if clipped_text is not None:
             on_event("limit", clipped_text)
@@ -196,7 +198,7 @@ class PlaybackRun(PathlessRun):
             on_event("thrust", self.no_thrust)
         if self.speed < 1.0:
             on_event("limit", f"played at {self.speed:.2f} times the animal's speed")
-        return self._recorded(self.speed)
+        return self._loaded_recording(self.speed)
 
-    def _recorded(self, speed: float) -> Recorded | PartedRecording:
+    def _loaded_recording(self, speed: float) -> Recorded | PartedRecording:
         return recording(self.robot, *self.joint_track, speed)

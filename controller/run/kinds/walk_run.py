@@ -118,9 +118,9 @@ class WalkRun(PathRun):
     @cached_property
     def bridged(self) -> HeightField | None:
         """The ground as far as stiff links can follow it."""
-        return None if self.ground_ahead is None else self._bridged(self.ground_ahead)
+        return None if self.ground_ahead is None else self._bridged_ground(self.ground_ahead)
 
-    def _bridged(self, ground: HeightField) -> HeightField:
+    def _bridged_ground(self, ground: HeightField) -> HeightField:
         return bridged(ground, _BRIDGED_LINKS * self.robot.mean_link_length_m)
 
     @cached_property
@@ -312,7 +312,7 @@ class WalkRun(PathRun):
         pilot = self._pilot(self._chooser(rollout), planner=planner, fitter=fitter)
 
         def change_ground(ground: HeightField) -> None:
-            smooth = self._bridged(ground)
+            smooth = self._bridged_ground(ground)
             rollout.change_ground(smooth)
             fitter.change_ground(smooth)
 
@@ -369,7 +369,7 @@ class WalkRun(PathRun):
                 "ground's friction leaves narrower ones no hold (behaviour.curvature)"
             )
         if not self.library.recorded:
-            lines.append(self._no_recorded)
+            lines.append(self._no_recorded_message)
         return tuple(lines)
 
     @cached_property
@@ -377,7 +377,9 @@ class WalkRun(PathRun):
         """Sections of the path that are too steep for the body, on known ground."""
         if self.ground_ahead is None:
             return []
-        return steep_sections(self.path, self.ground_ahead, self.robot.length_m, self._climbed_rad)
+        return steep_sections(
+            self.path, self.ground_ahead, self.robot.length_m, self._steepest_climb_rad
+        )
 
     @property
     def climb_warnings(self) -> tuple[str, ...]:
@@ -385,14 +387,14 @@ class WalkRun(PathRun):
         return tuple(self._too_steep(section) for section in self.steep_sections)
 
     @property
-    def _climbed_rad(self) -> float:
+    def _steepest_climb_rad(self) -> float:
         """Steepest slope that a body climbs, or that friction along it holds."""
         return max(CLIMBED_RAD, float(np.arctan(self.world.friction.along)))
 
     def _too_steep(self, section: SteepSection) -> str:
         x_m, y_m = self.path.position(section.begin_m)
         slope = np.degrees(section.slope_rad)
-        climbed_deg = np.degrees(self._climbed_rad)
+        climbed_deg = np.degrees(self._steepest_climb_rad)
         return (
             f"the path climbs {slope:.1f} deg from {section.begin_m:.1f} to {section.end_m:.1f} m, "
             f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {climbed_deg:.1f} "
@@ -400,7 +402,7 @@ class WalkRun(PathRun):
         )
 
     @property
-    def _no_recorded(self) -> str:
+    def _no_recorded_message(self) -> str:
         return (
             f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
             f"walk is made of {len(self.library.shapes_rad)} random ones "
@@ -412,9 +414,9 @@ class WalkRun(PathRun):
         walk = self.run.walk
         if self.run.motion == "walk-printed":
             walk = walk.model_copy(update={"decision_fraction": 1.0, "ramp_limit_rad": 0.0})
-        return Walker(self._shuffled(library), walk, passes_all(filters))
+        return Walker(self._shuffled_shapes(library), walk, passes_all(filters))
 
-    def _shuffled(self, library: StateLibrary) -> Floats:
+    def _shuffled_shapes(self, library: StateLibrary) -> Floats:
         """Shapes (S, N) in an order by the seed: W settles ties by the order."""
         order = np.random.default_rng(self.run.seed).permutation(len(library.shapes_rad))
         return library.shapes_rad[order]
@@ -426,7 +428,7 @@ class WalkRun(PathRun):
             return Aimed(self.walker(self.library, self.shape_filters))
         predicts = rollout or self._rollout()
         return PredictiveWalker(
-            self._shuffled(self.library),
+            self._shuffled_shapes(self.library),
             self.run.walk,
             lambda track: Steering(predicts, track, self.pulse_segments_s),
             len(self.robot.yaw_joints),

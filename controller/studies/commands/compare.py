@@ -18,7 +18,7 @@ from snakewalk.controller.studies.run_comparison import compared_run, differing,
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
 
-_NOT_SHOWN: Final = frozenset(
+_HIDDEN_NUMBERS: Final = frozenset(
     {"config_hash", "software", "outcome", "pose_evidence", "pose_source", "assumptions"}
 )
 """Numbers that the verdicts or the differing settings state."""
@@ -85,7 +85,7 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
     for key in dict.fromkeys(key for summary in summaries for key in summary):
         values = [summary.get(key) for summary in summaries]
         is_known = any(value not in (None, "") for value in values)
-        if is_known and key.split(".")[0] not in _NOT_SHOWN:
+        if is_known and key.split(".")[0] not in _HIDDEN_NUMBERS:
             cells = [labelled(key, value) for value in values]
             label = min(
                 (spelling for spelling, _ in cells), key=len

@@ -180,7 +180,9 @@ def trials(
     changes = {"track": track, "seconds": seconds}
     seed_range = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seed_range, start_spread, changes)  # refuses bad input first
-    finished_trials = _run(planned, cases, changes, start_spread, _Where(workers, dask), out)
+    finished_trials = _run(
+        planned, cases, changes, start_spread, _SimulationPlace(workers, dask), out
+    )
     if parquet is not None and out is not None:
         table_to_parquet(out, parquet, KINDS)
     summaries = study.table(finished_trials, cases)
@@ -198,7 +200,7 @@ def trials(
         raise InputError(f"no run was possible: {study.reasons(finished_trials)}")
 
 
-class _Where(NamedTuple):
+class _SimulationPlace(NamedTuple):
     """Place of the simulation: processes, or a Dask cluster."""
 
     workers: int
@@ -261,7 +263,7 @@ def _run(
     cases: list[study.Case],
     changes: dict[str, Any],
     start_spread: float,
-    where: _Where,
+    where: _SimulationPlace,
     out: Path | None,
 ) -> list[study.Trial]:
     """Run the trials that the table ``out`` lacks, and return all."""

@@ -40,7 +40,7 @@ from snakewalk.controller.studies.shadow.diagnosis import (
 
 RATIO: Final = "across_over_along"
 MASS: Final = "mass"
-_LIFTED_RAD: Final = 0.1
+_LIFTING_RAD: Final = 0.1
 """Pitch joints that turn less in a log lift nothing (ours)."""
 WINDOW_S: Final = 1.0
 """Length of a window in which motions are compared (ours)."""
@@ -58,22 +58,22 @@ _COMMON: Final = 0.05
 """Prior of the common torque for a current: the data sheet's tolerance (ours)."""
 _STEP: Final = 0.1
 """Change of the logarithms for a numerical derivative (ours)."""
-_MOST: Final = 0.7
+_LONGEST_STEP: Final = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
-_ALONE = 4
-_TOGETHER = 2
+_STEPS_ALONE = 4
+_STEPS_TOGETHER = 2
 """Steps with friction alone, then with all differences of robots (ours)."""
-_DETERMINED: Final = 0.35
+_DETERMINED_SIGMA: Final = 0.35
 """Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
 twice the value (ours)."""
 _NORMAL_95: Final = 1.96
 
 
 _MOST_STEPS = 12
-_CONVERGED: Final = 0.01
+_CONVERGED_STEP: Final = 0.01
 """Steps with friction alone when laws are compared, and the step that ends them: a law that is not
 fitted to the end seems to be wrong (ours)."""
-_TOGETHER_FROM: Final = 0.9
+_REPORTED_CORRELATION: Final = 0.9
 """Correlation of two errors from which they are reported (ours)."""
 Resistance = FrictionConfig | Water
 """Part of a world that resists a body: the friction of a floor, or the water."""
@@ -188,9 +188,9 @@ class FrictionLog:
                 f"robot {robot.name}: has no pitch joints, so runs on a level floor depend on "
                 "the product of weight and friction only; weigh the robot"
             )
-        if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTED_RAD:
+        if np.ptp(self.answers[1][:, joints], axis=0).max() < _LIFTING_RAD:
             raise InputError(
-                f"the pitch joints turn less than {_LIFTED_RAD:g} rad and lift nothing, so the "
+                f"the pitch joints turn less than {_LIFTING_RAD:g} rad and lift nothing, so the "
                 "mass cannot be identified; use the log of a gait that lifts the body "
                 f"(snakewalk gait run sidewinding --robot {robot.name}, or rectilinear)"
             )
@@ -233,7 +233,7 @@ class Found:
     @property
     def determined(self) -> bool:
         """Whether the interval is narrower than from half to twice the value."""
-        return self.high < self.value * math.exp(_NORMAL_95 * _DETERMINED)
+        return self.high < self.value * math.exp(_NORMAL_95 * _DETERMINED_SIGMA)
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,15 +340,15 @@ class _Fit:
         self._prior[:k, :k] = np.eye(k) / _PRIOR**2
         self._prior[k:, k:] = np.linalg.inv(covariance)
         self._done = 0
-        self._total = (_ALONE + _TOGETHER) * (k + 1) + 1 + len(covariance)
+        self._total = (_STEPS_ALONE + _STEPS_TOGETHER) * (k + 1) + 1 + len(covariance)
 
     def run(self) -> FrictionFit:
         k = len(self._names)
         values = np.concatenate([self._start, np.zeros(len(self._steps))])
         now = self._simulated(values)
         others = np.zeros((len(now), 0))
-        for turn in range(_ALONE + _TOGETHER):
-            if turn == _ALONE:
+        for turn in range(_STEPS_ALONE + _STEPS_TOGETHER):
+            if turn == _STEPS_ALONE:
                 others = self._columns(values, now, range(k, len(values)), self._workers)
             effects = np.hstack([self._columns(values, now, range(k), 1), others])
             count = effects.shape[1]
@@ -357,7 +357,7 @@ class _Fit:
             away = values - np.concatenate([self._start, np.zeros(len(self._steps))])
             pull -= self._prior[:count, :count] @ away[:count]
             step = np.linalg.solve(curvature, pull)
-            step *= min(1.0, _MOST / np.abs(step[:k]).max())
+            step *= min(1.0, _LONGEST_STEP / np.abs(step[:k]).max())
             values[:count] += step
             now = self._simulated(values)
         self._set_noise(self._measured - now, effects)
@@ -376,9 +376,9 @@ class _Fit:
             curvature, pull = self._normal(effects, self._measured - now)
             pull -= self._prior[:k, :k] @ (values - self._start)
             step = np.linalg.solve(curvature, pull)
-            values += step * min(1.0, _MOST / np.abs(step).max())
+            values += step * min(1.0, _LONGEST_STEP / np.abs(step).max())
             now = self._simulated(np.append(values, others))
-            if np.abs(step).max() < _CONVERGED:
+            if np.abs(step).max() < _CONVERGED_STEP:
                 break
         square = (self._measured - now) ** 2
         misfit = 0.0
@@ -411,7 +411,7 @@ class _Fit:
         together = {
             names: correlation
             for names, correlation in pairs.items()
-            if abs(correlation) > _TOGETHER_FROM
+            if abs(correlation) > _REPORTED_CORRELATION
         }
         return FrictionFit(_friction(self._names, values, resistance), estimates, together, mass)
 
@@ -423,7 +423,7 @@ class _Fit:
     def _columns(self, values: Floats, now: Floats, which: range, workers: int) -> Floats:
         """Effects (N, len(which)) of some of the values, by differences."""
         steps = np.concatenate([np.full(len(self._names), _STEP), self._steps])
-        work = partial(_changed, self._logs, self._names, values, steps)
+        work = partial(_changed_values, self._logs, self._names, values, steps)
         done = ((k, work(k)) for k in which) if workers <= 1 else each(work, which, workers=workers)
         columns = {}
         for k, changed in done:
@@ -476,7 +476,7 @@ def _simulated(logs: Sequence[FrictionLog], names: Sequence[str], values: Floats
     return np.concatenate([each_log.vector() for each_log in again])
 
 
-def _changed(
+def _changed_values(
     logs: Sequence[FrictionLog], names: Sequence[str], values: Floats, steps: Floats, which: int
 ) -> Floats:
     changed = values.copy()

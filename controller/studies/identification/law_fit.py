@@ -10,7 +10,7 @@ from typing import Final
 from snakewalk.config.friction_law import LAWS, LawName
 from snakewalk.controller.studies.identification.friction_fit import FrictionLog, friction_misfit
 
-_DECIDED: Final = 5.0
+_DECIDING_LIKELIHOOD: Final = 5.0
 """Difference of log-likelihoods that decides for a law (ours): odds of 150."""
 
 
@@ -30,7 +30,7 @@ class LawFit:
     @property
     def is_decided(self) -> bool:
         """Whether the logs decide between the best law and the others."""
-        return sorted(self.misfit.values())[1] > _DECIDED
+        return sorted(self.misfit.values())[1] > _DECIDING_LIKELIHOOD
 
     def text(self) -> str:
         """A line for a person."""
@@ -41,7 +41,7 @@ class LawFit:
             return f"law of friction: {self.best}; worse by (log-likelihood): {others}"
         return (
             f"law of friction: these logs cannot decide it; {self.best} fits best; worse by "
-            f"(log-likelihood, {_DECIDED:g} decide): {others}"
+            f"(log-likelihood, {_DECIDING_LIKELIHOOD:g} decide): {others}"
         )
 
 

@@ -36,7 +36,7 @@ _COARSE_TURNS: Final = 25
 _FINE_TURNS: Final = 100
 _SPREAD: Final = 0.4
 """Spread of the starts, as a factor's logarithm."""
-_FIRST: Final = 4
+_BEST_FITS: Final = 4
 """Best fits that hops begin from."""
 _OUTLIER_RAD: Final = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
@@ -114,8 +114,8 @@ def fit_pendulum(
         on_progress(k + 1, total)
     pool.sort(key=lambda fit: float(fit.cost))
     for k in range(hops):
-        best = pool[rng.integers(min(_FIRST, len(pool)))].x if rng.random() < 0.3 else pool[0].x
-        other = pool[rng.integers(min(2 * _FIRST, len(pool)))].x
+        best = pool[rng.integers(min(_BEST_FITS, len(pool)))].x if rng.random() < 0.3 else pool[0].x
+        other = pool[rng.integers(min(2 * _BEST_FITS, len(pool)))].x
         size = 0.15 * np.maximum(np.abs(best), 0.01 * width) * (rng.random(len(best)) < 0.4)
         drawn = best + rng.normal(size=len(best)) * size
         drawn = drawn + (rng.random() < 0.3) * 0.3 * (other - best)
@@ -130,11 +130,11 @@ def fit_pendulum(
         )
     values = np.asarray(_fit(logs, best, squares, FINE_S, _FINE_TURNS).x)
     on_progress(total, total)
-    least, most = _alike(logs, values, squares)
+    least, most = _inseparable_factors(logs, values, squares)
     chosen = float(np.clip(first[_P_UNIT] / values[_P_UNIT], least, most))
-    smallest = _scaled(values, least)
-    greatest = _scaled(values, most)
-    values = _scaled(values, chosen)
+    smallest = _scaled_constants(values, least)
+    greatest = _scaled_constants(values, most)
+    values = _scaled_constants(values, chosen)
     low, high = _intervals(logs, values, squares)
     unknown = np.full(len(squares), np.nan)
     low = np.append(np.minimum(low, smallest), unknown)
@@ -213,7 +213,7 @@ def _fit(
     )
 
 
-def _scaled(values: Floats, factor: float) -> Floats:
+def _scaled_constants(values: Floats, factor: float) -> Floats:
     """Return the constants with torque constant and P unit times a factor, resistance its square.
 
     Where the output never comes to its limit, such a servo moves in the same way: with less
@@ -225,8 +225,10 @@ def _scaled(values: Floats, factor: float) -> Floats:
     return out
 
 
-def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tuple[float, float]:
-    """Least and greatest factor of ``_scaled`` that the recordings do not separate from 1."""
+def _inseparable_factors(
+    logs: Sequence[PendulumLog], values: Floats, squares: Floats
+) -> tuple[float, float]:
+    """Range of the factor of ``_scaled_constants`` that the recordings do not separate from 1."""
     searched = ranges(logs[0].actuator)
     lowest = searched.low[: len(values)]
     highest = searched.high[: len(values)]
@@ -235,7 +237,7 @@ def _alike(logs: Sequence[PendulumLog], values: Floats, squares: Floats) -> tupl
     for step in (1.0 / _FACTOR, _FACTOR):
         factor = 1.0
         while True:
-            further = _scaled(values, factor * step)
+            further = _scaled_constants(values, factor * step)
             inside = (further >= lowest).all() and (further <= highest).all()
             if not inside or _cost(further, logs, squares) > limit:
                 break

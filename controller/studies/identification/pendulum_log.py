@@ -12,7 +12,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
 _COLUMNS: Final = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
-_ABOUT: Final = ("mass", "length", "kp")
+_LOG_KEYS: Final = ("mass", "length", "kp")
 _LIMIT: Final = "goal_current_a"
 """Our addition to BAM's logs: Goal Current of a servo in current-based position mode."""
 _LEAST_ROWS: Final = 20
@@ -51,11 +51,11 @@ def read_pendulum_log(path: Path) -> PendulumLog:
     """
     data = read_json_object(path)
     entries = data.get("entries")
-    faults = [f"{path}: {key}: is missing" for key in (*_ABOUT, "entries") if key not in data]
+    faults = [f"{path}: {key}: is missing" for key in (*_LOG_KEYS, "entries") if key not in data]
     if faults:
         raise InputError(faults)
     try:
-        mass_kg, arm_m, p_gain = (_number(data[key]) for key in _ABOUT)
+        mass_kg, arm_m, p_gain = (_number(data[key]) for key in _LOG_KEYS)
         limit_a = math.inf if _LIMIT not in data else _number(data[_LIMIT])
         rows: Any = entries
         time_s, goal, position, volts, torque = (

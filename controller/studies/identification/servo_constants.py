@@ -79,7 +79,7 @@ on request; squares stay as given (``docs/identify.md`` states the reason)."""
 _OHM_FACTOR: Final = 6.0
 """Greatest factor of a resistance on nominal voltage over stall current (ours): recordings give
 that of a weaker motor with a smaller torque constant, too."""
-_NEAR: Final = 1e-3
+_END_OF_RANGE: Final = 1e-3
 """Share of a range within which a constant stands on its end (ours)."""
 _FORMS: Final = ("m1", "m2", "m3", "m4", "m5", "m6")
 _BOTH_SIDES: Final = {
@@ -123,7 +123,7 @@ class Ranges(NamedTuple):
         """
         reached = {}
         for name, value, low, high in zip(NAMES, values, self.low, self.high, strict=True):
-            near = _NEAR * (high - low)
+            near = _END_OF_RANGE * (high - low)
             if value >= high - near:
                 reached[name] = float(high), "upper"
             elif low != 0.0 and value <= low + near:

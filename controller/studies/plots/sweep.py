@@ -12,7 +12,7 @@ from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.registry import GAITS
 from snakewalk.controller.studies.sweep_table import UNITS, number, pace
 
-_ACROSS = 3
+_PANELS_ACROSS = 3
 
 
 def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
@@ -20,7 +20,7 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     gaits = list(dict.fromkeys(row["gait"] for row in rows))
     robots = list(dict.fromkeys(row["robot"] for row in rows))
     colours = {robot: SERIES[k % len(SERIES)] for k, robot in enumerate(robots)}
-    across = min(_ACROSS, len(gaits))
+    across = min(_PANELS_ACROSS, len(gaits))
     down = -(-len(gaits) // across)
     with style():
         figure = Figure(figsize=(WIDTH_IN, 0.7 + 2.3 * down), layout="constrained")

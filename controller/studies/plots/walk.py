@@ -19,8 +19,8 @@ _COLORS = {
     "random": GREEN,
     "degree": PURPLE,
 }
-_SHOWN = 4.5  # steps over |V|; later dots are left out
-_LEAST = 40.0  # % of the states: below, all curves are one
+_MOST_SHOWN_COVER = 4.5  # steps over |V|; later dots are left out
+_LEAST_PERCENT = 40.0  # % of the states: below, all curves are one
 
 
 def draw(results: Sequence[StudyResult], file: Path) -> None:
@@ -42,10 +42,13 @@ def draw(results: Sequence[StudyResult], file: Path) -> None:
             for result in (graph_result for graph_result in results if graph_result.graph == graph):
                 color = _COLORS[result.rule]
                 axes.plot(result.grid, 100.0 * result.visited, color=color, label=result.rule)
-                if np.isfinite(result.cover).any() and np.nanmean(result.cover) <= _SHOWN:
+                if (
+                    np.isfinite(result.cover).any()
+                    and np.nanmean(result.cover) <= _MOST_SHOWN_COVER
+                ):
                     end = float(np.nanmean(result.cover))
                     axes.plot(end, 100.0, "o", color=color, ms=5, clip_on=False)
-            axes.set(xlim=(0.0, _SHOWN), ylim=(_LEAST, 100.0), title=graph)
+            axes.set(xlim=(0.0, _MOST_SHOWN_COVER), ylim=(_LEAST_PERCENT, 100.0), title=graph)
         for axes in panels.flat[len(graphs) :]:
             axes.set_axis_off()
         for axes in panels[:, 0]:

@@ -35,14 +35,17 @@ _BIN_S: Final = 0.1
 _CURRENT_STEP_A: Final = 2.69e-3
 _ANGLE_STEP_RAD: Final = 1.5e-3
 """Units of the two: a step of the registers of most models."""
-_CORRELATED: Final = 4.0
+_CORRELATED_BINS: Final = 4.0
 """Bins of noise that count as one: the model error is not white (ours)."""
 _LEAST_NOISE: Final = 1.0 / 12.0
 """Variance of a value that is rounded to whole steps, before averaging."""
 _REFINEMENTS: Final = 4
 _LEAST_STEP: Final = 0.01
 """Least change of ``faulty``: smaller ones have no effect (ours)."""
-_REFINED: Final = dict[Cause, int](friction=1, load=2) | {"weaker servo": 1, "slipped horn": 2}
+_REFINED_CAUSES: Final = dict[Cause, int](friction=1, load=2) | {
+    "weaker servo": 1,
+    "slipped horn": 2,
+}
 """Number of causes of each kind, those that explain most at first, that are followed on the
 simulator (ours)."""
 SETTLED_S: Final = 1.0
@@ -383,12 +386,12 @@ class Signatures:
         order = sorted(range(len(first)), key=lambda k: -first[k][0])
         well = likely.of(difference)
         refined = {}
-        for cause, count in _REFINED.items():
+        for cause, count in _REFINED_CAUSES.items():
             for k in [k for k in order if constants.causes[k][0] == cause][:count]:
                 evidence, explained = first[k]
                 worth = evidence > well
                 parts = constants.causes[k][2]
-                refined[k] = self._refined(likely, difference, parts) if worth else explained
+                refined[k] = self._refined_cause(likely, difference, parts) if worth else explained
         # the residual of the best explanation is noise: it judges all of them
         likely = self._likelihood([difference, *(rest for _, rest, _ in refined.values())])
         well = likely.of(difference)
@@ -406,7 +409,7 @@ class Signatures:
         spare = max(effects.shape[0] - effects.shape[1], 1)
         left = [rest - effects @ np.linalg.lstsq(effects, rest)[0] for rest in rests]
         noise = max(_LEAST_NOISE, min(float(residual @ residual) / spare for residual in left))
-        return _Likelihood(effects, self._healthy, _CORRELATED * noise)
+        return _Likelihood(effects, self._healthy, _CORRELATED_BINS * noise)
 
     def _linear(
         self, likely: "_Likelihood", difference: Floats, parts: list[int]
@@ -414,11 +417,13 @@ class Signatures:
         """Log evidence of a cause with proportional effects; values, residuals, slopes."""
         constants = self._constants
         slopes = self._effects[:, parts]
-        values = self._allowed(likely.best(difference, slopes, constants.faulty[parts]), parts)
+        values = self._allowed_values(
+            likely.best(difference, slopes, constants.faulty[parts]), parts
+        )
         rest = difference - slopes @ values
         return likely.cause(rest, slopes, values, constants.faulty[parts]), (values, rest, slopes)
 
-    def _refined(
+    def _refined_cause(
         self, likely: "_Likelihood", difference: Floats, parts: list[int]
     ) -> tuple[Floats, Floats, Floats]:
         """Values of a cause, their residuals and slopes, found on the simulator.
@@ -433,12 +438,12 @@ class Signatures:
         best = (-math.inf, values, difference, slopes)
         for _ in range(_REFINEMENTS):
             target = difference - changed + slopes @ values
-            step = self._allowed(likely.best(target, slopes, faulty), parts) - values
+            step = self._allowed_values(likely.best(target, slopes, faulty), parts) - values
             if np.abs(step / faulty).max() < _LEAST_STEP:
                 break
             values = values + step
             before = changed
-            changed = self._changed(parts, values)
+            changed = self._changed_answers(parts, values)
             slopes = slopes + np.outer(changed - before - slopes @ step, step) / (step @ step)
             rest = difference - changed
             evidence = likely.cause(rest, slopes, values, faulty)
@@ -446,11 +451,11 @@ class Signatures:
                 best = (evidence, values, rest, slopes)
         return best[1:]
 
-    def _allowed(self, values: Floats, parts: list[int]) -> Floats:
+    def _allowed_values(self, values: Floats, parts: list[int]) -> Floats:
         """Return values where loads and weakness are not negative."""
         return np.where(self._constants.never_less[parts], np.maximum(values, 0.0), values)
 
-    def _changed(self, parts: list[int], values: Floats) -> Floats:
+    def _changed_answers(self, parts: list[int], values: Floats) -> Floats:
         vector = np.zeros(len(self._constants.step))
         vector[parts] = values
         return (

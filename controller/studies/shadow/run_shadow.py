@@ -85,7 +85,7 @@ class ShadowAlarm:
         slow = 1.0 / (self.cycle_hz * _MEMORY_S)
         self._smooth += min(quick, 1.0) * np.where(state.valid, now - self._smooth, 0.0)
         self._square += min(slow, 1.0) * (self._smooth**2 - self._square)
-        effect = self._slope * shadow.velocity_rad_s * self._late_s(state)
+        effect = self._slope * shadow.velocity_rad_s * self._reply_delay_s(state)
         self._unsure += min(slow, 1.0) * (effect**2 - self._unsure)
         self._cycles += 1
         if self._cycles < self.cycle_hz * _MEMORY_S:
@@ -102,7 +102,7 @@ class ShadowAlarm:
             for j in joints_over
         )
 
-    def _late_s(self, state: JointState) -> float:
+    def _reply_delay_s(self, state: JointState) -> float:
         """Return how much later than the earliest reply this one came."""
         age_s = state.age_s[state.valid]
         if not len(age_s):

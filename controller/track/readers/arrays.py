@@ -102,14 +102,14 @@ def _unpacked_mat(data: bytes) -> int:
         kind, length = struct.unpack_from(f"{order}II", data, position)
         position += 8
         if kind == _MAT_PACKED:
-            size += _unpacked(memoryview(data)[position : position + length])
+            size += _unpacked_bytes(memoryview(data)[position : position + length])
         else:
             size += length
         position += length
     return size
 
 
-def _unpacked(packed: memoryview) -> int:
+def _unpacked_bytes(packed: memoryview) -> int:
     """Unpacked bytes of a zlib stream, counted piece by piece up to a fault."""
     stream = zlib.decompressobj()
     size = 0

@@ -52,7 +52,7 @@ def load_bvh(file: Path, choice: Choice) -> Keypoints:
     joints = _skeleton(file, words[1:begin])
     frames, step_s, values = _motion(file, words[begin + 1 :], sum(len(j.channels) for j in joints))
     places = _places(joints, values.reshape(frames, -1)) @ _TO_Z_UP.T
-    longest = _longest(joints)
+    longest = _longest_chain(joints)
     notes = []
     if choice.keypoints is None and len(longest) < len(joints):
         side_joints = [joints[k].name for k in range(len(joints)) if k not in longest]
@@ -169,7 +169,7 @@ def _places(joints: list[_Joint], values: Floats) -> Floats:
     return places
 
 
-def _longest(joints: list[_Joint]) -> list[int]:
+def _longest_chain(joints: list[_Joint]) -> list[int]:
     depth = [0] * len(joints)
     for k, joint in enumerate(joints):
         depth[k] = depth[joint.parent] + 1 if joint.parent >= 0 else 0

@@ -25,7 +25,7 @@ PCUTOFF = 0.6
 """DeepLabCut's own default: below this likelihood it does not draw a point."""
 _LEVELS = {"scorer", "individuals", "bodyparts", "coords"}
 _NUMBER = re.compile(r"(\d+)(?:\.[A-Za-z]+)?$")  # 12, or labeled-data/film/img0012.png
-_OF_NONE = "single"  # body parts that belong to no animal
+_NO_INDIVIDUAL = "single"  # body parts that belong to no animal
 Column = tuple[str, str, str]
 """Individual, body part, coordinate."""
 
@@ -125,7 +125,7 @@ def _track(
 ) -> Keypoints:
     index_by_column = {column: k for k, column in enumerate(columns)}
     names = list(dict.fromkeys(who for who, _, _ in columns))
-    animals = [who for who in names if who != _OF_NONE] or names
+    animals = [who for who in names if who != _NO_INDIVIDUAL] or names
     animals_with_points = {
         column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()
     }

@@ -16,7 +16,7 @@ from snakewalk.controller.track.track import Track
 
 EMBEDDED = shipped("recordings")
 """Names of the shipped recordings."""
-_FINE = 64  # samples per cycle of the head's motion
+_SAMPLES_PER_CYCLE = 64  # samples per cycle of the head's motion
 
 
 def generate(figures: RecordingConfig) -> Track:
@@ -60,7 +60,7 @@ def _script(
     figures: RecordingConfig, start_s: float, stop_s: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, gain, phase and heading of the head from ``start_s`` to ``stop_s``."""
-    count = int((stop_s - start_s) * figures.frequency_hz * _FINE) + 2
+    count = int((stop_s - start_s) * figures.frequency_hz * _SAMPLES_PER_CYCLE) + 2
     knots_s = np.linspace(start_s, stop_s, count)
     gain = np.full(count, figures.episodes[0].gain)
     waves = np.full(count, figures.episodes[0].waves or figures.waves)

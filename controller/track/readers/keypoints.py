@@ -155,13 +155,13 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
         curve = scipy.interpolate.CubicSpline(along[is_visible], places[k, is_visible])
         out[k, lost[k]] = curve(along[lost[k]])
         if lost[k, 0]:
-            out[k, 0] = _beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
+            out[k, 0] = _point_beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
         if lost[k, -1]:
-            out[k, -1] = _beyond(out[k, -2], out[k, -3], out[k, -4], usual[-1])
+            out[k, -1] = _point_beyond(out[k, -2], out[k, -3], out[k, -4], usual[-1])
     return out, able
 
 
-def _beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats:
+def _point_beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats:
     """The point beyond an end: half of the last turn continues."""
     heading = np.arctan2(*(last - second)[::-1])
     turn = np.angle(np.exp(1j * (heading - np.arctan2(*(second - third)[::-1]))))

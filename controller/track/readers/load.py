@@ -79,7 +79,7 @@ def load_file(
 
     """
     choice = _with(path, rate_hz, choice)
-    loaded = _loaded(Path(path), choice)
+    loaded = _loaded_recording(Path(path), choice)
     return loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
 
 
@@ -95,7 +95,7 @@ def load_keypoints(
 
     """
     choice = _with(path, rate_hz, choice)
-    loaded = _loaded(Path(path), choice)
+    loaded = _loaded_recording(Path(path), choice)
     if not isinstance(loaded, Keypoints):
         raise InputError(
             f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
@@ -104,7 +104,7 @@ def load_keypoints(
     return loaded
 
 
-def _loaded(file: Path, choice: Choice) -> Track | Keypoints:
+def _loaded_recording(file: Path, choice: Choice) -> Track | Keypoints:
     loaded = _read(file, choice)
     if isinstance(loaded, Track):
         return loaded

@@ -20,14 +20,14 @@ from snakewalk.controller.track.choice import FEWEST, PLANES, Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 
 UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-_UNLABELLED = re.compile(
+_UNLABELLED_NAME = re.compile(
     r"\*\d*|uname\*?\d+|unlabell?ed[ _-]?\d*|unknown[ _-]?\d*|unnamed[ _-]?\d*|new \d{4}",
 )
 """Names that programs give to markers without a label: ``*17``, ``uname*4``, ``New 0012``."""
-_STILL = 0.02
+_STILL_SHARE = 0.02
 """Part of the others' usual way in which a marker counts as one that does not move (ours)."""
-_JOINED = 0.1
-_NEAR = 3.0
+_JOINED_DEVIATION = 0.1
+_NEAR_SPACINGS = 3.0
 """Largest change of the distance to a neighbour on a body, and largest distance, in spacings of
 markers (ours)."""
 _FIRST_WORDS = {"NO_OF_FRAMES", "NO_OF_MARKERS", "FREQUENCY", "MARKER_NAMES", "DATA_INCLUDED"}
@@ -138,7 +138,7 @@ def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int
     without = [k for k in every if is_unlabelled(names[k])]
     rest = [k for k in every if k not in without]
     labelled = [k for k in rest if np.isfinite(places[:, k]).any()]
-    still = _still(places, labelled)
+    still = _still_markers(places, labelled)
     notes = []
     for left, why in ((without, "without a label"), (still, "that do not move")):
         if left:
@@ -147,7 +147,7 @@ def _labelled_and_moving(names: Sequence[str], places: Floats) -> tuple[list[int
     return [k for k in rest if k not in still], notes
 
 
-def _still(places: Floats, candidates: Sequence[int]) -> list[int]:
+def _still_markers(places: Floats, candidates: Sequence[int]) -> list[int]:
     """Markers that neither move nor keep a distance to a moving one.
 
     A body's head may be held in place; the marker next to it then keeps its distance.
@@ -157,21 +157,21 @@ def _still(places: Floats, candidates: Sequence[int]) -> list[int]:
     extent = np.nanmax(places, axis=0) - np.nanmin(places, axis=0)
     extent_m = np.linalg.norm(extent, axis=1)
     usual = float(np.median(extent_m[list(candidates)]))
-    moving = [k for k in candidates if extent_m[k] >= _STILL * usual]
+    moving = [k for k in candidates if extent_m[k] >= _STILL_SHARE * usual]
     spacing = float(np.nanmedian(np.linalg.norm(np.diff(places[:, moving], axis=1), axis=2)))
     still_points = []
     for k in candidates:
         if k not in moving:
             gap = np.linalg.norm(places[:, moving] - places[:, k, None], axis=2)
-            near = np.nanmean(gap, axis=0) < _NEAR * spacing
-            if not (near & (np.nanstd(gap, axis=0) < _JOINED * spacing)).any():
+            near = np.nanmean(gap, axis=0) < _NEAR_SPACINGS * spacing
+            if not (near & (np.nanstd(gap, axis=0) < _JOINED_DEVIATION * spacing)).any():
                 still_points.append(k)
     return still_points
 
 
 def is_unlabelled(name: str) -> bool:
     """Whether a program generated this name for a marker without a label."""
-    return not name.strip() or _UNLABELLED.fullmatch(name.strip().lower()) is not None
+    return not name.strip() or _UNLABELLED_NAME.fullmatch(name.strip().lower()) is not None
 
 
 def number_or_none(text: str) -> float | None:

@@ -20,8 +20,8 @@ from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.track import MOST_FRAMES, frame_numbers
 
 _DOWNWARDS = np.array([1.0, -1.0])
-_CENTRED = 1.1  # format from which whole numbers are pixel centres, not corners
-_PREDICTED = 1
+_CENTRED_VERSION = 1.1  # format from which whole numbers are pixel centres, not corners
+_PREDICTED_TYPE = 1
 _NO_TRACK = "no track"
 
 
@@ -114,19 +114,19 @@ def load_analysis(
 
 def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
     values = np.asarray(stored[:], dtype=float)
-    named = _stated(stored, "dims")
+    named = _json_attribute(stored, "dims")
     if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
         return values
     return np.asarray(values.transpose([named.index(axis) for axis in axes]))
 
 
 def _stated_rate(h5_file: Any) -> float | None:
-    about = _stated(h5_file, "video_backend_metadata")
+    about = _json_attribute(h5_file, "video_backend_metadata")
     rate = about.get("fps") if isinstance(about, dict) else None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
 
 
-def _stated(h5_file: Any, name: str) -> Any:
+def _json_attribute(h5_file: Any, name: str) -> Any:
     """Content of a JSON attribute; None if it is missing or invalid."""
     try:
         return parse_json(_text(h5_file.attrs[name]))
@@ -171,12 +171,12 @@ def load_project(
     scores = np.full((last + 1, len(nodes)), np.nan)
     by_hand = np.zeros(last + 1, dtype=bool)
     taken = np.zeros(last + 1, dtype=bool)
-    shift = 0.0 if version >= _CENTRED else -0.5
+    shift = 0.0 if version >= _CENTRED_VERSION else -0.5
     for instance, name in zip(instances, whose, strict=True):
         if name != mine:
             continue
         row_index = number.get(int(instance["frame_id"]), -1)
-        predicted = int(instance["instance_type"]) == _PREDICTED
+        predicted = int(instance["instance_type"]) == _PREDICTED_TYPE
         rows = tables[predicted][int(instance["point_id_start"]) : int(instance["point_id_end"])]
         if row_index < 0 or len(rows) != len(nodes):
             raise InputError(f"{file}: an instance has {len(rows)} points of {len(nodes)}")

@@ -23,7 +23,7 @@ _MIDLINE: dict[tuple[str, str], float | None] = {
     **{("x_lengths", "y_lengths"): None, ("x_px", "y_px"): None},
 }
 """Columns of places, and metres in their unit; None: body lengths or pixels, without a scale."""
-_WIDE = {"x_m": 1.0, "x_px": None, "x_lengths": None}
+_WIDE_COLUMNS = {"x_m": 1.0, "x_px": None, "x_lengths": None}
 """Columns of places in wide rows, which end in the number of the point, and metres in their
 unit."""
 
@@ -45,13 +45,13 @@ def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
             columns = [column[name] for name in ("t", "frame", "point", *pair)]
             table = _numbers(file, rows, columns)
             track = _midline(file, table, scale_m, choice, _status_of(rows, column))
-            return _about(file, track, rows, column)
-    for name, scale_m in _WIDE.items():
+            return _named_track(file, track, rows, column)
+    for name, scale_m in _WIDE_COLUMNS.items():
         if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
             rows = _of_animal(file, rows, column, choice)
-            table = _long(file, rows, column, name.removeprefix("x_"))
+            table = _long_table(file, rows, column, name.removeprefix("x_"))
             track = _midline(file, table, scale_m, choice, _status_of(rows, column))
-            return _about(file, track, rows, column)
+            return _named_track(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, choice)
@@ -88,7 +88,7 @@ def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, Fra
     return dict(zip(numbers, named_statuses, strict=True)) if named_statuses else {}
 
 
-def _about(file: Path, track: Track, rows: list[list[str]], column: dict[str, int]) -> Track:
+def _named_track(file: Path, track: Track, rows: list[list[str]], column: dict[str, int]) -> Track:
     """The track with the animal's name and with the certainty of its head, where stated."""
     if "head_sure" in column:
         sure = float(_numbers(file, rows[:2], [column["head_sure"]])[0, 0])
@@ -98,7 +98,7 @@ def _about(file: Path, track: Track, rows: list[list[str]], column: dict[str, in
     return track
 
 
-def _long(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
+def _long_table(file: Path, rows: list[list[str]], column: dict[str, int], unit: str) -> Floats:
     count = 1
     while {f"x_{unit}_{count + 1}", f"y_{unit}_{count + 1}"} <= column.keys():
         count += 1

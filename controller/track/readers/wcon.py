@@ -22,7 +22,7 @@ from snakewalk.controller.track.frame_status import statuses_named
 from snakewalk.controller.track.resample import equal_arc_length
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_OWN = "@snakewalk"
+_OWN_KEY = "@snakewalk"
 """Key of a record with facts for which WCON has no name."""
 
 
@@ -55,7 +55,7 @@ def load_wcon(file: Path, text: str, choice: Choice) -> Track:
         frame = np.arange(len(time))
     track = track_from_points(
         file.stem,
-        _alike([points for _, points in bodies]),
+        _resampled_bodies([points for _, points in bodies]),
         choice.rate or 1.0 / step,
         scale_m=None if metres["x"] is None else 1.0,
         frame=frame,
@@ -64,7 +64,7 @@ def load_wcon(file: Path, text: str, choice: Choice) -> Track:
         if len(words) == len(time)
         else (),
     )
-    return _about(track, document.get("metadata"), records)
+    return _with_metadata(track, document.get("metadata"), records)
 
 
 def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
@@ -91,7 +91,7 @@ def _all_bodies(
     for number, record in enumerate(records):
         try:
             bodies += _bodies(record, metres)
-            words += _words(record)
+            words += _statuses(record)
         except (TypeError, ValueError, KeyError, IndexError, AttributeError) as error:
             raise InputError(
                 f"{file}: data[{number}]: expected id, t, x and y, as many lists x and y as times: "
@@ -106,7 +106,7 @@ def _all_bodies(
     return bodies, words
 
 
-def _about(track: Track, about: Any, records: list[Any]) -> Track:
+def _with_metadata(track: Track, about: Any, records: list[Any]) -> Track:
     if isinstance(about, dict):
         stated = [about.get(name) for name in ("source", "licence")]
         source, licence = (
@@ -114,19 +114,19 @@ def _about(track: Track, about: Any, records: list[Any]) -> Track:
         )
         recorded = about.get("places_recorded") is not False
         track = replace(track, source=source, licence=licence, places_recorded=recorded)
-    our_records = [record for record in records if isinstance(record.get(_OWN), dict)]
+    our_records = [record for record in records if isinstance(record.get(_OWN_KEY), dict)]
     if len(our_records) == len(records):
-        sure = [our_record[_OWN].get("head_sure") for our_record in our_records]
+        sure = [our_record[_OWN_KEY].get("head_sure") for our_record in our_records]
         numbers = [float(sure_value) for sure_value in sure if isinstance(sure_value, (int, float))]
-        source = our_records[0][_OWN].get("source", track.source)
+        source = our_records[0][_OWN_KEY].get("source", track.source)
         track = replace(track, name=str(our_records[0].get("id")), source=str(source))
         return replace(track, head_sure=min(numbers, default=None))
     return track
 
 
-def _words(record: dict[str, Any]) -> list[tuple[float, str]]:
+def _statuses(record: dict[str, Any]) -> list[tuple[float, str]]:
     """Times and names of the statuses of a record; empty where they are not stated."""
-    our_words = record.get(_OWN)
+    our_words = record.get(_OWN_KEY)
     words = our_words.get("status") if isinstance(our_words, dict) else None
     times = record["t"] if isinstance(record["t"], list) else [record["t"]]
     if not isinstance(words, list) or len(words) != len(times):
@@ -162,14 +162,14 @@ def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, F
             [_floats(x) * (metres["x"] or 1.0), _floats(y) * (metres["y"] or 1.0)], axis=-1
         )
         points = points + [
-            float(_at(record.get(name, 0.0), k)) * (metres[name] or 1.0) for name in from_
+            float(_element_at(record.get(name, 0.0), k)) * (metres[name] or 1.0) for name in from_
         ]
-        head = _at(record.get("head", "L"), k)
+        head = _element_at(record.get("head", "L"), k)
         bodies.append((float(moment), points[::-1] if head == "R" else points))
     return bodies
 
 
-def _at(value: Any, k: int) -> Any:
+def _element_at(value: Any, k: int) -> Any:
     return value[k] if isinstance(value, list) else value
 
 
@@ -178,7 +178,7 @@ def _floats(values: Any) -> Floats:
     return np.array([np.nan if v is None else float(v) for v in listed])
 
 
-def _alike(bodies: list[Floats]) -> Floats:
+def _resampled_bodies(bodies: list[Floats]) -> Floats:
     """Bodies (T, P, 2); bodies with different point counts are resampled to the largest."""
     counts = {len(points) for points in bodies}
     if len(counts) == 1:
@@ -201,16 +201,16 @@ _PREFIX = {
     **{"": 1.0, "c": 1e-2, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "n": 1e-9},
     **{"k": 1e3, "K": 1e3, "M": 1e6, "G": 1e9},
 }
-_WORDS = {
+_PREFIX_WORDS = {
     **{"centi": 1e-2, "milli": 1e-3, "micro": 1e-6, "nano": 1e-9, "": 1.0},
     **{"kilo": 1e3, "mega": 1e6, "giga": 1e9},
 }
-_SHORT = {"m": ("m", 1.0), "in": ("m", 0.0254), "s": ("s", 1.0), "sec": ("s", 1.0)} | {
+_SHORT_UNITS = {"m": ("m", 1.0), "in": ("m", 0.0254), "s": ("s", 1.0), "sec": ("s", 1.0)} | {
     "min": ("s", 60.0),
     "h": ("s", 3600.0),
     "d": ("s", 86400.0),
 }
-_LONG = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
+_LONG_UNITS = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
     "micron": ("m", 1e-6),
     "second": ("s", 1.0),
     "minute": ("s", 60.0),
@@ -229,7 +229,7 @@ def si_value(unit: str, dimension: str) -> float | None:
     kinds: list[str] = []
     parts = re.split(r"([*/])", unit.replace(" ", ""))
     for sign, word in zip(["*", *parts[1::2]], parts[::2], strict=True):
-        kind, factor = _word(word)
+        kind, factor = _unit_factor(word)
         if factor == 0.0:
             return None
         value = value * factor if sign == "*" else value / factor
@@ -237,19 +237,19 @@ def si_value(unit: str, dimension: str) -> float | None:
     return value if kinds == [dimension] else None
 
 
-def _word(word: str) -> tuple[str, float]:
+def _unit_factor(word: str) -> tuple[str, float]:
     """Kind ("m", "s", "1" for a number, "?") and SI value of a factor of a unit."""
     try:
         return "1", float(word)
     except ValueError:
         singular = word.removesuffix("s")
-    if word in _SHORT:
-        return _SHORT[word]  # "min" is a minute, not a milli-inch
-    for base, (kind, factor) in _LONG.items():
+    if word in _SHORT_UNITS:
+        return _SHORT_UNITS[word]  # "min" is a minute, not a milli-inch
+    for base, (kind, factor) in _LONG_UNITS.items():
         for name in (word, singular, "inch" if word == "inches" else word):
-            if name.endswith(base) and name.removesuffix(base) in _WORDS:
-                return kind, factor * _WORDS[name.removesuffix(base)]
-    for base, (kind, factor) in _SHORT.items():
+            if name.endswith(base) and name.removesuffix(base) in _PREFIX_WORDS:
+                return kind, factor * _PREFIX_WORDS[name.removesuffix(base)]
+    for base, (kind, factor) in _SHORT_UNITS.items():
         if word.endswith(base) and word.removesuffix(base) in _PREFIX:
             return kind, factor * _PREFIX[word.removesuffix(base)]
     return "?", 1.0

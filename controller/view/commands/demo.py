@@ -19,7 +19,7 @@ from snakewalk.drivers.clock import WallClock
 
 RECORDED: Final = Path(__file__).resolve().parents[1] / "demonstration.mcap"
 """Log of ``snakewalk run`` on its defaults; it is part of the program."""
-_LIVE: Final = "snakewalk run --view"
+_LIVE_COMMAND: Final = "snakewalk run --view"
 _NICE: Final = 10
 """Loops are compiled behind the page (ours)."""
 
@@ -38,10 +38,10 @@ def demo(view_at: ViewAt = VIEW_AT) -> None:
     compiler = start(_compile_behind, daemon=True)
     clock = WallClock()
     play(page, clock, lambda: not compiler.is_alive())
-    print(f"{_LIVE}  runs the same live; Enter does it now", flush=True)
+    print(f"{_LIVE_COMMAND}  runs the same live; Enter does it now", flush=True)
     play(page, clock, _is_enter_pressed)
     page.server.stop()
-    raise SystemExit(run_command([*_LIVE.split()[1:], "--view-at", view_at]))
+    raise SystemExit(run_command([*_LIVE_COMMAND.split()[1:], "--view-at", view_at]))
 
 
 def _is_enter_pressed() -> bool:

@@ -14,7 +14,7 @@ from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.log_page import LogPage, play
 from snakewalk.drivers.clock import WallClock
 
-_MOST = 2
+_MOST_LOGS = 2
 
 
 @command(
@@ -39,7 +39,7 @@ def view(
     To watch a run, use --view of run, gait run and play.
     """
     host, port = host_and_port(view_at)
-    if len(logs) > _MOST:
+    if len(logs) > _MOST_LOGS:
         raise InputError(
             f"{len(logs)} logs: the page shows one or two; more: snakewalk log compare"
         )

@@ -353,7 +353,7 @@ def test_nothing_moves_where_nobody_can_say_yes(trio: Trio) -> None:
 
 
 def test_who_says_no_has_the_zeros_in_the_file(trio: Trio, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibrate_command, "_confirmed", lambda offsets, backup: False)
+    monkeypatch.setattr(calibrate_command, "_confirm_registers", lambda offsets, backup: False)
     monkeypatch.setattr(calibrate_command.sys, "stdin", SimpleNamespace(isatty=lambda: True))
     lines = iter(ANSWERS.splitlines())
     monkeypatch.setattr("builtins.input", lambda: next(lines))

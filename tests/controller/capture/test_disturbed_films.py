@@ -13,7 +13,7 @@ from snakewalk.controller.capture.small_body.crop import crop_body
 from snakewalk.controller.images.background import median_background, surrounding_ground
 from snakewalk.controller.images.body_detector import (
     BodyDetector,
-    _painted_out,
+    _repainted_detector,
     make_detector,
 )
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
@@ -137,7 +137,7 @@ def test_a_painted_animal_leaves_the_light_of_a_patterned_ground() -> None:
     )  # fmt: skip
     frames, bare = list(film(scene))[::3], empty(scene).astype(float)
     around = BodyDetector(None, Polarity.DARK, "", 49)
-    painted = _painted_out(around, frames)
+    painted = _repainted_detector(around, frames)
     assert painted is not None
     assert painted.background is not None
     covered = np.zeros(bare.shape, bool)

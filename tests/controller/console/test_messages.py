@@ -150,7 +150,7 @@ def test_every_command_that_moves_a_body_may_be_watched() -> None:
 def test_a_fallback_reported_at_import_is_shown(
     mocker: MockerFixture, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    mocker.patch.dict("snakewalk.drivers.fallbacks._reported", clear=True)
+    mocker.patch.dict("snakewalk.drivers.fallbacks._reported_fallbacks", clear=True)
     report_fallback("numba", "numba 9: loops count references")
     report_fallback("numba", "numba 9: again")
     with messages("warning"):

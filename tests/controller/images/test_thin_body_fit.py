@@ -34,7 +34,7 @@ def test_slopes_are_those_of_the_picture(which: int) -> None:
 
 def test_the_curve_of_a_picture_of_spots_is_found_again() -> None:
     shown, _ = thin_body_fit._picture(values(), SHAPE)
-    true = np.stack([thin_body_fit._FINE @ v for v in np.split(values()[:18], 2)], axis=1)
+    true = np.stack([thin_body_fit._FINE_BASIS @ v for v in np.split(values()[:18], 2)], axis=1)
     guess = true[::8] + np.array([0.6, -0.8])
     found = fitted(guess, shown.astype(np.float32), 4.0)
     assert found is not None
@@ -80,6 +80,6 @@ def test_spots_beyond_each_edge_draw_the_part_that_is_inside() -> None:
 def test_a_fit_that_leaves_its_guess_is_none(reach: float) -> None:
     """A guess half as long as the body, or more than twice as long, is of something else."""
     shown, _ = thin_body_fit._picture(values(), SHAPE)
-    true = np.stack([thin_body_fit._FINE @ v for v in np.split(values()[:18], 2)], axis=1)
+    true = np.stack([thin_body_fit._FINE_BASIS @ v for v in np.split(values()[:18], 2)], axis=1)
     middle = true.mean(axis=0)
     assert fitted(middle + reach * (true[::8] - middle), shown.astype(np.float32), 4.0) is None

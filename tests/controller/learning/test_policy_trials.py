@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.learning.policy_trials import PolicyTrial, _is_set, _prepare
+from snakewalk.controller.learning.policy_trials import PolicyTrial, _is_parameter_set, _prepare
 from snakewalk.controller.run.factory import prepare_policy
 from tests.helpers.command import snakewalk
 from tests.helpers.in_process import work_in_this_process
@@ -28,9 +28,9 @@ def test_a_seed_moves_the_start_of_all_motions_alike() -> None:
 def test_a_file_with_a_gait_is_a_set_of_its_parameters(tmp_path: Path) -> None:
     (tmp_path / "set.toml").write_text('# tuned\nname = "x"\ngait = "rolling"\n')
     (tmp_path / "policy.toml").write_text('name = "x"\nrobot = "yaw16"\n')
-    assert _is_set(str(tmp_path / "set.toml"))
-    assert not _is_set(str(tmp_path / "policy.toml"))
-    assert not _is_set("wave-cma")
+    assert _is_parameter_set(str(tmp_path / "set.toml"))
+    assert not _is_parameter_set(str(tmp_path / "policy.toml"))
+    assert not _is_parameter_set("wave-cma")
 
 
 @pytest.mark.costs("trials of policies")

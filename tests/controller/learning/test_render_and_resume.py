@@ -129,7 +129,7 @@ def quick(monkeypatch: pytest.MonkeyPatch, stop_after: int | None = None) -> lis
             raise KeyboardInterrupt
         return float(-np.abs(policy.wave.vector() - 0.4).sum())  # type: ignore[attr-defined]
 
-    monkeypatch.setattr(wave_search, "_earned", earned)
+    monkeypatch.setattr(wave_search, "_earned_reward", earned)
     return episodes
 
 

@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from benchmarks.stereo import widened_opencv
 from snakewalk.config.errors import InputError
-from snakewalk.controller.mapping.disparity import _filled, match
+from snakewalk.controller.mapping.disparity import _filled_gaps, match
 
 ROWS, COLUMNS = 120, 200
 V, U = np.mgrid[:ROWS, :COLUMNS].astype(float)
@@ -103,10 +103,10 @@ def test_little_is_told_of_a_sky_over_textured_ground() -> None:
 def test_filled_gaps_are_interpolated_or_belong_to_the_farther_side() -> None:
     nan = np.nan
     row = np.array([[nan, 4.0, nan, nan, 4.6, nan, 9.0, nan, nan, nan, 9.0, nan]])
-    found = _filled(row, 2)
+    found = _filled_gaps(row, 2)
     wanted = [nan, 4.0, 4.2, 4.4, 4.6, 4.6, 9.0, nan, nan, nan, 9.0, nan]
     assert np.allclose(found[0], wanted, equal_nan=True)
-    assert np.array_equal(_filled(row, 0), row, equal_nan=True)
+    assert np.array_equal(_filled_gaps(row, 0), row, equal_nan=True)
 
 
 @pytest.mark.costs("matches a whole pair of images")

@@ -110,8 +110,8 @@ def test_the_score_is_the_way_of_the_body_between_the_ends() -> None:
     centre_m = np.stack([0.3 * time_s, 0.0 * time_s, 0.1 * time_s], axis=1)
     pose = type("Pose", (), {"time_s": time_s, "centre_m": centre_m})
     record = type("Record", (), {"pose": pose})
-    assert tasks._moved_m(record, "x") == pytest.approx(0.3 * 9.5)  # type: ignore[arg-type]
-    assert tasks._moved_m(record, "z") == pytest.approx(0.1 * 9.5)  # type: ignore[arg-type]
+    assert tasks._moved_distance_m(record, "x") == pytest.approx(0.3 * 9.5)  # type: ignore[arg-type]
+    assert tasks._moved_distance_m(record, "z") == pytest.approx(0.1 * 9.5)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -359,7 +359,7 @@ def test_a_command_that_waited_in_the_network_is_dropped_but_a_halt_is_not(
     commands.has_begun = True
     now_s = [50.0]
     monkeypatch.setattr("time.monotonic", lambda: now_s[0])
-    taken = commands._guarded("robot_gait", commands.on_gait)
+    taken = commands._guarded_callback("robot_gait", commands.on_gait)
 
     def send(text: str, sent_s: float) -> Any:
         taken(String(data=text), {"source_timestamp": int(1e9 * (3600.0 + sent_s))})

@@ -33,11 +33,11 @@ def test_keys_of_a_run_that_stood_still_are_dropped_and_reported() -> None:
     device.keys = ["n", "m"]
     now_s[0] = 10.9
     assert hands.torque_off() is None
-    assert hands._take() == ["n", "m"]
+    assert hands._take_keys() == ["n", "m"]
     device.keys = ["n", "q"]
     now_s[0] = 12.0
     assert hands.torque_off() is None
-    late, ending = hands._take()
+    late, ending = hands._take_keys()
     assert isinstance(late, Refused)
     assert late.why.startswith("n came up to 1.1 s late and is dropped; at most 1 s is accepted")
     assert ending == "q"
@@ -49,7 +49,7 @@ def test_keys_that_waited_for_the_motion_are_dropped() -> None:
     device.keys = ["n"]
     for now_s[0] in (10.5, 11.0, 11.5):
         assert hands.torque_off() is None
-    (late,) = hands._take()
+    (late,) = hands._take_keys()
     assert isinstance(late, Refused)
 
 

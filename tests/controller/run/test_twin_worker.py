@@ -160,7 +160,7 @@ def test_an_answer_counts_for_the_decision_it_was_asked_for_and_not_later(
             made.append(len(asked.questions))
             # an answer about the decision just made is late
             asked.due = [TwinAnswer(made[-1], 0, rolled(9.0))]
-            assert walker._answered_best(walker._best()).cost_m2 < 9.0
+            assert walker._best_answer(walker._best_piece()).cost_m2 < 9.0
     assert made == sorted(made)
     assert made[-1] >= 2
 

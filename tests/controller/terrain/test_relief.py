@@ -8,7 +8,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.relief import (
     Relief,
-    _summed,
+    _window_sum,
     elevation_variance_m2,
     fitted_slope_rad,
 )
@@ -120,4 +120,4 @@ def test_sums_in_windows_are_scipys_to_the_bit(window: tuple[int, int]) -> None:
     rng = np.random.default_rng(3)
     values, weight = rng.normal(size=(60, 75)), rng.normal(size=window)
     expected = fftconvolve(values, weight[::-1, ::-1], mode="same")
-    np.testing.assert_array_equal(_summed(values, weight), expected)
+    np.testing.assert_array_equal(_window_sum(values, weight), expected)

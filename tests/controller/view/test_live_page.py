@@ -369,7 +369,7 @@ def clicked(
     if word:
         panel._arming(word)(None)
     origin_m = np.add([*at_m, 0.0], [-1.0, -2.0, 3.0]) + panel._scene._frame.position
-    panel._clicked(
+    panel._on_click(
         SimpleNamespace(ray_origin=origin_m, ray_direction=(1.0, 2.0, -3.0), modifier=modifier)  # type: ignore[arg-type]
     )
 
@@ -399,7 +399,7 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
         view.on_row("/pose", b"{}")
         for topic, row in view.sent():
             if topic == "/picture":
-                view.page._take(topic, row)
+                view.page._store_row(topic, row)
         assert view.page._dashboard is not None
         picture = view.page._dashboard._picture
         return None if picture is None else picture.image

@@ -186,7 +186,7 @@ def considered(
     scene.rolls._planner.tried = lambda *given: plans  # type: ignore[method-assign]
     at = pose_at(np.zeros(2), 0.0)
     view = body_in_world(ROBOT, at, np.zeros(16))._replace(centre_m=np.zeros(3))
-    return scene.rolls._best(view, target_m), scene
+    return scene.rolls._best_roll(view, target_m), scene
 
 
 def test_a_roll_is_as_fast_as_on_the_twin_and_ends_where_that_is_nearest() -> None:

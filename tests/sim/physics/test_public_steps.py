@@ -37,7 +37,7 @@ CASES = [
 @pytest.fixture(autouse=True)
 def checked_again(mocker: MockerFixture) -> Iterator[None]:
     """The check runs again in each test, and nothing was reported before."""
-    mocker.patch.dict(fallbacks._reported, clear=True)
+    mocker.patch.dict(fallbacks._reported_fallbacks, clear=True)
     step_layout.cache_clear()
     yield
     step_layout.cache_clear()
@@ -99,12 +99,12 @@ def test_the_public_steps_are_reported_once(
 )
 def test_a_moved_field_is_found(field: str, error: str, mocker: MockerFixture) -> None:
     """A description with one field in another place than in memory."""
-    described, arrays = layout._described()
+    described, arrays = layout._mujoco_layout()
     if field in arrays:
         arrays = {**arrays, field: arrays[field] + 8}
     wrong = {**described.data, field: described.data.get(field, 0) + 8}
     moved_field = StepLayout(wrong, described.contact, described.functions)
-    mocker.patch.object(layout, "_described", return_value=(moved_field, arrays))
+    mocker.patch.object(layout, "_mujoco_layout", return_value=(moved_field, arrays))
     found = step_layout()
     assert isinstance(found, str)
     assert error in found
@@ -123,11 +123,11 @@ def test_parts_that_step_otherwise_than_mujoco_are_not_used(
     missing: str, mocker: MockerFixture
 ) -> None:
     """One of the parts does something else than its name says."""
-    described, arrays = layout._described()
+    described, arrays = layout._mujoco_layout()
     other = described.functions["mj_projectConstraint"]
     functions = {**described.functions, missing: other}
     changed = StepLayout(described.data, described.contact, functions)
-    mocker.patch.object(layout, "_described", return_value=(changed, arrays))
+    mocker.patch.object(layout, "_mujoco_layout", return_value=(changed, arrays))
     found = step_layout()
     assert isinstance(found, StepLayout)
     assert not found.has_parts or missing == "mj_checkVel"
