@@ -144,10 +144,15 @@ class LegPairConfig(Strict):
     )
 
     @property
+    def parts(self) -> dict[str, float]:
+        """Names and lengths from the root to the ankle or fetlock, then the foot, if present."""
+        names = ("blade", "upper", "lower", "cannon", "foot")
+        return {name: part for name in names if (part := getattr(self, name)) > 0.0}
+
+    @property
     def segments(self) -> tuple[float, ...]:
-        """Lengths from the root to the ankle or fetlock, then the foot, without missing ones."""
-        parts = (self.blade, self.upper, self.lower, self.cannon, self.foot)
-        return tuple(part for part in parts if part > 0.0)
+        """Lengths of the parts."""
+        return tuple(self.parts.values())
 
     @property
     def sole_height(self) -> float:

@@ -27,6 +27,14 @@ _POINT = 0.15
 _PLAIN_UV = 0.3, 0.98
 """A place of the texture outside its bands."""
 _DARK_V = 0.5
+_LEG_BONES = tuple(
+    dict(zip(("blade", "upper", "lower", "cannon", "foot"), names, strict=True))
+    for names in (
+        ("scapula", "upper_arm", "forearm", "fore_cannon", "fore_foot"),
+        ("hip", "thigh", "shank", "hind_cannon", "hind_foot"),
+    )
+)
+"""Names of the parts of a front and of a hind leg."""
 
 
 def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
@@ -39,21 +47,25 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
     parts = [(base.mesh, base.held)]
     rest = list(base.rest_m)
     parent = base.parent.tolist()
+    names = list(base.names)
 
     def hang(corners: Floats, carrier: int, uv: tuple[float, float]) -> None:
         """Add a bone with its part."""
         parts.append(carried_part(corners, _RING_CORNERS, len(rest), uv))
         rest.append(np.zeros(3))
         parent.append(carrier)
+        names.append(f"ornament_{len(names) - ornaments:02d}")
 
     dark = (1.0 / bands if bands else 0.5), _DARK_V
-    for pair in animal.leg_pairs:
-        for side in (1.0, -1.0):
+    for pair, bones in zip(animal.leg_pairs, _LEG_BONES, strict=True):
+        for side, suffix in ((1.0, "left"), (-1.0, "right")):
+            names += [f"{bones[part]}_{suffix}" for part in pair.parts]
             first = len(rest)
             parts += leg_parts(pair, length_m, first, side, LegColours(_PLAIN_UV, dark))
             starts_m = length_m * np.concatenate([[0.0], np.cumsum(pair.segments)[:-1]])
             rest += [np.array([-start, 0.0, 0.0]) for start in starts_m]
             parent += [_carrier(pair.at), *range(first, first + len(starts_m) - 1)]
+    ornaments = len(names)
     for ornament in animal.all_ornaments:
         thick_m = length_m * ornament.thick
         cone = _horn(ornament, length_m, thick_m)
@@ -70,7 +82,8 @@ def animal_rig(animal: AnimalConfig, skin: Skin, bands: int) -> Rig:
                     uv,
                 )
             )
-    return Rig(*_joined_mesh(parts), np.array(rest), np.array(parent, dtype=np.int64))
+    mesh, held = _joined_mesh(parts)
+    return Rig(mesh, held, np.array(rest), np.array(parent, dtype=np.int64), tuple(names))
 
 
 def animal_bones(animal: AnimalConfig, motion: AnimalMotion) -> BoneMotion:

@@ -21,12 +21,16 @@ class Rig:
     """(K, 3) fronts of the bones at rest."""
     parent: Ints
     """(K,) the bone that carries each one, before it in order; -1 none."""
+    names: tuple[str, ...]
+    """K names of the bones, such as ``thigh_left``."""
 
 
 def spine_rig(skin: Skin, bone_m: Floats) -> Rig:
     """Hang a skin on a spine's bones of lengths (K,), each carried by the one before."""
     rest_m = rest_fronts_m(bone_m, skin.axis_m)
-    return Rig(skin.mesh, weights(skin, bone_m), rest_m, np.arange(len(bone_m)) - 1)
+    parent = np.arange(len(bone_m)) - 1
+    names = tuple(f"spine_{k:02d}" for k in range(len(bone_m)))
+    return Rig(skin.mesh, weights(skin, bone_m), rest_m, parent, names)
 
 
 def posed_m(rig: Rig, motion: BoneMotion, frame: int) -> Floats:

@@ -139,7 +139,7 @@ def _bones(rig: Rig) -> tuple[list[pygltflib.Node], Floats]:
     nodes = [
         pygltflib.Node(name="body", mesh=0, skin=0),
         pygltflib.Node(
-            name="spine",
+            name="root",
             rotation=_ROOT_QUATERNION,
             children=(np.flatnonzero(~carried) + 2).tolist(),
         ),
@@ -147,7 +147,7 @@ def _bones(rig: Rig) -> tuple[list[pygltflib.Node], Floats]:
     for k in range(len(rest)):
         children = (np.flatnonzero(rig.parent == k) + 2).tolist()
         nodes.append(
-            pygltflib.Node(name=f"bone{k}", translation=local[k].tolist(), children=children)
+            pygltflib.Node(name=rig.names[k], translation=local[k].tolist(), children=children)
         )
     return nodes, local
 

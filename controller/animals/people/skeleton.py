@@ -113,6 +113,12 @@ class PersonSkeleton:
         )
 
 
+def bone_name(name: str) -> str:
+    """Return the name of a bone in a file: ``left upper arm`` is ``upper_arm_left``."""
+    part = _part(name)
+    return "_".join([*part.split(), *name.removesuffix(part).split()])
+
+
 def _part(name: str) -> str:
     """Name of a bone without its side."""
     return name.removeprefix("left ").removeprefix("right ")

@@ -22,7 +22,7 @@ from snakewalk.controller.animals.people.body_curves import (
     BodyPart,
     body_parts,
 )
-from snakewalk.controller.animals.people.skeleton import PersonSkeleton
+from snakewalk.controller.animals.people.skeleton import BONES, PersonSkeleton, bone_name
 from snakewalk.controller.images.mesh import Mesh
 
 _ROWS = 3
@@ -97,7 +97,8 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
     triangles = np.concatenate(faces)
     mesh = Mesh(vertices, vertex_normals(vertices, triangles), np.concatenate(uv), triangles)
     weights = Weights(np.concatenate(bones), np.concatenate(shares))
-    return Rig(mesh, weights, skeleton.joint_m, skeleton.parent)
+    names = tuple(bone_name(name) for name, _ in BONES)
+    return Rig(mesh, weights, skeleton.joint_m, skeleton.parent, names)
 
 
 def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:

@@ -39,6 +39,7 @@ def worn_mesh(person: Person, mesh: Mesh) -> Rig:
         weights,
         person.rig.rest_m,
         person.rig.parent,
+        person.rig.names,
     )
 
 

@@ -68,7 +68,8 @@ def rig_with_tongue(rig: Rig, length_m: float, texture: Image | None) -> tuple[R
         np.vstack([rig.held.shares, np.tile([0.0, 1.0, 0.0], (len(corners), 1))]),
     )
     parent = np.append(rig.parent, 0)
-    return Rig(joined, weights, np.vstack([rig.rest_m, rig.rest_m[0]]), parent), texture
+    rest_m = np.vstack([rig.rest_m, rig.rest_m[0]])
+    return Rig(joined, weights, rest_m, parent, (*rig.names, "tongue")), texture
 
 
 def bones_with_tongue(bones: BoneMotion, heights: Floats) -> BoneMotion:

@@ -220,6 +220,9 @@ def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
     assert skin.read_bytes().startswith(b"glTF")
     held = pygltflib.GLTF2().load(str(skin))
     assert len(held.skins[0].joints) >= 100
+    names = [held.nodes[joint].name for joint in held.skins[0].joints]
+    assert names[3] == "spine_03"
+    assert len(set(names)) == len(names)
     assert held.accessors[held.animations[0].samplers[0].input].count == 4
 
 

@@ -31,6 +31,10 @@ def test_bones_of_the_legs_lie_between_their_joints(name: str) -> None:
     animal, motion = read_animal(name), moved(name)
     rig, bones = AnimalBody.of(animal).rig, animal_bones(animal, motion)
     assert len(rig.rest_m) == bones.front_m.shape[1] == len(bones.bone_m) == len(rig.parent)
+    assert len(set(rig.names)) == len(rig.names) == len(rig.parent)
+    assert {"spine_03", "upper_arm_right", "thigh_left", "hind_foot_left"} <= set(rig.names)
+    thigh = rig.names.index("thigh_left")
+    assert rig.names[rig.parent[thigh + 1]] == "thigh_left"
     first = SEGMENTS
     for k, joints in enumerate(motion.joints_m):
         parts = len(animal.leg_pairs[k // 2].segments)

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pygltflib
 import pytest
 import trimesh
 from scipy.spatial import cKDTree
@@ -194,6 +195,9 @@ def test_the_file_plays_the_same_cycle_and_closes(
     facts = json.loads(done.stdout)
     assert facts["feet_slide_m"] == 0.0
     assert facts["bones"] == 19
+    names = [node.name for node in pygltflib.GLTF2().load(str(tmp_path / "a.glb")).nodes]
+    assert len(set(names)) == len(names) == facts["bones"] + 2
+    assert {"thigh_left", "upper_arm_right", "pelvis"} <= set(names)
     player = GltfPlayer.read(tmp_path / "a.glb")
     np.testing.assert_allclose(player.time_s, walk.bones.time_s, atol=1e-6)
     to_world = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
