@@ -2,7 +2,6 @@
 
 import csv
 import io
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -47,7 +46,7 @@ def read_schedule(path: Path) -> ScheduleConfig:
         rows = csv.DictReader(io.StringIO(read_text(path, MOST_JSON_BYTES)))
         if tuple(rows.fieldnames or ()) != COLUMNS:
             raise InputError(f"{path}: expected the columns {','.join(COLUMNS)}")
-        table = [[_number(path, line, row[name]) for name in COLUMNS] for line, row in _lines(rows)]
+        table = [[_number(path, rows.line_num, row[name]) for name in COLUMNS] for row in rows]
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from None
     except (UnicodeDecodeError, csv.Error) as error:
@@ -56,10 +55,6 @@ def read_schedule(path: Path) -> ScheduleConfig:
         raise InputError(f"{path}: no rows")
     curves = {COLUMNS[k]: [[row[0], row[k]] for row in table] for k in (1, 2)}
     return checked(ScheduleConfig, curves | {"duration_s": table[-1][0]}, str(path))
-
-
-def _lines(rows: "csv.DictReader[str]") -> list[tuple[int, dict[str, str | None]]]:
-    return [(rows.line_num, dict(row)) for row in rows]
 
 
 def _number(path: Path, line: int, text: str | None) -> float:
@@ -126,21 +121,15 @@ class ScheduleRun(PathlessRun):
         return float(curve_at(asked.speed_m_s, time_s)), float(curve_at(asked.turn_rad_s, time_s))
 
     def check_plan(self) -> PlanSummary:
-        """Check that there is an action for each direction that the schedule requests.
+        """Check that the actions can have each constant speed and turn of the schedule in the mean.
 
         Raises:
-            InputError: the actions cannot be loaded, or none goes or turns that way.
+            InputError: the actions cannot be loaded, or have no such mean.
 
         """
-        control = self.controller()
-        missing_time = self._first_lasting(lambda *asked: bool(control.missing(*asked)))
-        if missing_time is not None:
-            since_s, asked = missing_time
-            raise InputError(
-                f"{self.config.file}: no action {control.missing(*asked)} ({asked[0]:g} m/s, "
-                f"{asked[1]:g} rad/s from {since_s:.1f} s); request one of these: "
-                f"{control.available()}"
-            )
+        fault = self._first_unreachable(is_constant=True) if self.config.patience is None else None
+        if fault is not None:
+            raise InputError(fault)
         return plan_without_path(self.run)
 
     def remark(self) -> str | None:
@@ -152,30 +141,28 @@ class ScheduleRun(PathlessRun):
                 f"{self.config.file}: recorded on world {recorded}; on {world} speeds, turns and "
                 f"even directions may differ: record there, or leave --world out"
             )
-        control = self.controller()
-        far_time = self._first_lasting(control.is_far)
-        if far_time is None:
-            return None
-        since_s, asked = far_time
-        return (
-            f"{self.config.file}: the nearest action to {asked[0]:g} m/s and {asked[1]:g} rad/s "
-            f"(from {since_s:.1f} s) is {control.text(control.nearest(*asked))}; "
-            "`snakewalk gait repertoire show` lists all actions"
-        )
+        return self._first_unreachable(is_constant=False)
 
-    def _first_lasting(
-        self, of: Callable[[float, float], bool]
-    ) -> tuple[float, tuple[float, float]] | None:
-        """Return since when, and the request for which, ``of`` holds for a while; None if never."""
+    def _first_unreachable(self, *, is_constant: bool) -> str | None:
+        """Return the first request that lasts and that no actions meet in the mean, in words."""
         config = self.config
+        control = self.controller()
         times_s = np.arange(0.0, config.duration_s, _SAMPLE_S)
-        asked = (curve_at(curve, times_s) for curve in (config.speed_m_s, config.turn_rad_s))
+        curves = (curve_at(curve, times_s) for curve in (config.speed_m_s, config.turn_rad_s))
         lasting = min(round(_LASTING_S / _SAMPLE_S), len(times_s))
         count = 0
-        for k, (speed_m_s, turn_rad_s) in enumerate(zip(*asked, strict=True)):
-            count = count + 1 if of(float(speed_m_s), float(turn_rad_s)) else 0
+        before = None
+        for k, asked in enumerate(zip(*(curve.tolist() for curve in curves), strict=True)):
+            if is_constant and asked != before:
+                count = 0
+            before = asked
+            others = control.unreachable(*asked)
+            count = count + 1 if others else 0
             if count == lasting:
-                return float(times_s[k - lasting + 1]), (float(speed_m_s), float(turn_rad_s))
+                return (
+                    f"{config.file}: its actions do not have {asked[0]:g} m/s and {asked[1]:g} "
+                    f"rad/s in the mean (from {times_s[k - lasting + 1]:.1f} s); they have {others}"
+                )
         return None
 
     def make_source(self, on_event: OnEvent) -> "ScheduleMotion":

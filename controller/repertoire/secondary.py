@@ -1,25 +1,24 @@
 """The secondary controller ([YT] 5.1): from a requested speed and turn to a segment."""
 
+from functools import cached_property
 from typing import Final
 
 import numpy as np
 
-from snakewalk.config.arrays import Indices
+from snakewalk.config.arrays import Indices, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.repertoire.mixture import CYCLES, Mixtures
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.segment import SIDES
 
 _ALIKE: Final = 0.1
 """Turns that differ by less than this share of the largest one count as equal (ours)."""
-_FAR: Final = 0.25
-"""A speed or turn that is off by more than this share of the largest one is far (ours)."""
-_DIRECTIONS: Final = {1: "goes forward", -1: "goes backward", 0: "rests"}
-_SIDES: Final = {1: " and turns left", -1: " and turns right", 0: ""}
 
 
 class SecondaryController:
-    """Selects segments, and another one when one has been repeated too often.
+    """Selects segments whose mean speed and turn over ten cycles are the requested ones.
 
+    With ``patience`` it repeats the nearest segment, and replaces it after that many cycles.
     A requested speed has a direction: forward, backward, or at rest, which is below half of the
     slowest recorded speed. A segment of another direction is selected only if this direction has
     none.
@@ -55,7 +54,6 @@ class SecondaryController:
         moves = self._kinds != "rest"
         self._direction = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
         turns = np.isin(self._kinds, list(SIDES))
-        self._side = np.where(turns, np.sign(self._turn_rad_s), 0.0).astype(int)
         steady_m_s = self._speed_m_s[self._steady]
         if not (self._direction[self._steady] > 0).any():
             raise InputError(
@@ -65,9 +63,9 @@ class SecondaryController:
         self._slowest_m_s = float(steady_m_s[self._direction[self._steady] > 0].min())
         back_m_s = -steady_m_s[self._direction[self._steady] < 0]
         self._slowest_back_m_s = float(back_m_s.min(initial=np.inf))
-        self._fastest_m_s = float(np.abs(steady_m_s).max())
-        self._least_turn_rad_s = float(np.abs(self._turn_rad_s[turns]).min(initial=np.inf))
         self._most_turn_rad_s = float(np.abs(self._turn_rad_s[turns]).max(initial=0.0))
+        self._duration_s = np.array([segment.duration_s for segment in segments])
+        self._owed: Ints = np.zeros(len(segments), dtype=np.int64)
         self._patience = patience
         self._random = np.random.default_rng(seed)
         self._last: int | None = None
@@ -81,11 +79,14 @@ class SecondaryController:
         return int(near[np.argmin(np.abs(self._speed_m_s[near] - speed_m_s))])
 
     def choose(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
-        """As ``nearest``, for the next cycle; a body that goes forward brakes before it rests.
+        """Select the next cycle; a body that goes forward brakes before it rests.
 
         After ``patience`` equal ones a random other of the same kind and direction follows.
         """
-        chosen = self.nearest(speed_m_s, turn_rad_s)
+        if self._patience is None:
+            chosen = self._next_of_mixture(speed_m_s, turn_rad_s)
+        else:
+            chosen = self.nearest(speed_m_s, turn_rad_s)
         if self._kinds[chosen] == "rest":
             # a brake goes forward, also after an action that does not
             last = self._last
@@ -106,32 +107,53 @@ class SecondaryController:
         self._last = chosen
         return chosen
 
-    def missing(self, speed_m_s: float, turn_rad_s: float) -> str:
-        """Return the motion that is requested and that no segment has; empty if one has it."""
-        direction = self._requested_direction(speed_m_s)
-        side = self._requested_side(turn_rad_s)
-        has = (self._direction == direction) & (self._side == side)
-        return "" if has[self._steady].any() else _DIRECTIONS[direction] + _SIDES[side]
-
-    def is_far(self, speed_m_s: float, turn_rad_s: float) -> bool:
-        """Return whether speed or turn of the nearest segment differs much from the requested."""
-        chosen = self.nearest(speed_m_s, turn_rad_s)
-        off_m_s = abs(self._speed_m_s[chosen] - speed_m_s)
-        off_rad_s = abs(self._turn_rad_s[chosen] - turn_rad_s)
-        least_rad_s = max(self._most_turn_rad_s, abs(turn_rad_s))
-        return bool(off_m_s > _FAR * self._fastest_m_s or off_rad_s > _FAR * least_rad_s)
-
-    def text(self, segment: int) -> str:
-        """Return name, speed and turn of a segment for a message."""
-        speed_m_s, turn_rad_s = (
-            round(float(rates[segment]), 2) + 0.0  # not -0
-            for rates in (self._speed_m_s, self._turn_rad_s)
-        )
-        return f"{self._names[segment]} ({speed_m_s:.2f} m/s, {turn_rad_s:.2f} rad/s)"
+    def unreachable(self, speed_m_s: float, turn_rad_s: float) -> str:
+        """Return the reachable speeds and turns in words; empty if a mixture meets both."""
+        asked = np.array([speed_m_s, turn_rad_s])
+        if self._mixtures[self._requested_direction(speed_m_s)].best(asked)[1] <= 1.0:
+            return ""
+        ranges = []
+        for axis, unit, other in (
+            (0, "m/s", f"{turn_rad_s:g} rad/s"),
+            (1, "rad/s", f"{speed_m_s:g} m/s"),
+        ):
+            means = (mixtures.span(axis, asked) for mixtures in self._mixtures.values())
+            ends = (np.round([span.min(), span.max()], 2) + 0.0 for span in means if len(span))
+            spans = dict.fromkeys(
+                " to ".join(dict.fromkeys(f"{end:.2f}" for end in pair)) for pair in ends
+            )
+            if spans:
+                ranges.append(f"with {other}: {' or '.join(spans)} {unit}")
+        return "; ".join(ranges) or self.available()
 
     def available(self) -> str:
-        """Return all segments that can be selected, for a message."""
-        return ", ".join(self.text(int(segment)) for segment in self._steady)
+        """Return name, speed and turn of all segments that can be selected, for a message."""
+        return ", ".join(
+            f"{self._names[k]} ({self._speed_m_s[k]:.2f} m/s, {self._turn_rad_s[k]:.2f} rad/s)"
+            for k in self._steady
+        )
+
+    def _next_of_mixture(self, speed_m_s: float, turn_rad_s: float) -> int:
+        """Return the segment that the mixture owes most cycles; ten in a row contain them all."""
+        direction = self._requested_direction(speed_m_s)
+        options = self._going(direction)
+        asked = np.array([speed_m_s, turn_rad_s])
+        cycles, _ = self._mixtures[direction].best(asked)
+        self._owed[options] += cycles
+        part = options[cycles > 0]
+        chosen = int(part[np.argmax(self._owed[part])])
+        self._owed[chosen] -= CYCLES
+        return chosen
+
+    @cached_property
+    def _mixtures(self) -> dict[int, Mixtures]:
+        """Mixtures of the segments of each direction."""
+        rates = np.column_stack([self._speed_m_s, self._turn_rad_s])
+        options = {direction: self._going(direction) for direction in (1, 0, -1)}
+        return {
+            direction: Mixtures(rates[k], self._duration_s[k], self._slowest_m_s)
+            for direction, k in options.items()
+        }
 
     def _requested_direction(self, speed_m_s: float) -> int:
         """Return 1 forward, -1 backward, 0 at rest."""
@@ -141,14 +163,6 @@ class SecondaryController:
         if speed_m_s >= 0.5 * self._slowest_m_s:
             return 1
         return -1 if speed_m_s <= -0.5 * back_m_s else 0
-
-    def _requested_side(self, turn_rad_s: float) -> int:
-        """Return 1 left, -1 right, 0 where straight on is as near as the gentlest turn."""
-        least_rad_s = self._least_turn_rad_s
-        if least_rad_s == np.inf:
-            least_rad_s = 0.0
-        turns = turn_rad_s != 0.0 and abs(turn_rad_s) >= 0.5 * least_rad_s
-        return int(np.sign(turn_rad_s)) if turns else 0
 
     def _going(self, direction: int) -> Indices:
         """Return the segments of a direction; else those that rest, else the slowest."""

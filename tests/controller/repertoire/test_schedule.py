@@ -39,14 +39,15 @@ def test_the_body_does_what_the_actions_did_when_recorded_also_at_another_size(
     file: Path, tmp_path: Path, size: float
 ) -> None:
     keys = {"robot.link_length_m": 0.07 * size}
-    prepared = prepare_schedule(file, WANTED, keys=keys)
+    speed = tuple((time_s, size * speed_m_s) for time_s, speed_m_s in WANTED.speed_m_s)
+    prepared = prepare_schedule(file, WANTED.model_copy(update={"speed_m_s": speed}), keys=keys)
     assert prepared.scale == pytest.approx(size)
     finished = run_robot(RunRequest(prepared, tmp_path))
     assert isinstance(finished.source, ScheduleMotion)
     names = [segment.name for segment in prepared.repertoire.segments]
     played = finished.source.played
     done = [names[one.action] for one in played]
-    assert done[:2] == ["left-sharp", "forward-fast" if size == 1.0 else "forward-medium"]
+    assert done[:2] == ["left-sharp", "forward-fast"]
     at = done.index("brake")
     assert set(done[at + 1 :]) <= {"rest", "reverse"}
     back = played[-1]
@@ -120,8 +121,8 @@ def test_a_direction_that_was_not_recorded_is_rejected_before_torque(
         *("gait", "repertoire", "play", str(file), "--speed=-0.4", "--turn", "0.3", *port, *out)
     )
     assert done.returncode == 2
-    assert "no action goes backward and turns left (-0.4 m/s, 0.3 rad/s from 0.0 s)" in done.stderr
-    assert "reverse (-0.38 m/s, 0.00 rad/s)" in done.stderr
+    assert "do not have -0.4 m/s and 0.3 rad/s in the mean (from 0.0 s)" in done.stderr
+    assert "with 0.3 rad/s: 0.42 to 0.59 m/s; with -0.4 m/s: 0.00 rad/s" in done.stderr
     assert not (tmp_path / "run").exists()
 
 
@@ -132,15 +133,18 @@ def test_a_direction_that_is_missing_for_a_moment_is_a_transition(
     turn = ((0.0, 0.9), (4.0, 0.9), (4.4, 0.0))
     prepare_schedule(file, ScheduleConfig(speed_m_s=speed, turn_rad_s=turn))
     assert not caplog.messages
-    with pytest.raises(InputError, match=r"goes backward and turns left .*from 4\.2 s"):
+    with pytest.raises(InputError, match=r"-0\.4 m/s and 0\.9 rad/s in the mean \(from 4\.4 s"):
         prepare_schedule(file, ScheduleConfig(speed_m_s=speed, turn_rad_s=0.9))
 
 
-def test_an_action_that_is_much_slower_than_requested_is_reported(
+def test_a_ramp_to_speeds_that_no_action_has_is_reported(
     file: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    prepare_schedule(file, ScheduleConfig(speed_m_s=1.5))
-    assert "the nearest action to 1.5 m/s and 0 rad/s (from 0.0 s) is forward-fast" in caplog.text
+    prepare_schedule(file, ScheduleConfig(speed_m_s=((0.0, 0.5), (20.0, 1.5))))
+    assert "rad/s in the mean (from " in caplog.text
+    assert "they have with 0 rad/s: 0.38 to 0.60 or 0.00 or -0.38 m/s" in caplog.text
+    with pytest.raises(InputError, match=r"do not have 1\.5 m/s and 0 rad/s in the mean"):
+        prepare_schedule(file, ScheduleConfig(speed_m_s=1.5))
 
 
 @pytest.mark.slow
