@@ -156,7 +156,7 @@ def _tables(title: str, model: type[BaseModel]) -> list[str]:
     lines = [
         f"## {title}",
         "",
-        _sentence(model),
+        (model.__doc__ or "").strip().partition("\n")[0],
         "",
         "| key | value | default | |",
         "|---|---|---|---|",
@@ -193,10 +193,6 @@ def _title(title: str, name: str, model: type[BaseModel], choices: int) -> str:
     if choices == 1:
         return place
     return f'{place} with `kind = "{_text(model.model_fields["kind"].default)}"`'
-
-
-def _sentence(model: type[BaseModel]) -> str:
-    return (model.__doc__ or "").strip().partition("\n")[0]
 
 
 def table_models(annotation: Any) -> list[type[BaseModel]]:

@@ -24,7 +24,10 @@ class _Temporary(caching.UserWideCacheLocator):  # type: ignore[misc]  # numba h
 
     def __init__(self, py_func: Any, py_file: str) -> None:
         super().__init__(py_func, py_file)
-        self.folder = os.path.join(tempfile.gettempdir(), _folder_name())
+        self.folder = os.path.join(
+            tempfile.gettempdir(),
+            (f"snakewalk-{os.getuid()}-loops" if hasattr(os, "getuid") else "snakewalk-loops"),
+        )
         self._cache_path = os.path.join(self.folder, self.get_suitable_cache_subpath(py_file))
 
     def ensure_cache_path(self) -> None:
@@ -153,7 +156,3 @@ def _names(code: CodeType) -> Iterator[str]:
 def _file_stamp(file: str) -> tuple[float, int]:
     info = os.stat(file)
     return info.st_mtime, info.st_size
-
-
-def _folder_name() -> str:
-    return f"snakewalk-{os.getuid()}-loops" if hasattr(os, "getuid") else "snakewalk-loops"

@@ -13,7 +13,7 @@ import numpy as np
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.console.finding import Finding, Grade, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
-from snakewalk.drivers.chain.chain_settings import ChainSetting, chain_settings
+from snakewalk.drivers.chain.chain_settings import chain_settings
 from snakewalk.drivers.chain.fingerprint import (
     COMPARED,
     fixed_faults,
@@ -422,7 +422,12 @@ class _Checks:
         """Registers that are neither the factory's nor the run's."""
         unusual_values = []
         for servo in self._servos:
-            run = {s.register: s for s in self._settings(servo)}
+            run = {
+                s.register: s
+                for s in chain_settings(
+                    self._robot, self._units, servo.joint, self._full[servo.joint]
+                )
+            }
             for name in registers:
                 value = servo.values.get(name)
                 if value is None:
@@ -441,6 +446,3 @@ class _Checks:
         """Value of a new servo's register; ``value`` if the model's file does not give it."""
         facts = self._robot.servo_records[servo.joint]
         return value if facts.motor is None else facts.registers[name].initial
-
-    def _settings(self, servo: ServoRegisters) -> tuple[ChainSetting, ...]:
-        return chain_settings(self._robot, self._units, servo.joint, self._full[servo.joint])

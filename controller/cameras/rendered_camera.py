@@ -102,7 +102,7 @@ class RenderedCamera:
 
     def first(self) -> LineDetection:
         """Detect the body now."""
-        return self._detect(self._clock.now_s())
+        return self.detector.detect(self._view.picture(self._qpos()), self._clock.now_s())
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
         """Capture a frame if due; return arrived ones."""
@@ -130,6 +130,3 @@ class RenderedCamera:
         detection = self.detector.track(picture, now_s, prior, self._robot)
         self.detector = self._learning.after(self.detector, picture, prior, detection)
         return detection
-
-    def _detect(self, now_s: float) -> LineDetection:
-        return self.detector.detect(self._view.picture(self._qpos()), now_s)

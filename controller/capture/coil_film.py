@@ -227,7 +227,9 @@ class _Film:
                 error_px = float(np.hypot(error / self.body.scale, own_px))
             is_beside_end = n in {0, len(stretch) - 1} and status is not FrameStatus.COIL
             if solved_skeleton.status is FrameStatus.GOOD and (
-                is_beside_end or _mean_distance_px(solved_skeleton, body) < error_px
+                is_beside_end
+                or float(np.hypot(*(solved_skeleton.points_px - body.points_px).T).mean())
+                < error_px
             ):
                 body = solved_skeleton
                 error_px = np.nan  # the medial axis was right
@@ -462,11 +464,6 @@ class _Film:
 def _unsolved_skeleton(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
     """Skeleton of a frame that is not solved, with its own reason if it may not be a coil."""
     return skeleton if skeleton.status in _UNCLEAR_STATUSES else no_skeleton(status)
-
-
-def _mean_distance_px(skeleton: Skeleton, other: Skeleton) -> float:
-    """Mean distance of corresponding points, px."""
-    return float(np.hypot(*(skeleton.points_px - other.points_px).T).mean())
 
 
 def _nearest_turns(values: Floats, reference: Floats) -> Floats:

@@ -183,7 +183,9 @@ class CommandGroup(TyperGroup):
         if entries[0].name != path:
             return _family(path, entries)
         return (
-            _stub(cmd_name, entries[0]) if self._is_listing else _full_command(cmd_name, entries[0])
+            TyperCommand(cmd_name, help=entries[0].help, rich_markup_mode="rich")
+            if self._is_listing
+            else _full_command(cmd_name, entries[0])
         )
 
     def get_params(self, ctx: Any) -> list[Any]:
@@ -348,10 +350,6 @@ def _family(path: str, commands: list[Plugin]) -> Any:
     group = typer.main.get_group(family)
     group.name = path.rsplit(maxsplit=1)[-1]
     return group
-
-
-def _stub(name: str, listed: Plugin) -> Any:
-    return TyperCommand(name, help=listed.help, rich_markup_mode="rich")
 
 
 def _full_command(name: str, listed: Plugin) -> Any:

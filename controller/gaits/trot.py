@@ -71,7 +71,7 @@ class LegGait(Gait, ABC):
                 joints[:, first + k] = (
                     (1.0 - shorter) * p.stride_rad * swing(cycle_share, self.duty)
                 )
-            elif joint.place == _first_roll(robot.limbs[joint.pair].joint_axes):
+            elif joint.place == robot.limbs[joint.pair].joint_axes.find("r"):
                 joints[:, first + k] = -p.stance_rad + p.lift_rad * lift(cycle_share, self.duty)
         return joints
 
@@ -91,10 +91,6 @@ class LegGait(Gait, ABC):
             joints[:, front - 1] += turned
         if hind < robot.link_count - 1:
             joints[:, hind] += turned
-
-
-def _first_roll(joint_axes: str) -> int:
-    return joint_axes.find("r")
 
 
 class Trot(LegGait):

@@ -52,7 +52,7 @@ def sampled_solutions(
     excess = np.empty(_NEAREST_BRANCHES)
     for reach, number in _LIMITS:
         # halves, quarters, ...: the chords of most solutions are in the middle
-        order = np.argsort([_bit_reversed(k) for k in range(number)], kind="stable")
+        order = np.argsort([int(f"{k:08b}"[::-1], 2) for k in range(number)], kind="stable")
         for chord in least + (most - least) * (order + 0.5) / number:
             limits = np.array([reach * chord, length])
             place_count = follow_places(line, arc, chord, limits, steps, excess)
@@ -62,10 +62,6 @@ def sampled_solutions(
                 place = None if bracket is None else root(bracket)
                 if place is not None:
                     yield place, crossing
-
-
-def _bit_reversed(number: int) -> int:
-    return int(f"{number:08b}"[::-1], 2)
 
 
 def _bracket(

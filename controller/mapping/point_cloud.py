@@ -6,7 +6,6 @@ PCD is decoded here: trimesh cannot, and other readers include a viewer. Format:
 
 import math
 import struct
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -79,7 +78,11 @@ def _pcd(file: Path, data: bytes) -> Floats:
         names = [n if n in "xyz" else f"{n}{k}" for k, n in enumerate(names)]
     if min(counts) < 1 or len(counts) != len(names):
         raise ValueError("COUNT must be 1 or more of each field")
-    total = int(header["POINTS"][0]) if "POINTS" in header else _extent(header)
+    total = (
+        int(header["POINTS"][0])
+        if "POINTS" in header
+        else (int(header["WIDTH"][0]) * int(header["HEIGHT"][0]))
+    )
     row = np.dtype([(n, k, (c,)) for n, k, c in zip(names, kinds, counts, strict=True)])
     if total < 0:
         raise ValueError(f"says {total} points")
@@ -126,10 +129,6 @@ def _header(data: bytes) -> tuple[dict[str, list[str]], int]:
     lines = data[:end].decode("ascii").splitlines()
     words = [line.split() for line in lines if line.strip() and not line.startswith("#")]
     return {key: rest for key, *rest in words}, end
-
-
-def _extent(header: Mapping[str, list[str]]) -> int:
-    return int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
 
 
 def _ascii(body: bytes, names: list[str], counts: list[int], total: int) -> Floats:

@@ -53,7 +53,11 @@ def travel(record: RunRecord) -> Travel:
         first, last = int(rows[0]), int(rows[-1])
         return Travel(travelled_m(pose, first, last), *_times(record, first, last))
     climbs = gait is not None and make_gait(gait.name, gait.parameters).aim == "climb"
-    if gait is not None and not gait.then and not _may_be_steered(record):
+    if (
+        gait is not None
+        and not gait.then
+        and not any(event.kind in {"operator", "command"} for event in record.events)
+    ):
         moved = gait_displacement(record)
         if moved.cycles:
             return Travel(moved.distance_m, moved.start_s, moved.end_s, moved)
@@ -67,11 +71,6 @@ def travel(record: RunRecord) -> Travel:
     moved_m = pose.centre_m[last] - pose.centre_m[first]
     distance_m = moved_m[2] if climbs else np.linalg.norm(moved_m)
     return Travel(float(distance_m), *_times(record, first, last))
-
-
-def _may_be_steered(record: RunRecord) -> bool:
-    """Return whether an operator or another program may have changed the gait."""
-    return any(event.kind in {"operator", "command"} for event in record.events)
 
 
 def _times(record: RunRecord, first: int, last: int) -> tuple[float, float]:

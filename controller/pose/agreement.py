@@ -155,7 +155,7 @@ class Agreement:
         if float(np.sqrt(np.mean(expected**2))) < LEAST_TURN_RAD:
             return
         share = float(turns @ expected / (expected @ expected))
-        related = _correlation(expected, turns)
+        related = float(expected @ turns) / _size(expected, turns)
         off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(reckoned_rad))
         slow_rad = off_rad - _detrended_values(off_rad, line)
         steps = np.diff(reckoned_m) * np.exp(1j * slow_rad[:-1])
@@ -248,7 +248,3 @@ def _detrended_values(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
     fit = np.linalg.lstsq(line, values, rcond=None)[0]
     return values - line @ fit
-
-
-def _correlation(a: Floats, b: Floats) -> float:
-    return float(a @ b) / _size(a, b)

@@ -120,7 +120,9 @@ class MeasuredFriction(FrictionEstimator):
             ):
                 yield self._filter.absorb(None, WINDOW_S)
                 return
-            window = replace(window, load=np.array([_load(ground, link) for link in links]))
+            window = replace(
+                window, load=np.array([np.column_stack(slope_load(ground, link)) for link in links])
+            )
             yield None
         hypothesis, by_both, by_ratio = self._filter.hypotheses()
         track = window.track(hypothesis)
@@ -148,11 +150,6 @@ def _cycle(time_s: float, view: BodyView) -> _Cycle:
     turned = np.column_stack([c * x + s * y, c * y - s * x])
     place = np.array([*view.centre_m[:2], mean])
     return _Cycle(time_s, place, headings - mean, turned, view.link_m[:, :2])
-
-
-def _load(ground: HeightField, links_m: Floats) -> Floats:
-    """Return gravity (L, 3) on links at (L, 2), as ``planar_slide`` accepts it."""
-    return np.column_stack(slope_load(ground, links_m))
 
 
 def _roughness_m(ground: HeightField, links_m: Floats) -> float:

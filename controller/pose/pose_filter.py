@@ -141,7 +141,9 @@ class PoseFilter:
         off_m, off_rad = measured.position_m - head_m, rotation_vector(measured_frame @ body.T)
         gap_s = min(max(then.time_s - self._seen_s, 0.0), SLIDE_S)
         self._seen_s = then.time_s
-        far = _deviations(off_m, self._gate + measured.position_covariance)
+        far = float(
+            np.sqrt(off_m @ np.linalg.solve(self._gate + measured.position_covariance, off_m))
+        )
         variance = (self.turn_covariance + measured.rotation_covariance)[2, 2]
         turn_rad = abs(_turn_between(body[:, 0], measured_frame[:, 0]))
         is_jump = bool(
@@ -251,11 +253,6 @@ def _turn_between(first: Floats, two: Floats) -> float:
     return float(
         np.arctan2(first[0] * two[1] - first[1] * two[0], first[0] * two[0] + first[1] * two[1])
     )
-
-
-def _deviations(error: Floats, covariance: Floats) -> float:
-    """Return the length of an error (3,) in standard deviations."""
-    return float(np.sqrt(error @ np.linalg.solve(covariance, error)))
 
 
 def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:

@@ -102,7 +102,7 @@ def judge(
         closest_m=tuple(round(float(value), 3) for value in closest),
         verdict=verdict(record, numbers).with_cause,
         tripped=numbers.trip,
-        path_error_mean_m=_mean(off_path_m),
+        path_error_mean_m=(round(float(off_path_m.mean()), 4) if off_path_m.size else None),
         path_error_max_m=_largest_value(off_path_m),
         pose_error_rms_m=_rms(head_m),
         pose_error_max_m=_largest_value(head_m),
@@ -181,10 +181,6 @@ def _stride(truth: Truth) -> int:
         return 1
     period_s = (truth.time_s[-1] - truth.time_s[0]) / (len(truth.time_s) - 1)
     return max(round(0.1 / float(period_s)), 1)
-
-
-def _mean(values: Floats) -> float | None:
-    return round(float(values.mean()), 4) if values.size else None
 
 
 def _largest_value(values: Floats) -> float | None:

@@ -9,7 +9,6 @@ from snakewalk.config.arrays import Indices, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.repertoire.mixture import CYCLES, Mixtures
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.repertoire.segment import SIDES
 
 _ALIKE: Final = 0.1
 """Turns that differ by less than this share of the largest one count as equal (ours)."""
@@ -53,7 +52,6 @@ class SecondaryController:
         self._turn_rad_s = np.array([segment.turn_rad_s for segment in segments])
         moves = self._kinds != "rest"
         self._direction = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
-        turns = np.isin(self._kinds, list(SIDES))
         steady_m_s = self._speed_m_s[self._steady]
         if not (self._direction[self._steady] > 0).any():
             raise InputError(
@@ -63,7 +61,6 @@ class SecondaryController:
         self._slowest_m_s = float(steady_m_s[self._direction[self._steady] > 0].min())
         back_m_s = -steady_m_s[self._direction[self._steady] < 0]
         self._slowest_back_m_s = float(back_m_s.min(initial=np.inf))
-        self._most_turn_rad_s = float(np.abs(self._turn_rad_s[turns]).max(initial=0.0))
         self._duration_s = np.array([segment.duration_s for segment in segments])
         self._owed: Ints = np.zeros(len(segments), dtype=np.int64)
         self._patience = patience
@@ -75,7 +72,7 @@ class SecondaryController:
         """Return the nearest segment in the direction of the speed: by turn, then by speed."""
         options = self._going(self._requested_direction(speed_m_s))
         off = np.abs(self._turn_rad_s[options] - turn_rad_s)
-        near = options[off <= off.min() + _ALIKE * self._most_turn_rad_s]
+        near = options[off <= off.min() + _ALIKE * np.abs(self._turn_rad_s).max()]
         return int(near[np.argmin(np.abs(self._speed_m_s[near] - speed_m_s))])
 
     def choose(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:

@@ -121,7 +121,9 @@ def _foreign(file: BinaryIO) -> str:
             profile = record.profile
         elif isinstance(record, Channel):
             topics.add(record.topic)
-    listed = ", ".join(sorted(topics)[:_MOST_NAMED_TOPICS]) + (", ..." if len(topics) > _MOST_NAMED_TOPICS else "")
+    listed = ", ".join(sorted(topics)[:_MOST_NAMED_TOPICS]) + (
+        ", ..." if len(topics) > _MOST_NAMED_TOPICS else ""
+    )
     with_topics = f"with topics {listed}" if topics else "without topics"
     return (
         f"is a complete MCAP of profile {profile!r} {with_topics}, but no log of snakewalk; "

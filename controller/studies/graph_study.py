@@ -68,7 +68,9 @@ class StudyResult:
             "covered": len(covered),
             "cover_mean": round(float(covered.mean()), 4) if len(covered) else None,
             "cover_std": round(float(covered.std()), 4) if len(covered) else None,
-            "cover_ci95": round(_ci95(covered), 4) if len(covered) > 1 else None,
+            "cover_ci95": round(float(1.96 * covered.std(ddof=1) / np.sqrt(len(covered))), 4)
+            if len(covered) > 1
+            else None,
             "cover_worst": round(float(covered.max()), 4) if len(covered) else None,
             "seen_at_v": round(float(np.interp(1.0, self.grid, self.visited)), 4),
             "cover_each": [round(float(x), 4) if np.isfinite(x) else None for x in self.cover],
@@ -131,11 +133,6 @@ def return_gaps(done: Walk) -> NDArray[np.int64]:
     order = np.argsort(done.path, kind="stable")
     same = done.path[order][1:] == done.path[order][:-1]
     return np.asarray(np.diff(order)[same])
-
-
-def _ci95(values: Floats) -> float:
-    """Half width of the 95 % interval of the mean, by the normal distribution."""
-    return float(1.96 * values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def _first_visits(done: Walk) -> NDArray[np.bool_]:

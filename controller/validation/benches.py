@@ -178,12 +178,11 @@ def _pendulum(robot: RobotConfig, motion: PendulumMotion) -> dict[str, float]:
         drive.goal_rad[:] = trajectory(np.maximum(time_s[k : k + 1] - motion.delay_s, 0.0))
     settled = time_s >= _SETTLING_S
     late_s = np.arange(0.0, _MOST_LAG_S + 1e-9, _LAG_STEP_S)
-    errors = [_rms(angle_rad[settled] - trajectory(time_s[settled] - lag)) for lag in late_s]
+    errors = [
+        float(np.sqrt(np.mean((angle_rad[settled] - trajectory(time_s[settled] - lag)) ** 2)))
+        for lag in late_s
+    ]
     return {"lag_s": float(late_s[np.argmin(errors)]), "rms_error_rad": errors[0]}
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _motor(robot: RobotConfig, motion: MotorMotion) -> dict[str, float]:

@@ -278,15 +278,13 @@ def _curve_colours(panel: Panel) -> dict[str, str]:
 def _newest_values(panel: Panel, curves: Sequence[CurveValues], time_s: Floats) -> list[Floats]:
     """Values (n,) of each curve of a panel that were the newest at some times."""
     newest_values = {
-        curve.curve.name: curve.values[_rows_at(curve.time_s, time_s)] for curve in curves
+        curve.curve.name: curve.values[
+            np.maximum(np.searchsorted(curve.time_s, time_s, side="right") - 1, 0)
+        ]
+        for curve in curves
     }
     unknown = np.full(len(time_s), np.nan)
     return [newest_values.get(name, unknown) for name in _curve_colours(panel)]
-
-
-def _rows_at(of_s: Floats, time_s: Floats) -> np.ndarray:
-    """Row that was the newest at each time; the first where there was none yet."""
-    return np.maximum(np.searchsorted(of_s, time_s, side="right") - 1, 0)
 
 
 def _bar(share: float, text: str) -> str:

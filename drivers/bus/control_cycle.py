@@ -237,7 +237,7 @@ class ControlCycle:
                 self._note_stall(request)
                 self._note_success()
                 return outcome
-            raw, reply = self._receive_rest(request, outcome, by.remaining_s)
+            raw, reply = self._receive(request, outcome, self._port.clock.now_s() + by.remaining_s)
         self._note_stall(request)
         responded = reply.answered
         if not self._pending.empty:
@@ -264,7 +264,9 @@ class ControlCycle:
             self.counters.stalls += 1
             self.counters.stalled_s += late_s
 
-    def _without_late_replies(self, request: GroupReadRequest, reply: GroupReadReply) -> GroupReadReply:
+    def _without_late_replies(
+        self, request: GroupReadRequest, reply: GroupReadReply
+    ) -> GroupReadReply:
         new = np.array(
             [
                 not self._pending.is_pending(i, request.length, fast=request.fast)
@@ -287,7 +289,7 @@ class ControlCycle:
             return default
         if not none_pending:
             # on a silent bus keep some lengths for the reads after its first reply
-            responding = self._responding()
+            responding = [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
             spares = SPARE_LENGTHS
             if not responding:
                 responding = [*self._ids]
@@ -303,9 +305,6 @@ class ControlCycle:
             self._requests[key] = request
         return request
 
-    def _responding(self) -> list[int]:
-        return [self._ids[k] for k in np.flatnonzero(self._missed < _MISSED_LIMIT)]
-
     def _send(self, packet: bytes) -> None:
         self._line.reserve(len(packet) * self._byte_s)
         self._port.write(packet)
@@ -319,12 +318,6 @@ class ControlCycle:
         free_s = self._line.reserve(len(packet) * byte_s)
         self._port.write(packet)
         return free_s + request.reply_bytes * byte_s + self._latency_s
-
-    def _receive_rest(
-        self, request: GroupReadRequest, raw: bytes, remaining_s: float
-    ) -> tuple[bytes, GroupReadReply]:
-        """Receive the rest of an irregular reply that begins with ``raw``."""
-        return self._receive(request, raw, self._port.clock.now_s() + remaining_s)
 
     def _receive(
         self, request: GroupReadRequest, raw: bytes, deadline_s: float

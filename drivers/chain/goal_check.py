@@ -93,7 +93,9 @@ class GoalCheck:
         self._watched = max(self._watched - 1, 0)
         self._read()
         over = [
-            joint for joint, difference in self._differences.items() if self._exceeds_tolerance(difference)
+            joint
+            for joint, difference in self._differences.items()
+            if self._exceeds_tolerance(difference)
         ]
         if over:
             raise BusError(self._fault(sorted(over), explain))

@@ -7,7 +7,6 @@ step.
 import mujoco
 import numpy as np
 
-from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled_when_called
 from snakewalk.sim.physics.friction import make_lanes
 from snakewalk.sim.physics.mechanics import Mechanics
@@ -80,7 +79,13 @@ class PublicSteps:
             contacts = self._contacts()
             _apply(body, shafts, contacts, self._lanes)
             mujoco.mj_step2(mechanics.model, data)
-            _settle(body, shafts, contacts, self._forces_n(), self._rubs)
+            _settle(
+                body,
+                shafts,
+                contacts,
+                np.ascontiguousarray(self._mechanics.data.efc_force),
+                self._rubs,
+            )
         return float(data.time)
 
     def _body(self) -> Body:
@@ -103,7 +108,3 @@ class PublicSteps:
         if count > len(self._lanes[1]):
             self._lanes = make_lanes(count)
         return Contacts(reals.ravel(), integers.ravel(), count, _FIELD_PLACES)
-
-    def _forces_n(self) -> Floats:
-        """MuJoCo's constraint forces; empty in the air."""
-        return np.ascontiguousarray(self._mechanics.data.efc_force)

@@ -43,10 +43,6 @@ def tilted(tilt_rad: float, carrier: Floats) -> Floats:
     return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])
 
 
-def _level_rotation(c: float, s: float) -> Floats:
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-
 class StereoView:
     """Draws a hilly world with grain from two cameras; ``close`` it.
 
@@ -94,7 +90,14 @@ class StereoView:
         ``at_m`` is the left camera; ``heading_rad`` is seen from above, ``tilt_rad`` downwards.
         """
         c, s = math.cos(heading_rad), math.sin(heading_rad)
-        return self.taken([CameraFrame(np.array(at_m), tilted(tilt_rad, _level_rotation(c, s)))])
+        return self.taken(
+            [
+                CameraFrame(
+                    np.array(at_m),
+                    tilted(tilt_rad, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])),
+                )
+            ]
+        )
 
     def taken(
         self, frames: Sequence[CameraFrame], qpos: Floats | None = None

@@ -141,7 +141,7 @@ class ServoBank:
         self.false_alert = np.zeros(len(self.ids), bool)
         """(S,) servos that set the alert bit of their replies without an error."""
         self.table: Bytes = np.zeros((len(self.ids), TABLE_BYTES), np.uint8)
-        rows = [self._rows_of(kind) for kind in kinds]
+        rows = [np.flatnonzero([registers is kind for registers in self._of_row]) for kind in kinds]
         self._kinds = tuple(zip(kinds, rows, strict=True))
         self.scales = ServoScales.of([registers.facts for registers in self._of_row])
         self._registers = _in_one_place(kinds)
@@ -376,9 +376,6 @@ class ServoBank:
             return self.range_of(row, name)
         limit = int(self[limit_of(name)][row])
         return -limit, limit
-
-    def _rows_of(self, kind: ModelRegisters) -> Indices:
-        return np.flatnonzero([registers is kind for registers in self._of_row])
 
     def _column(self, register: Register) -> SignedInts:
         number = f"<{'i' if register.signed else 'u'}{register.size}"

@@ -8,7 +8,7 @@ from tests.campaign.rig import ROBOT
 
 LONG_S = 2.0
 """Duration from which a constant reading has to be named."""
-_PREFIX_WORDS = {
+_WORDS = {
     "Present Current": "current",
     "Present Velocity": "velocity",
     "Present Position": "",
@@ -52,7 +52,7 @@ def judge_sensors(
             continue
         for servo_id in fault.ids:
             label = ROBOT.joint_label(ROBOT.servo_ids.index(servo_id))
-            word = _PREFIX_WORDS[fault.register_name]
+            word = _WORDS[fault.register_name]
             if any(label in line and word in line for line in lines):
                 counts.noticed += 1
             elif any(fault.at_s <= time_s <= until_s for time_s, _ in trips):

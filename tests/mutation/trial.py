@@ -128,7 +128,7 @@ class _Forks:
         self._out: int | None = None
         self._start_s = 0.0
         self._used_s = 0.0
-        self._note_failure: set[str] = set()
+        self._failed: set[str] = set()
         self.is_child = False
         self.trial: Trial | None = None
 
@@ -185,13 +185,13 @@ class _Forks:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed:
-            self._note_failure.add(report.nodeid)
+            self._failed.add(report.nodeid)
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         if self._out is not None:
             spent_s = cpu_s() - self._start_s
             self._used_s += spent_s
-            line = json.dumps([nodeid, spent_s, nodeid not in self._note_failure])
+            line = json.dumps([nodeid, spent_s, nodeid not in self._failed])
             os.write(self._out, f"{line}\n".encode())
 
     def _apply(self, mutant: Mutant, functions: dict[tuple[str, int], list[FunctionType]]) -> None:

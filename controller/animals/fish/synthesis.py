@@ -274,7 +274,9 @@ def _first_piece_of_best(pieces: PieceGraph, first_node: _Node, aim: _Aim, depth
         best = beam[0]
     node = first_node
     for k in best.order[first : first + 1]:
-        node = _append_piece(pieces, node, k, _is_by_rule(pieces, node, k), aim)
+        node = _append_piece(
+            pieces, node, k, (not node.order or k in pieces.permitted(node.last)), aim
+        )
     return node
 
 
@@ -292,10 +294,6 @@ def _choice(pieces: PieceGraph, node: _Node) -> tuple[list[int], bool]:
     if node.order:
         return pieces.next(node.last)
     return sorted(pieces.lasting) or list(range(len(pieces.pieces))), True
-
-
-def _is_by_rule(pieces: PieceGraph, node: _Node, piece: int) -> bool:
-    return not node.order or piece in pieces.permitted(node.last)
 
 
 def _append_piece(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, aim: _Aim) -> _Node:

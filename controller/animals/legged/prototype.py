@@ -47,7 +47,7 @@ def prototype(animal: AnimalConfig, time_s: Floats) -> Prototype:
     length_m = animal.length_m
     cycles = time_s / animal.cycle_s
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
-    phase = [_cycles_since_touchdown(pair, cycles) for pair in animal.leg_pairs]
+    phase = [((cycles[:, None] - [pair.left, pair.right]) % 1.0) for pair in animal.leg_pairs]
     foot = []
     hip = []
     contact = []
@@ -135,11 +135,6 @@ def _spine_m(animal: AnimalConfig, time_s: Floats, high_m: Floats) -> Floats:
     middle_m = animal.speed_m_s * time_s - 0.5 * animal.length_m * (front + hind)
     plan[..., 0] += middle_m[:, None]
     return np.concatenate([plan, z[..., None]], axis=-1)
-
-
-def _cycles_since_touchdown(pair: LegPairConfig, cycles: Floats) -> Floats:
-    """(T, 2) cycles since the left and the right foot came down, 0 to 1."""
-    return (cycles[:, None] - [pair.left, pair.right]) % 1.0
 
 
 def spine_shares(girdle_places: tuple[float, float], along: Floats) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from snakewalk.config.animal import AnimalConfig
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.legged.contact_fit import (
     Contact,
@@ -300,7 +300,7 @@ def _turns(
     cross = travel[:, None, 0] * step[..., 1] - travel[:, None, 1] * step[..., 0]
     heading = np.arctan2(cross, _components(step, travel))
     wave = np.exp(-1j * TURN * phase)
-    complete_cycles = _in_whole_cycles(phase)
+    complete_cycles = np.asarray(phase - phase[0] < np.floor(phase[-1] - phase[0]))
     amplitude = 2.0 * (heading[complete_cycles] * wave[complete_cycles, None]).mean(axis=0)
     # the tail swings more than the hind girdle moves it: its segments do not show the girdle
     ahead_of_tail = places[1:] <= girdle_places[1] + 1e-9
@@ -309,11 +309,6 @@ def _turns(
         raise InputError("expected two segments of the spine or more ahead of the hind legs")
     solution = np.linalg.lstsq(shares.astype(complex), amplitude[ahead_of_tail], rcond=None)[0]
     return float(abs(solution[0])), float(abs(solution[1]))
-
-
-def _in_whole_cycles(phase: Floats) -> Bools:
-    """Frames of as many whole cycles as there are."""
-    return np.asarray(phase - phase[0] < np.floor(phase[-1] - phase[0]))
 
 
 def _smoothed_points(points: Floats, window: int) -> Floats:

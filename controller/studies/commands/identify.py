@@ -123,7 +123,7 @@ def identify(
     have 95 % intervals.
     """
     judge = judge or []
-    of_runs = [path for path in (*logs, *judge) if _is_run(path)]
+    of_runs = [path for path in (*logs, *judge) if (".mcap" in path.suffixes)]
     if of_runs:
         if len(of_runs) < len(logs) + len(judge):
             raise InputError(
@@ -172,10 +172,6 @@ class _Outs(NamedTuple):
 
     world: Path | None
     robot: Path | None
-
-
-def _is_run(path: Path) -> bool:
-    return ".mcap" in path.suffixes
 
 
 def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
