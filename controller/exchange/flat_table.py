@@ -161,17 +161,19 @@ def _points(cells: Mapping[str, Cells], lists: Sequence[Floats], width: int) -> 
     """A row for each point, counted from 1 in its list; a point without a height has NaN."""
     counts = [len(points) for points in lists]
     points = np.concatenate(
-        [np.zeros((0, width)), *(_padded_points(row_list, width) for row_list in lists)]
+        [
+            np.zeros((0, width)),
+            *(
+                np.hstack([row_list, np.full((len(row_list), width - row_list.shape[1]), np.nan)])
+                for row_list in lists
+            ),
+        ]
     )
     return {
         **{name: np.repeat(np.asarray(values), counts) for name, values in cells.items()},
         "number": np.concatenate([np.zeros(0, int), *(np.arange(1, n + 1) for n in counts)]),
         **{f"point_{_XYZ[k]}_m": points[:, k] for k in range(width)},
     }
-
-
-def _padded_points(points_m: Floats, width: int) -> Floats:
-    return np.hstack([points_m, np.full((len(points_m), width - points_m.shape[1]), np.nan)])
 
 
 def _config(header: Header) -> FlatTable:
