@@ -53,9 +53,9 @@ _FIRST_READS = 5
 """Tries to get one complete reply at the start (ours)."""
 _HOLD_READS = 2
 """Reads in which the servos may report their positions before they hold (ours)."""
-_SETTLE_READS, _SETTLE_S, _SETTLED_RAD = 50, 0.02, 0.01
-"""Reads for which a start waits for limp joints, the time between two, and the largest difference
-of two readings of a joint at rest (ours)."""
+_SETTLE_READS, _SETTLED_RAD = 50, 0.01
+"""Reads for which a start waits for limp joints, every 20 ms, and the largest difference of two
+readings of a joint at rest (ours)."""
 STILL_RAD = 0.1
 """Largest distance of a joint from the position that it holds; farther is another joint (ours)."""
 
@@ -294,7 +294,7 @@ class ServoChain:
             now_rad, reported_goals = self._identified.positions_and_goals(
                 _FIRST_READS, ask_again=True
             )
-            if is_last or not np.abs(now_rad - here_rad).max() > STILL_RAD:
+            if is_last or not np.abs(now_rad - here_rad).max() > 0.5 * STILL_RAD:
                 break
             here_rad = self._settled(now_rad)
         check_stillness(self.robot, now_rad, here_rad, STILL_RAD)
@@ -316,7 +316,7 @@ class ServoChain:
         """Angles (J,) after limp joints have come to rest, or after a while."""
         for _ in range(_SETTLE_READS):
             before_rad = here_rad
-            self._clock.sleep_until_s(self._clock.now_s() + _SETTLE_S)
+            self._clock.sleep_until_s(self._clock.now_s() + 0.02)
             here_rad = self._identified.positions_rad(_FIRST_READS, ask_again=True)
             if np.abs(here_rad - before_rad).max() <= _SETTLED_RAD:
                 break

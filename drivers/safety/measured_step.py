@@ -21,6 +21,8 @@ class MeasuredSteps:
 
     def __init__(self, limits: SafetyLimits) -> None:
         self._limits = limits
+        self.joint = -1
+        """Joint of the newest doubt."""
         self._doubted_rad: Floats | None = None
         """(J,) what was read and not believed; NaN where the last reading was."""
 
@@ -66,7 +68,7 @@ class MeasuredSteps:
         if not doubted.any():
             is_held = ~state.valid & (position_rad != believed.position_rad)
             return (_held_state(state, believed, is_held) if is_held.any() else state), None
-        joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
+        joint = self.joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
         doubt = (
             f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
             f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: two servos with one "

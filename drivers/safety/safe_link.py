@@ -33,7 +33,7 @@ from snakewalk.drivers.safety.vet import (
 )
 from snakewalk.drivers.types import JointCommand, JointState
 
-SLOW_SHARE = 0.5
+SLOW_SHARE = 0.35
 """Share of ``stale_limit_s`` from which the age of the first state is reported (ours)."""
 RESTART_S = 2.0
 """Time after a servo's reboot in which the goals' rate grows to the limit again (ours)."""
@@ -236,7 +236,7 @@ class SafeLink:
                 return self._recover(stale, None)
             if stale is not None:  # not recoverable: servos and joints may be exchanged
                 self._state = state
-                self._trip(f"{stale}: {doubt}")
+                self._trip(self._explain(self._steps.joint) or f"{stale}: {doubt}")
                 return state
         self._state = state
         joint = self._overloaded_joint(state, self._memory)
@@ -369,12 +369,16 @@ class SafeLink:
     def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
         fault = self._following.update(state, memory.goal_rad)
         self._is_held_off = fault is not None and not self._following.is_idle
-        if fault is None or not isinstance(self._link, ExplainingLink):
-            return fault
-        joint = self._following.joint
-        reason = self._link.explain(joint)
+        if fault is None:
+            return None
+        reason = self._explain(self._following.joint)
         self._is_held_off &= reason is None
-        return fault if reason is None else f"{self._limits.joint_names[joint]}: {reason}"
+        return reason or fault
+
+    def _explain(self, joint: int) -> str | None:
+        """Cause that the link finds in a joint's servo, or None."""
+        reason = self._link.explain(joint) if isinstance(self._link, ExplainingLink) else None
+        return None if reason is None else f"{self._limits.joint_names[joint]}: {reason}"
 
     def _check(
         self, state: JointState, memory: SafetyMemory, limits: SafetyLimits | None = None

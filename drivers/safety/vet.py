@@ -176,9 +176,9 @@ def _stale_cause(state: JointState, joint: int, since_s: float, limits: SafetyLi
     silent = np.flatnonzero(~state.valid)
     if len(silent) == len(state.valid) > 1:
         return "no servo replies: their supply, the cable or the adapter"
-    if len(silent) > 1 and silent[-1] - silent[0] == len(silent) - 1 and silent[0] > 0:
+    if 1 < len(silent) == len(state.valid) - silent[0]:
         before = limits.joint_names[silent[0] - 1]
-        return f"{len(silent)} neighbours do not reply: a cable or plug behind {before}"
+        return f"all behind {before} are silent: a cable or plug there, or two servos with one ID"
     return "no valid reply: its plug or supply, or two servos with its ID"
 
 

@@ -207,7 +207,7 @@ KINDS = (
     Kind(
         "loose cable",
         "Interbotix/interbotix_ros_manipulators#240",
-        "a cable or plug behind",
+        "all behind .* are silent: a cable or plug",
         _unplugged,
     ),
     Kind(
@@ -319,3 +319,16 @@ def test_a_dead_motor_is_named_behind_a_slow_adapter() -> None:
     ).said
     assert "(ID 3)" in said
     assert "its motor does not push" in said
+
+
+@pytest.mark.parametrize("make", [X, STS])
+def test_a_pause_shorter_than_the_watchdog_is_read_again(make: str) -> None:
+    """A pause of 0.15 s during a read ended the run: not read for 0.175 s."""
+    assert not swing(make, faults=[{"kind": "stall", "for_s": 0.15}], seconds=3.0).said
+
+
+def test_a_line_that_is_too_slow_for_the_limit_is_reported_at_the_start() -> None:
+    line = AdapterLine(in_grid_s=0.036, out_grid_s=0.036)
+    reports = swing(X, line=line, seconds=0.1, latency_s=NETWORK_S).at_start
+    assert reports[0].startswith("replies need up to 0.")
+    assert "safety.stale_limit_s is 0.1" in reports[0]

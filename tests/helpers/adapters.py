@@ -108,6 +108,8 @@ class Swing:
 
     tripped: str | None = None
     reports: list[str] = field(default_factory=list)
+    at_start: list[str] = field(default_factory=list)
+    """Reports of the start."""
 
     @property
     def said(self) -> str:
@@ -138,7 +140,9 @@ def swing(
     link = SafeLink(chain, limits, clock, on_event=ran.reports.append)
     try:
         link.enable()
-        chain.on_event = ran.reports.append  # the settings of the start are no reports of a run
+        ran.at_start = [*ran.reports]
+        ran.reports.clear()
+        chain.on_event = ran.reports.append
         start_s = clock.now_s()
         if faults:
             plan = [{**fault, "at_s": at_s + fault.get("at_s", 0.0)} for fault in faults]
