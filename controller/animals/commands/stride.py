@@ -76,7 +76,7 @@ def stride(
     refuse_to_overwrite(written, force)
     if picture is not None:
         check_picture(picture)
-    keypoints_of_film = load_keypoints(keypoints, choice=Choice(**choice.model_dump()))
+    keypoints_of_film = load_keypoints(keypoints, Choice(**choice.model_dump()))
     measured = measure_animal(keypoints_of_film, names, animal, output.stem, length_m, view)
     write_result(output, measured.text())
     if picture is not None:

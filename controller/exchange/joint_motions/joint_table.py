@@ -16,14 +16,8 @@ from snakewalk.controller.motion.joint_motion import (
     second,
 )
 
-_TIME: Final = {
-    **dict.fromkeys(("time", "t", "timestamp"), None),
-    **dict.fromkeys(("time_s", "t_s", "timestamp_s", "seconds"), "s"),
-    **dict.fromkeys(("time_ms", "t_ms", "timestamp_ms"), "ms"),
-    **dict.fromkeys(("time_us", "t_us", "timestamp_us"), "us"),
-    **dict.fromkeys(("time_ns", "t_ns", "timestamp_ns"), "ns"),
-}
-"""Names of the column of time, and the unit that each states."""
+_TIME: Final = re.compile("(?:time|t|timestamp)(?:_(s|ms|us|ns))?|(s)econds")
+"""Name of the column of time, and the unit that it states."""
 _MIDLINE_COLUMNS: Final = {"frame", "point", "frame_idx", "scorer"}
 _UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
 
@@ -40,11 +34,9 @@ class JointTable:
             return False
         cells = re.split(r"[,;\t]", line)
         names = [_plain_name(cell.strip(' "')) for cell in cells]
+        is_time = _TIME.fullmatch(names[0]) is not None
         return (
-            len(cells) > 1
-            and names[0] in _TIME
-            and not {*names} & _MIDLINE_COLUMNS
-            and b"\x00" not in head
+            len(cells) > 1 and is_time and not {*names} & _MIDLINE_COLUMNS and b"\x00" not in head
         )
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
@@ -64,15 +56,17 @@ class JointTable:
                 )
         values = numbers_of(path, rows, cells, range(2, len(rows) + 2))
         unit = _unit_of(path, units, request)
-        hint = "or end the names of columns in _rad or _deg"
-        angles = radians(f"{path}:", values[:, 1:], unit, hint)
+        angles = radians(
+            f"{path}:", values[:, 1:], unit, "or end the names of columns in _rad or _deg"
+        )
         time_s = values[:, 0] * _time_unit_s(path, cells[0], request, values[:, 0])
         return joint_motion(path, time_s, names, angles)
 
 
 def _time_unit_s(path: Path, column: str, request: JointRequest, time: Floats) -> float:
     """Return the size in seconds of the unit that the column of time or the user states."""
-    unit = _TIME[_plain_name(column)]
+    stated = _TIME.fullmatch(_plain_name(column))
+    unit = None if stated is None else stated[1] or stated[2]
     if unit is not None and request.time_unit not in (None, unit):
         raise InputError(
             f"--time-unit {request.time_unit}: {path} states {unit}; leave the option out"

@@ -57,8 +57,12 @@ class LeRobotEpisode:
             names = [f"{feature}.{k}" for k in range(values.shape[1])]
         if len(names) != values.shape[1]:
             raise InputError(f"{path}: {feature}: {len(names)} names of {values.shape[1]} values")
-        hint = "motors normalized to -100..100 are not angles"
-        angles = radians(f"{path}: {feature}", values, request.unit, hint)
+        angles = radians(
+            f"{path}: {feature}",
+            values,
+            request.unit,
+            "motors normalized to -100..100 are not angles",
+        )
         if not np.isfinite(time_s).all():
             time_s = np.arange(len(values)) / rate_hz
         notes = [f"episode {episode} of {episodes}, {feature}, LeRobot {version}"]

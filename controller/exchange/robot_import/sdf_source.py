@@ -102,11 +102,10 @@ class _Frames:
 
     def pose(self, part: Element, usual: str) -> Floats:
         """Return the pose of an element, stated relative to the frame ``usual`` by default."""
-        stated = part.find("pose")
-        attributes = {} if stated is None else stated.attrib
+        attributes = getattr(part.find("pose"), "attrib", {})
         frame = attributes.get("relative_to") or attributes.get("frame") or usual
         pose = np.eye(4)
-        text = "" if stated is None else (stated.text or "").strip()
+        text = part.findtext("pose", "").strip()
         if text:
             is_quaternion = attributes.get("rotation_format") == "quat_xyzw"
             values = numbers(text, 7 if is_quaternion else 6)
@@ -154,8 +153,7 @@ def _add_link(
         part = added(urdf_element, "inertial")
         _add_origin(part, to_base @ in_model.pose(inertial, name))
         added(part, "mass", value=_text(inertial, "mass"))
-        moments = {part.tag: part.text or "0" for part in inertial.iterfind("inertia/*")}
-        added(part, "inertia", **moments)
+        added(part, "inertia", **{e.tag: e.text or "0" for e in inertial.iterfind("inertia/*")})
     for shape in children(link, "visual", "collision"):
         solid = shape.find("geometry/*")
         if solid is None or solid.tag not in _SHAPES:
@@ -164,21 +162,18 @@ def _add_link(
         _add_origin(part, to_base @ in_model.pose(shape, name))
         sizes = {k: _text(solid, tag) or "1 1 1" for k, tag in _SHAPES[solid.tag].items()}
         added(added(part, "geometry"), solid.tag, **sizes)
-    friction = link.findtext("collision/surface/friction/ode/mu")
-    if friction is not None:
-        added(added(urdf, "gazebo", reference=name), "mu1").text = friction
 
 
 def _add_axis(
     joint: LineElement, axis: Element, in_model: _Frames, base: Floats, *, is_old: bool
 ) -> None:
-    xyz = axis.find("xyz")
+    expressed_in = getattr(axis.find("xyz"), "attrib", {}).get("expressed_in")
     frame = base
     if axis.findtext("use_parent_model_frame", str(is_old)).strip() in ("1", "true", "True"):
         frame = np.eye(4)
-    elif xyz is not None and xyz.get("expressed_in"):
-        frame = in_model.of(str(xyz.get("expressed_in")))
-    direction = numbers(None if xyz is None else xyz.text, 3) or [0.0, 0.0, 1.0]
+    elif expressed_in:
+        frame = in_model.of(expressed_in)
+    direction = numbers(axis.findtext("xyz"), 3) or [0.0, 0.0, 1.0]
     added(joint, "axis", xyz=_words(base[:3, :3].T @ frame[:3, :3] @ direction))
     if axis.find("mimic") is not None:
         added(joint, "mimic")

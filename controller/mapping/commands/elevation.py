@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -21,7 +21,6 @@ from snakewalk.controller.mapping.world_file import MapWorld, map_beside
 
 if TYPE_CHECKING:
     from snakewalk.controller.mapping.elevation_file import FileMap
-    from snakewalk.controller.terrain.elevation_map import CellHeight
 
 WorldOut = Annotated[Path, typer.Option("--out", "-o", help="write the world's file here (.toml)")]
 Spacing = Annotated[
@@ -36,9 +35,6 @@ Picture = Annotated[
 ]
 _SMALLEST, _LARGEST = 1e-6, 1e6
 """Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
-_UNITS = ("m", "cm", "mm", "km", "ft", "us-ft")
-_POINTS = ("lowest", "median", "highest")
-_AXES = ("z", "y", "x", "-z", "-y", "-x")
 ElevationFile = Annotated[
     Path,
     typer.Argument(
@@ -50,12 +46,13 @@ VerticalScale = Annotated[float | None, typer.Option(help="scale of heights; def
 CropText = Annotated[
     str | None, typer.Option(help="X0,Y0,X1,Y1: metres of the file from its south-west corner")
 ]
+_Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
 Unit = Annotated[
-    str | None,
-    typer.Option(help=f"unit of the file: {', '.join(_UNITS)}, deg; default: as it states"),
+    Literal[_Length, "deg"] | None,
+    typer.Option(help="unit of the file; default: as it states"),
 ]
 HeightUnit = Annotated[
-    str | None,
+    _Length | None,
     typer.Option(
         help="unit of the file's heights; default: as it states, else as its lengths if metric"
     ),
@@ -69,12 +66,12 @@ HeightStep = Annotated[
 ]
 NoData = Annotated[float | None, typer.Option(help="value of empty cells, such as -9999 or nan")]
 PointOf = Annotated[
-    str | None,
-    typer.Option(help="point of a cell that counts: lowest, median, highest; default: median"),
+    Literal["lowest", "median", "highest"] | None,
+    typer.Option(help="point of a cell that counts; default: median"),
 ]
 Up = Annotated[
-    str | None,
-    typer.Option(help="axis of a mesh or cloud that points up: z, y, x, -z, -y, -x; default: z"),
+    Literal["z", "y", "x", "-z", "-y", "-x"] | None,
+    typer.Option(help="axis of a mesh or cloud that points up; default: z"),
 ]
 Classes = Annotated[
     str | None,
@@ -122,9 +119,6 @@ def elevation(
         }
     )
     check_fill(fill, faults)
-    chosen = {"--unit": (unit, (*_UNITS, "deg")), "--height-unit": (height_unit, _UNITS)}
-    chosen |= {"--point": (point, _POINTS), "--up": (up, _AXES)}
-    faults += _not_chosen(chosen)
     corners = None if crop is None else _corners(crop, faults)
     kinds = None if classes is None else _numbers_of(classes, faults)
     if faults:
@@ -132,8 +126,7 @@ def elevation(
     assumed = Assumptions(assume or ())
     check_world_files(out, picture, [file], force)
     units = RasterUnits(unit, cell, height_step, no_data, height_unit)
-    which = cast("CellHeight | None", point)
-    options = MapOptions(units, corners, scale, vertical_scale, spacing, which, up, kinds, assumed)
+    options = MapOptions(units, corners, scale, vertical_scale, spacing, point, up, kinds, assumed)
     read = read_elevation(file, options)
     assumed.check_used("keys: lowest_m, highest_m")
     world = MapWorld.of(out, read.elevation.height_field(fill))
@@ -175,15 +168,6 @@ def _facts(read: "FileMap", options: "MapOptions", notes: list[str]) -> dict[str
     }
 
 
-def _not_chosen(options: Mapping[str, tuple[str | None, Sequence[str]]]) -> list[str]:
-    """Faults of options whose value is not among their choices."""
-    return [
-        f"{option} {value}: is none of {', '.join(choices)}"
-        for option, (value, choices) in options.items()
-        if value is not None and value not in choices
-    ]
-
-
 def _numbers_of(classes: str, faults: list[str]) -> tuple[int, ...]:
     words = classes.split(",")
     if not all(word.strip().isdecimal() and int(word) < 256 for word in words):
@@ -214,13 +198,11 @@ def check_world_files(
 
 def not_positive(options: Mapping[str, float | None]) -> list[str]:
     """Faults of options whose value is not above 0, or beyond all lengths and factors."""
-    faults = []
-    for option, value in options.items():
-        if value is not None and not 0.0 < value < math.inf:
-            faults.append(f"{option} {value:g}: must be above 0")
-        elif value is not None and not _SMALLEST <= value <= _LARGEST:
-            faults.append(f"{option} {value:g}: must be from {_SMALLEST:g} to {_LARGEST:g}")
-    return faults
+    return [
+        f"{option} {value:g}: must be from {_SMALLEST:g} to {_LARGEST:g}"
+        for option, value in options.items()
+        if value is not None and not _SMALLEST <= value <= _LARGEST
+    ]
 
 
 def check_fill(fill_m: float, faults: list[str]) -> None:

@@ -149,12 +149,11 @@ def _track(
         if (whose, p, "likelihood") in index_by_column
     ]
     scores = values[:, sure] if len(sure) == len(parts) else None
-    default = 0.0 if scores is None else PCUTOFF
     return Keypoints(
         file,
         parts,
         pixels * [1.0, -1.0],
         scores,
-        least_score=default,
+        least_score=0.0 if scores is None else PCUTOFF,
         frame=frame,
     )

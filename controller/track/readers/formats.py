@@ -8,7 +8,8 @@ from snakewalk.controller.track.readers.markers import is_qtm
 
 KNOWN = (
     "a CSV of midlines (t, frame, point, x_m, y_m), a SLEAP CSV (frame_idx, <keypoint>.x, "
-    "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5. Also: a WCON "
+    "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5, "
+    "HDF5 of Tierpsy (featuresN, skeletons). Also: a WCON "
     "(JSON), an .npz or MATLAB .mat (points or angles_rad or x and y, with rate_hz; or skeletons), "
     "an .npy of joint angles (frames, joints). Or markers: QTM's TSV, Vicon's CSV, a TRC or a C3D. "
     "Or a BVH skeleton"

@@ -1,6 +1,7 @@
-"""HDF5 recordings: SLEAP's analysis and projects, DeepLabCut's table, MATLAB 7.3."""
+"""HDF5 recordings: SLEAP's analysis and projects, DeepLabCut's table, Tierpsy, MATLAB 7.3."""
 
 from pathlib import Path
+from typing import Any, Final
 
 import h5py
 import numpy as np
@@ -14,7 +15,13 @@ from snakewalk.controller.track.readers.deeplabcut import load_group
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.sleap import load_analysis, load_project
-from snakewalk.controller.track.track import Track
+from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
+
+_TIERPSY: Final = (
+    ("coordinates/skeletons", "timeseries_data", "worm_index", "timestamp"),
+    ("skeleton", "trajectories_data", "worm_index_joined", "frame_number"),
+)
+"""Bodies of Tierpsy (T, P, 2), their table, and its columns of animal and frame."""
 
 
 def load_hdf5(file: Path, choice: Choice) -> Track | Keypoints:
@@ -31,6 +38,9 @@ def load_hdf5(file: Path, choice: Choice) -> Track | Keypoints:
                 return load_analysis(file, h5_file, choice)
             if "metadata" in h5_file and "instances" in h5_file:
                 return load_project(file, h5_file, choice)
+            for places, table, *columns in _TIERPSY:
+                if places in h5_file and table in h5_file:
+                    return _tierpsy(file, h5_file[places], h5_file[table], columns, choice)
             tables = [g for g in h5_file.values() if _holds_table(g)]
             if tables:
                 return load_group(file, tables[0], choice)
@@ -48,6 +58,30 @@ def load_hdf5(file: Path, choice: Choice) -> Track | Keypoints:
         raise InputError(f"{file}: holds no arrays, and no table of DeepLabCut; known: {KNOWN}")
     choice.only(file, "a MATLAB file")
     return track_from_arrays(file, arrays, choice)
+
+
+def _tierpsy(file: Path, places: Any, table: Any, columns: list[str], choice: Choice) -> Track:
+    """Load bodies of one animal; the attributes of ``trajectories_data`` state units and rate.
+
+    Bodies are in micrometres in a file of features, and in pixels in one of skeletons.
+    """
+    choice.only(file, "a file of Tierpsy", "individual")
+    whose, frame = (table[column] for column in columns)
+    names = list(map(str, np.unique(whose[whose >= 0])))
+    mine = whose == int(choice.animal(file, names, names))
+    about = places.file.get("trajectories_data", table).attrs
+    stated = float(about.get("fps", about.get("expected_fps", 0.0)))
+    rate_hz = choice.rate or (0.0 if "frames" in str(about.get("time_units")) else stated)
+    if rate_hz <= 0.0:
+        raise InputError(f"{file}: states no frames a second; say --rate")
+    unit_m = 1e-6 if places.parent.name != "/" else 1e-6 * about.get("microns_per_pixel", 1)
+    return track_from_points(
+        file.stem,
+        places[mine] * [1.0, -1.0],
+        rate_hz,
+        scale_m=None if "pixels" in str(about.get("xy_units", "pixels")) else unit_m,
+        frame=frame_numbers(str(file), frame[mine].astype(float)),
+    )
 
 
 def _linked_file(name: str, link: object) -> str | None:

@@ -41,9 +41,8 @@ def load_track(
 
     """
     path = Path(name_or_path)
-    is_track_file = name_or_path in EMBEDDED or path.suffix == ".toml"
     choice = _with(path, rate_hz, choice)
-    if is_track_file:
+    if name_or_path in EMBEDDED or path.suffix == ".toml":
         choice.only(path, "a shipped recording")
         if choice.rate or choice.min_score:
             raise InputError(
@@ -83,18 +82,13 @@ def load_file(
     return loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
 
 
-def load_keypoints(
-    path: str | Path,
-    rate_hz: float | None = None,
-    choice: Choice = ALL,
-) -> Keypoints:
+def load_keypoints(path: str | Path, choice: Choice = ALL) -> Keypoints:
     """Load all keypoints of one animal, including those off its midline; see ``load_file``.
 
     Raises:
         InputError: as ``load_file``, or the file holds midlines.
 
     """
-    choice = _with(path, rate_hz, choice)
     loaded = _loaded_recording(Path(path), choice)
     if not isinstance(loaded, Keypoints):
         raise InputError(

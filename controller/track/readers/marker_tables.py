@@ -66,8 +66,7 @@ def load_vicon(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
     names = short if len(set(short)) == len(short) else names
     frame = _frames(file, data)
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=block[4][0])
-    scale_m = UNITS[units.pop()]
-    return projected(file, names, places, scale_m, stated, choice, frame)
+    return projected(file, names, places, units.pop(), stated, choice, frame)
 
 
 def load_trc(file: Path, choice: Choice) -> Keypoints:
@@ -78,8 +77,6 @@ def load_trc(file: Path, choice: Choice) -> Keypoints:
     about = dict(zip((cell.strip() for cell in rows[1]), rows[2], strict=False))
     unit = about.get("Units", "").strip().lower()
     stated = number_or_none(about.get("DataRate", ""))
-    if unit not in UNITS:
-        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
     names = [cell.strip() for cell in rows[3][2:] if cell.strip()]
     if not names or len(names) > _MOST_COLUMNS // 3:
         raise InputError(f"{file}: line 4: expected Frame#, Time and the names of markers")
@@ -93,7 +90,7 @@ def load_trc(file: Path, choice: Choice) -> Keypoints:
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
     if not stated and choice.rate is None:
         raise InputError(f"{file}: states no DataRate; say --rate with frames a second")
-    keypoints = projected(file, names, places, UNITS[unit], stated, choice, frame)
+    keypoints = projected(file, names, places, unit, stated, choice, frame)
     _check_count(file, "NumFrames", about, len(data))
     return keypoints
 

@@ -58,7 +58,7 @@ def load_qtm(file: Path, choice: Choice) -> Keypoints:
         file, [row[before:] for row in lines], len(names), first_line=len(about) + 1 + bool(before)
     )
     stated = number_or_none((about.get("FREQUENCY") or [""])[0])
-    return projected(file, names, places, 1e-3, stated, choice)
+    return projected(file, names, places, "mm", stated, choice)
 
 
 def load_c3d(file: Path, choice: Choice) -> Keypoints:
@@ -75,9 +75,7 @@ def load_c3d(file: Path, choice: Choice) -> Keypoints:
         places = np.asarray(c3d["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
     except Exception as error:
         raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
-    if unit not in UNITS:
-        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
-    return projected(file, names[: places.shape[1]], places, UNITS[unit], stated or None, choice)
+    return projected(file, names[: places.shape[1]], places, unit, stated or None, choice)
 
 
 def marker_places(
@@ -100,7 +98,7 @@ def projected(
     file: Path,
     names: list[str],
     places: Floats,
-    scale_m: float,
+    unit: str,
     rate_hz: float | None,
     choice: Choice,
     frame: Ints | None = None,
@@ -109,6 +107,8 @@ def projected(
 
     Without chosen keypoints, unlabelled and static markers are left out, and named in the notes.
     """
+    if unit not in UNITS:
+        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
     notes: list[str] = []
     if choice.keypoints is None:
@@ -127,7 +127,7 @@ def projected(
         None,
         rate_hz=rate_hz,
         frame=frame,
-        scale_m=scale_m,
+        scale_m=UNITS[unit],
         notes=tuple(notes),
     )
 

@@ -196,7 +196,7 @@ def test_files_as_trackers_write_them_give_the_stride(
         held.extract(name, tmp_path)
     lizard = read_animal("lizard")
     rate_hz = None if name.endswith(("slp", "is.h5", "rd.h5")) else 16 / lizard.cycle_s
-    keypoints = load_keypoints(tmp_path / name, rate_hz, choice=Choice(individual=individual))
+    keypoints = load_keypoints(tmp_path / name, Choice(individual=individual, rate=rate_hz))
     names = Names.of("nose,neck,mid,hip,tail,tip", "neck,hip", "FL,FR,HL,HR")
     mine = measure_animal(keypoints, names, "lizard", "mine", None, "above")
     assert not mine.rate_assumed
