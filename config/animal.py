@@ -23,7 +23,9 @@ class SectionConfig(Strict):
     half_height: float = Field(
         ge=0.0, le=0.5, description="half of the height of the body here, in body lengths"
     )
-    lift: float = Field(0.0, ge=-0.5, le=0.5, description="of its middle above the body's axis")
+    lift: float = Field(
+        0.0, ge=-0.5, le=0.5, description="height of the section's middle above the body's axis"
+    )
 
 
 class FinConfig(Strict):
@@ -32,8 +34,10 @@ class FinConfig(Strict):
     at: Place = Field(description="middle of the root along the body")
     chord: float = Field(gt=0.0, le=0.8, description="length of the root")
     around_deg: float = Field(ge=-180.0, le=180.0, description="90 the back, 0 left, -90 the belly")
-    span: float = Field(gt=0.0, le=0.5, description="from root to tip")
-    sweep: float = Field(0.0, ge=-0.5, le=0.5, description="of the tip's middle, backwards")
+    span: float = Field(gt=0.0, le=0.5, description="length of the fin from root to tip")
+    sweep: float = Field(
+        0.0, ge=-0.5, le=0.5, description="backward distance of the tip's middle from the root's"
+    )
     tip_chord: float = Field(0.4, gt=0.0, le=2.0, description="the tip's length over the root's")
     thickness: float = Field(0.004, gt=0.0, le=0.05, description="half of it, at the root")
     paired: bool = Field(False, description="the same on the other side")
@@ -88,11 +92,15 @@ class LegPairConfig(Strict):
     """
 
     at: Place = Field(description="place of the girdle along the body, 0 the head's tip")
-    hip_side: float = Field(gt=0.0, le=0.3, description="of a leg's root from the body's middle")
-    hip_drop: float = Field(
-        0.0, ge=-0.2, le=0.5, description="of the legs' roots below the body's axis"
+    hip_side: float = Field(
+        gt=0.0, le=0.3, description="distance of a leg's root from the body's middle plane"
     )
-    foot_side: float = Field(gt=0.0, le=0.5, description="of a foot from the line of travel")
+    hip_drop: float = Field(
+        0.0, ge=-0.2, le=0.5, description="depth of the legs' roots below the body's axis"
+    )
+    foot_side: float = Field(
+        gt=0.0, le=0.5, description="distance of a foot from the line of travel"
+    )
     foot_ahead: float = Field(
         0.0, ge=-0.5, le=0.5, description="middle of a step, ahead of the hips"
     )
@@ -140,7 +148,7 @@ class LegPairConfig(Strict):
     right: Cycles = Field(description="when the right foot comes down, in cycles")
     lift: float = Field(ge=0.0, le=0.3, description="height of a step")
     turn_rad: float = Field(
-        0.0, ge=0.0, le=1.2, description="of the girdle to either side, with its legs"
+        0.0, ge=0.0, le=1.2, description="angle by which the girdle turns to either side"
     )
 
     @property
@@ -170,10 +178,12 @@ class OrnamentConfig(Strict):
         description="place of the tip in body lengths, from the base of the ornament"
     )
     thick: float = Field(gt=0.0, le=0.1, description="radius at the root")
-    bow: Point = Field((0.0, 0.0, 0.0), description="of its middle, off the line to the tip")
-    swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="to and fro, once a step")
+    bow: Point = Field(
+        (0.0, 0.0, 0.0), description="offset of the ornament's middle from the line to its tip"
+    )
+    swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="amplitude of the swing, once a step")
     paired: bool = Field(False, description="the same on the other side")
-    dark: bool = Field(False, description="of the colour of the skin's bands")
+    dark: bool = Field(False, description="whether the ornament has the colour of the skin's bands")
 
     @property
     def mirrored(self) -> Self:
@@ -190,8 +200,10 @@ class AnimalConfig(Strict):
     skin: str = Field(
         description="skin of the body: a shipped skin, or a .toml in the folder of this file"
     )
-    length_m: float = Field(gt=0.0, le=20.0, description="from the head's tip to the tail's")
-    height: float = Field(gt=0.0, le=1.5, description="of the body's axis, over its length")
+    length_m: float = Field(gt=0.0, le=20.0, description="length from the head's tip to the tail's")
+    height: float = Field(
+        gt=0.0, le=1.5, description="height of the body's axis over the body's length"
+    )
     stride: float = Field(gt=0.0, le=3.0, description="way of a cycle, body lengths")
     cycle_s: float = Field(gt=0.02, le=20.0, description="duration of a cycle")
     leg_pairs: tuple[LegPairConfig, LegPairConfig] = Field(description="front, then hind")
@@ -201,9 +213,11 @@ class AnimalConfig(Strict):
         "[GC] Eq. 9-10 as printed, with one height for left and right",
     )
     vault: float = Field(
-        0.0, ge=0.0, le=1.0, description="how far the body rides on legs as on pendulums"
+        0.0, ge=0.0, le=1.0, description="share of the body's vertical motion on legs as pendulums"
     )
-    tail_swing_rad: float = Field(0.0, ge=0.0, le=1.5, description="of the tail's tip")
+    tail_swing_rad: float = Field(
+        0.0, ge=0.0, le=1.5, description="amplitude of the swing of the tail's tip"
+    )
     ornaments: tuple[OrnamentConfig, ...] = Field(
         (), description="horns, ears and beard of the animal"
     )

@@ -14,11 +14,13 @@ ServoId = Annotated[int, Field(ge=0, le=252)]
 
 
 class _Fault(Strict):
-    at_s: float = Field(0.0, ge=0.0, description="when it begins")
+    at_s: float = Field(0.0, ge=0.0, description="time at which the fault begins")
 
 
 class _Lasting(_Fault):
-    for_s: float | None = Field(None, gt=0.0, description="how long; not given: to the end")
+    for_s: float | None = Field(
+        None, gt=0.0, description="duration of the fault; not given: to the end"
+    )
 
 
 class NoiseFault(_Lasting):
@@ -28,7 +30,7 @@ class NoiseFault(_Lasting):
         description="change of a packet; late: a reply that the host no longer waits for"
     )
     chance: float = Field(1.0, gt=0.0, le=1.0, description="share of the packets that change")
-    ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
+    ids: tuple[ServoId, ...] = Field((), description="IDs of the affected servos; not given: all")
     of: Literal["answers", "questions", "both"] = Field(
         "answers",
         description="packets that change: those of the servos, those of the host, or both",
@@ -136,7 +138,7 @@ class SupplyFault(_Lasting):
 
     kind: Literal["supply"]
     volts: float = Field(ge=0.0, le=40.0, description="voltage of the supply during the fault")
-    ids: tuple[ServoId, ...] = Field((), description="of these servos only; not given: of all")
+    ids: tuple[ServoId, ...] = Field((), description="IDs of the affected servos; not given: all")
 
 
 class UnplugFault(_Lasting):
@@ -177,7 +179,7 @@ Fault = Annotated[NoiseFault | StallFault | ScheduledFault, Field(discriminator=
 class FaultPlan(Strict):
     """A fault file."""
 
-    seed: int = Field(0, ge=0, description="of every chance and every wrong bit")
+    seed: int = Field(0, ge=0, description="seed of all random choices")
     fault: tuple[Fault, ...] = Field(
         (), description="faults in the order of the file; each has a start and an end"
     )

@@ -73,7 +73,7 @@ class PoseConfig(Strict):
         10.0,
         ge=0.0,
         le=600.0,
-        description="how long a run without a pose holds, torque on, before it ends as failed",
+        description="time for which a run without a pose holds, torque on, before it fails",
     )
     start_m: float = Field(
         0.25,
@@ -98,12 +98,14 @@ class TrackerConfig(Strict):
     correlation_s: float = Field(
         0.0, ge=0.0, le=60.0, description="time over which the noise keeps its value; 0: white"
     )
-    delay_s: float = Field(0.0, ge=0.0, le=5.0, description="from measurement to arrival")
+    delay_s: float = Field(0.0, ge=0.0, le=5.0, description="delay from measurement to arrival")
     jitter_s: float = Field(0.0, ge=0.0, le=5.0, description="largest additional random delay")
     clock_offset_s: float = Field(
-        0.0, ge=-1e9, le=1e9, description="of the sender's clock from that of the robot"
+        0.0, ge=-1e9, le=1e9, description="offset of the sender's clock from the robot's"
     )
-    clock_drift_ppm: float = Field(0.0, ge=-1000.0, le=1000.0, description="of the sender's clock")
+    clock_drift_ppm: float = Field(
+        0.0, ge=-1000.0, le=1000.0, description="drift of the sender's clock"
+    )
     lost_share: float = Field(
         0.0, ge=0.0, lt=1.0, description="share of the datagrams that are lost, at random"
     )
@@ -116,5 +118,5 @@ class TrackerConfig(Strict):
     )
     swap_s: float = Field(0.2, ge=0.0, le=60.0, description="length of a swap")
     swap_m: float = Field(
-        0.3, ge=0.0, le=10.0, description="by how much swapped markers move the pose"
+        0.3, ge=0.0, le=10.0, description="distance by which swapped markers move the pose"
     )

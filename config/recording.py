@@ -8,9 +8,11 @@ from snakewalk.config.base import Strict
 class EpisodeConfig(Strict):
     """A stretch of the motion, as made by the head and passed on to the tail."""
 
-    cycles: float = Field(gt=0.0, le=100.0, description="how long, in cycles of the wave")
+    cycles: float = Field(gt=0.0, le=100.0, description="duration in cycles of the wave")
     gain: float = Field(1.0, gt=0.0, le=3.0, description="bends over the measured ones")
-    waves: float | None = Field(None, gt=0.1, le=5.0, description="on the body; default: measured")
+    waves: float | None = Field(
+        None, gt=0.1, le=5.0, description="number of waves on the body; default: measured"
+    )
     turn_rad: float = Field(0.0, ge=-7.0, le=7.0, description="change of heading, + is left")
 
 
@@ -19,10 +21,10 @@ class RecordingConfig(Strict):
 
     name: str = Field(description="name of the recording")
     source: str = Field(description="the animal, and who recorded it")
-    licence: str = Field(description="of the recording that was measured")
+    licence: str = Field(description="licence of the recording that was measured")
     rate_hz: float = Field(gt=0.0, description="frames per second")
-    length_m: float = Field(gt=0.0, description="of the animal")
-    waves: float = Field(gt=0.1, le=5.0, description="on the body")
+    length_m: float = Field(gt=0.0, description="length of the animal")
+    waves: float = Field(gt=0.1, le=5.0, description="number of waves on the body")
     frequency_hz: float = Field(gt=0.0, description="waves per second")
     travel: float = Field(ge=0.0, le=1.0, description="speed of the head over speed of the wave")
     envelope_rad: tuple[float, ...] = Field(

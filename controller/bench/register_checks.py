@@ -86,7 +86,9 @@ def register_findings(
     checks = _Checks(servos, robot, units)
     findings = [finding for finding in checks.all() if finding is not None]
     if not any(finding.check != "pose" for finding in findings):
-        findings.append(Finding("settings", "ok", "as a factory or a run leaves them"))
+        findings.append(
+            Finding("settings", "ok", "all registers have the values of a factory or a run")
+        )
     return findings
 
 

@@ -18,12 +18,18 @@ class CompoundSerpenoidParameters(GaitParameters):
 
     lateral_rad: float = Field(0.5, ge=0.0, le=1.5, description="amplitude of the yaw joints")
     dorsal_rad: float = Field(0.2, ge=0.0, le=1.2, description="amplitude of the pitch joints")
-    lateral_offset_rad: float = Field(0.0, ge=-0.5, le=0.5, description="of every yaw joint")
-    dorsal_offset_rad: float = Field(0.0, ge=-0.5, le=0.5, description="of every pitch joint")
-    lateral_waves: float = Field(1.5, ge=-4.0, le=4.0, description="on the body; 0: all together")
-    dorsal_waves: float = Field(1.5, ge=-4.0, le=4.0, description="on the body; 0: all together")
+    lateral_offset_rad: float = Field(0.0, ge=-0.5, le=0.5, description="offset of every yaw joint")
+    dorsal_offset_rad: float = Field(
+        0.0, ge=-0.5, le=0.5, description="offset of every pitch joint"
+    )
+    lateral_waves: float = Field(
+        1.5, ge=-4.0, le=4.0, description="number of waves on the body; 0: all joints together"
+    )
+    dorsal_waves: float = Field(
+        1.5, ge=-4.0, le=4.0, description="number of waves on the body; 0: all joints together"
+    )
     lead_rad: float = Field(
-        float(np.pi / 2), ge=-np.pi, le=np.pi, description="of the pitch joints' wave"
+        float(np.pi / 2), ge=-np.pi, le=np.pi, description="phase of the pitch joints' wave"
     )
     dorsal_rate: int = Field(1, ge=1, le=3, description="cycles of the pitch joints in one")
 

@@ -21,8 +21,10 @@ class ConcertinaParameters(GaitParameters):
     """The fold."""
 
     winding_rad: float = Field(1.0, ge=0.0, le=1.5, description="folds against the body's axis")
-    folds: float = Field(2.0, ge=1.0, le=6.0, description="that fit on the body")
-    share: float = Field(0.8, ge=0.2, le=1.0, description="of the body that is folded at a time")
+    folds: float = Field(2.0, ge=1.0, le=6.0, description="number of folds on the body")
+    share: float = Field(
+        0.8, ge=0.2, le=1.0, description="share of the body that is folded at a time"
+    )
 
 
 class Concertina(Gait):

@@ -28,9 +28,13 @@ class ErectParameters(GaitParameters):
     """Paths of the feet, in shares of a leg's length from hip to foot."""
 
     frequency_hz: Frequency = 0.5
-    stride: float = Field(0.2, ge=0.0, le=0.5, description="of a foot to either side of the hip")
+    stride: float = Field(
+        0.2, ge=0.0, le=0.5, description="travel of a foot to either side of the hip"
+    )
     reach: float = Field(0.85, ge=0.3, le=0.98, description="hip to foot as it stands")
-    lift: float = Field(0.12, ge=0.0, le=0.6, description="by which a leg shortens in the air")
+    lift: float = Field(
+        0.12, ge=0.0, le=0.6, description="share by which a leg shortens in the air"
+    )
     stance_rad: float = Field(1.0, ge=0.5, le=1.5, description="roll of a leg down to the ground")
     turn: Turn = 0.0
 

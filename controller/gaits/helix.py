@@ -61,8 +61,8 @@ def helix_joints_rad(
 
 
 Turns = Annotated[float, Field(ge=0.0, le=2.0, description="turns of the body a second")]
-BodyRadius = Annotated[float, Field(ge=0.002, le=0.5, description="of the robot")]
-Rise = Annotated[float, Field(ge=0.05, le=1.2, description="of the helix")]
+BodyRadius = Annotated[float, Field(ge=0.002, le=0.5, description="radius of the robot's body")]
+Rise = Annotated[float, Field(ge=0.05, le=1.2, description="rise angle of the helix")]
 LeftHanded = Annotated[bool, Field(description="helix; right-handed otherwise")]
 Backward = Annotated[bool, Field(description="tail first")]
 
@@ -71,7 +71,7 @@ class HelixPoleParameters(GaitParameters):
     """The pole and the grip."""
 
     frequency_hz: Turns = 0.2
-    pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="of the pole")
+    pole_radius_m: float = Field(0.09, ge=0.02, le=1.0, description="radius of the pole")
     body_radius_m: BodyRadius = 0.03
     grip_m: float = Field(0.012, ge=-0.05, le=0.2, description="helix tighter than the pole by")
     rise_rad: Rise = 0.3

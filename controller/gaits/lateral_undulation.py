@@ -17,7 +17,7 @@ class LateralUndulationParameters(GaitParameters):
     """Hirose's serpenoid curve."""
 
     winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis: alpha")
-    waves: float = Field(1.2, ge=0.5, le=3.0, description="on the body")
+    waves: float = Field(1.2, ge=0.5, le=3.0, description="number of waves on the body")
     turn_rad: float = Field(
         0.0,
         ge=-2.5,

@@ -17,7 +17,7 @@ class RectilinearParameters(GaitParameters):
     """One wave in the pitch joints."""
 
     lift_rad: float = Field(0.2, ge=0.0, le=1.2, description="body against the ground")
-    waves: float = Field(2.5, ge=1.0, le=4.0, description="on the body")
+    waves: float = Field(2.5, ge=1.0, le=4.0, description="number of waves on the body")
     stance_rad: float = Field(
         0.4, ge=0.0, le=1.0, description="winding of a still S in plan: keeps it from rolling over"
     )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class RollingParameters(GaitParameters):
     """One bend that rotates."""
 
-    bend_rad: float = Field(1.2, ge=0.1, le=5.0, description="of the whole body")
+    bend_rad: float = Field(1.2, ge=0.1, le=5.0, description="bend of the whole body")
 
 
 class Rolling(Gait):

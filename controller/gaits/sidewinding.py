@@ -18,9 +18,12 @@ class SidewindingParameters(GaitParameters):
 
     winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis, in plan")
     lift_rad: float = Field(0.12, ge=0.0, le=0.8, description="body against its axis, in height")
-    waves: float = Field(1.5, ge=0.75, le=3.0, description="on the body")
+    waves: float = Field(1.5, ge=0.75, le=3.0, description="number of waves on the body")
     lead_rad: float = Field(
-        float(np.pi / 2), ge=-np.pi, le=np.pi, description="of the wave in height: sign is side"
+        float(np.pi / 2),
+        ge=-np.pi,
+        le=np.pi,
+        description="phase of the wave in height; its sign selects the side",
     )
     turn_rad: float = Field(0.0, ge=-1.5, le=1.5, description="bend of the axis over the body")
 

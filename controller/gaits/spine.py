@@ -28,9 +28,9 @@ SOURCE = (
 )
 Nose = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the head, body = 2 pi")]
 Tail = Annotated[float, Field(ge=0.0, le=1.5, description="amplitude at the tail, body = 2 pi")]
-Waves = Annotated[float, Field(ge=0.1, le=3.0, description="on the body: alpha")]
+Waves = Annotated[float, Field(ge=0.1, le=3.0, description="number of waves on the body: alpha")]
 StandingPhase = Annotated[
-    float, Field(ge=-np.pi, le=np.pi, description="of the standing form only: phi")
+    float, Field(ge=-np.pi, le=np.pi, description="phase of the standing form only: phi")
 ]
 
 
@@ -43,7 +43,9 @@ class SpineParameters(GaitParameters):
     phase_rad: StandingPhase = float(np.pi / 2)
     standing: bool = Field(False, description="Eq. 11 as printed: no thrust")
     turn_rad: float = Field(0.0, ge=-2.5, le=2.5, description="bend over the body; positive: left")
-    fold_rad: float = Field(1.1, ge=0.0, le=1.57, description="of legs, if any: back at the hip")
+    fold_rad: float = Field(
+        1.1, ge=0.0, le=1.57, description="angle by which legs fold back at the hip"
+    )
 
 
 @cache

@@ -36,9 +36,11 @@ class LegParameters(GaitParameters):
     """Strides, stance and bends."""
 
     frequency_hz: Frequency = 0.25
-    stride_rad: float = Field(0.5, ge=0.0, le=1.1, description="of a leg to either side: swing")
+    stride_rad: float = Field(0.5, ge=0.0, le=1.1, description="swing of a leg to either side")
     stance_rad: float = Field(0.6, ge=0.0, le=1.2, description="roll of a leg down to the ground")
-    lift_rad: float = Field(0.35, ge=0.0, le=1.2, description="how far a leg rises in the air")
+    lift_rad: float = Field(
+        0.35, ge=0.0, le=1.2, description="angle by which a leg rises in the air"
+    )
     bend_rad: float = Field(0.5, ge=0.0, le=1.5, description="front girdle against hind girdle")
     turn: Turn = 0.0
 

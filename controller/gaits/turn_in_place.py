@@ -18,7 +18,7 @@ class TurnInPlaceParameters(GaitParameters):
 
     winding_rad: float = Field(0.7, ge=0.0, le=1.4, description="body against its axis, in plan")
     lift_rad: float = Field(0.1, ge=0.0, le=0.8, description="at the ends, in height")
-    waves: float = Field(1.5, ge=0.75, le=3.0, description="on the body")
+    waves: float = Field(1.5, ge=0.75, le=3.0, description="number of waves on the body")
 
 
 class TurnInPlace(Gait):

@@ -37,7 +37,7 @@ class PolicyWave(Strict):
 
     frequency_hz: float = Field(0.5, ge=0.1, le=2.0, description="cycles a second")
     amplitude_rad: tuple[_Amplitude, _Amplitude, _Amplitude, _Amplitude] = Field(
-        (0.31, 0.31, 0.31, 0.31), description="of the joints, at four knots"
+        (0.31, 0.31, 0.31, 0.31), description="amplitudes of the joints at four knots"
     )
     waves: tuple[_Waves, _Waves, _Waves] = Field(
         (1.2, 1.2, 1.2), description="a body length, on each third of the body"
@@ -85,7 +85,9 @@ WAVE_SPAN: Final[Floats] = np.repeat([0.5, 0.15, 0.4, 0.2, 1.0, 0.3], [1, 4, 3, 
 class Layer(Strict):
     """Outputs are ``tanh(weights @ inputs + bias)``; the last layer's are without the tanh."""
 
-    weights: tuple[tuple[float, ...], ...] = Field(description="a row for each output")
+    weights: tuple[tuple[float, ...], ...] = Field(
+        description="weights of the network, one row for each output"
+    )
     """(outputs, inputs) weights of the layer."""
     bias: tuple[float, ...] = Field(description="one for each output")
     """(outputs,) biases of the layer."""
@@ -95,9 +97,9 @@ class Origin(Strict):
     """How a policy was learnt."""
 
     method: str = Field(description="the optimiser: cma or ppo")
-    seed: int = Field(description="of every random choice")
-    steps: int = Field(ge=0, description="of the environment, all together")
-    world: str = Field(description="that it was learnt on")
+    seed: int = Field(description="seed of every random choice")
+    steps: int = Field(ge=0, description="total number of environment steps")
+    world: str = Field(description="world of the training")
     law: str = Field("", description="law of friction of that world; empty: not stated")
     software: str = Field(description="names and versions")
 
@@ -106,7 +108,7 @@ class Policy(Strict):
     """A policy's file."""
 
     name: Name
-    robot: str = Field(description="that it was learnt on; others need as many yaw joints")
+    robot: str = Field(description="robot of the training; others need as many yaw joints")
     observation: tuple[str, ...] = Field((), description="names of the network's inputs")
     origin: Origin
     wave: PolicyWave = PolicyWave()

@@ -124,7 +124,9 @@ def calibrate(
 
 def _check_robot(like: RobotConfig) -> None:
     if like.limbs:
-        raise InputError(f"robot {like.name}: has legs; calibrate knows chains without")
+        raise InputError(
+            f"robot {like.name}: has legs; calibrate supports only chains without legs"
+        )
     if like.is_mixed:
         raise InputError(
             f"robot {like.name}: has servos of different series on its ports; calibrate knows one "

@@ -44,7 +44,9 @@ def scan(
     elif results:
         _print_servos(results, lines.several)
     elif noise:
-        console.print(f"{lines.port}: no reply came whole: cables, plugs, termination, ground?")
+        console.print(
+            f"{lines.port}: no reply was complete; check cables, plugs, termination and ground"
+        )
     else:
         console.print(f"{lines.port}: {_silence(baud)}")
     if not results:
