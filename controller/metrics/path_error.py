@@ -90,6 +90,14 @@ def travelled_m(pose: PoseTable, first: int = 0, last: int = -1) -> float:
     return length_m(smooth_track_m(pose)[rows])
 
 
+def ground_speed_m_s(pose: PoseTable) -> Floats:
+    """Speed (P,) of the centre of mass over the ground, mean of the last 2 s; NaN before."""
+    time_s = pose.time_s
+    row = np.searchsorted(time_s, time_s - _SMOOTH_S)
+    span_s = np.where(row, time_s - time_s[row], np.nan)
+    return np.asarray(np.hypot(*(pose.centre_m - pose.centre_m[row])[:, :2].T) / span_s)
+
+
 def smooth_track_m(pose: PoseTable) -> Floats:
     """Return the track of the centre of mass (P, 3) without the noise of single poses.
 

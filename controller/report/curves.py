@@ -14,7 +14,7 @@ from plotly.offline import get_plotlyjs
 from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import AMBER, BLUE, COLOURS, GREEN, INK, RED, rgb
 from snakewalk.controller.figures.style import thin
-from snakewalk.controller.metrics.path_error import path_error_m, waypoint_times_s
+from snakewalk.controller.metrics.path_error import ground_speed_m_s, path_error_m, waypoint_times_s
 from snakewalk.controller.report.trip import trip_of
 from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import panel_curves
@@ -80,6 +80,7 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
     if np.isfinite(error_m).any():
         panels.append((_DISTANCE, [("from the path", BLUE, record.pose.time_s, error_m)]))
     constant = []
+    speed_m_s = ground_speed_m_s(record.pose)
     for panel in Panel:
         curves = [] if panel.is_of_one_joint else panel_curves(record, panel)
         constant += [curve.constant_text for curve in curves if curve.is_constant]
@@ -88,6 +89,8 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
             for curve in curves
             if not curve.is_constant
         ]
+        if panel is Panel.SPEED and np.isfinite(speed_m_s).any():
+            drawn.insert(0, ("centre of mass, mean of 2 s", BLUE, record.pose.time_s, speed_m_s))
         if drawn:
             panels.append((panel, drawn))
     words = f" Constant, and not drawn: {', '.join(constant)}." if constant else ""

@@ -49,7 +49,7 @@ _NAN: Final = float("nan")
 class Panel(StrEnum):
     """Panels of curves, in the order in which pages show them; title with unit."""
 
-    SPEED = "forward speed, m/s"
+    SPEED = "speed, m/s"
     CURRENT = "current, A"
     CYCLE = "time in a cycle, ms"
     HEAT = "hottest servo, °C"

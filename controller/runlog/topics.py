@@ -219,7 +219,7 @@ class PoseTable(Table):
         Floats,
         _optional(
             "forward speed of the links, mean over the body",
-            curves=(Curve(Panel.SPEED, "speed", "blue"),),
+            curves=(Curve(Panel.SPEED, "links, along themselves", "sky"),),
         ),
     ]
     predicted_speed_m_s: Annotated[

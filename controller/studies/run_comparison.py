@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.metrics.path_error import path_error_m
+from snakewalk.controller.metrics.path_error import ground_speed_m_s, path_error_m
 from snakewalk.controller.metrics.summary import RunSummary, largest, summary
 from snakewalk.controller.metrics.tracking import tracking_errors
 from snakewalk.controller.metrics.verdict import RunVerdict, verdict
@@ -38,7 +38,7 @@ class ComparedRun:
     path_error_m: Floats
     """(P,) distances from the path, m."""
     speed_m_s: Floats
-    """(P,) forward speeds, m/s."""
+    """(P,) speeds of the centre of mass over the ground, m/s."""
     cycle_s: Floats
     """(T,) times of the values from control cycles:"""
     current_a: Floats
@@ -68,7 +68,7 @@ def compared_run(record: RunRecord, name: str) -> ComparedRun:
         centre_m=pose.centre_m[:, :2],
         pose_s=pose.time_s,
         path_error_m=path_error_m(record),
-        speed_m_s=pose.speed_m_s,
+        speed_m_s=ground_speed_m_s(pose),
         cycle_s=cycle.time_s,
         current_a=largest(cycle.current_a),
         tracking_rms_rad=np.sqrt(squares / np.where(count, count, np.nan)),

@@ -13,12 +13,11 @@ from snakewalk.controller.report.figures.effort import effort_figure
 from snakewalk.controller.report.figures.joints import joints_figure
 from snakewalk.controller.report.figures.safety import safety_figure
 from snakewalk.controller.report.figures.slope import slope_figure
-from snakewalk.controller.report.figures.timing import timing_figure
 from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
-_IN_CURVES: Final = frozenset({"Effort", "Time on the bus"})
+_IN_CURVES: Final = frozenset({"Effort"})
 """Quantities that the curves of the page show as well, to be zoomed."""
 _SECTIONS: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (
@@ -56,11 +55,6 @@ _SECTIONS: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ..
         "In a long run a curve is a mean, its pale band reaches from least to largest. Torque, "
         "where its constant is known, is current times constant, gear losses included.",
         effort_figure,
-    ),
-    (
-        "Time on the bus",
-        "A cycle has to fit into its period; a deadline that was missed is skipped, never made up.",
-        timing_figure,
     ),
     (
         "Safety",

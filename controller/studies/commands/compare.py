@@ -1,6 +1,7 @@
 """``snakewalk log compare``: several runs side by side, from their logs."""
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -72,7 +73,7 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
         console.print(settings, "")
     else:
         console.print("Run, robot and world are the same.\n")
-    numbers = _table("number", "What came of it", runs)
+    numbers = _table("number", "Numbers that differ, the largest difference first", runs)
     verdicts = [run.verdict for run in runs]
     numbers.add_row("verdict", *(verdict.sentence for verdict in verdicts))
     numbers.add_row("pose", *(verdict.evidence for verdict in verdicts))
@@ -82,16 +83,26 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
         if any(texts):
             numbers.add_row(label.replace("_", " "), *(text or "-" for text in texts))
     summaries = [flat(run.summary.to_dict()) for run in runs]
-    for key in dict.fromkeys(key for summary in summaries for key in summary):
-        values = [summary.get(key) for summary in summaries]
-        is_known = any(value not in (None, "") for value in values)
-        if is_known and key.split(".")[0] not in _HIDDEN_NUMBERS:
+    keys = dict.fromkeys(key for summary in summaries for key in summary)
+    values_by_key = {key: [summary.get(key) for summary in summaries] for key in keys}
+    for key in sorted(keys, key=lambda key: _spread(values_by_key[key]), reverse=True):
+        values = values_by_key[key]
+        if _spread(values) > 0.0 and key.split(".")[0] not in _HIDDEN_NUMBERS:
             cells = [labelled(key, value) for value in values]
             label = min(
                 (spelling for spelling, _ in cells), key=len
             )  # without the unit, if one is known
             numbers.add_row(label, *(text for _, text in cells))
-    console.print(numbers)
+    console.print(numbers, "The other numbers are the same; --json prints all.")
+
+
+def _spread(values: list[Any]) -> float:
+    """Difference of values relative to the largest; infinite if one is missing or no number."""
+    if all(value == values[0] for value in values):
+        return 0.0
+    if not all(isinstance(value, int | float) for value in values):
+        return math.inf
+    return float((max(values) - min(values)) / max(map(abs, values)))
 
 
 def _table(heading: str, title: str, runs: "list[ComparedRun]") -> Table:

@@ -180,14 +180,23 @@ def trials(
     changes = {"track": track, "seconds": seconds}
     seed_range = range(first_seed, first_seed + seeds)
     planned = study.plan_trials(cases, seed_range, start_spread, changes)  # refuses bad input first
-    finished_trials = _run(
-        planned, cases, changes, start_spread, _SimulationPlace(workers, dask), out
-    )
+    finished_trials: list[study.Trial] = []
+    try:
+        _run(
+            planned,
+            cases,
+            changes,
+            start_spread,
+            _SimulationPlace(workers, dask),
+            out,
+            finished_trials,
+        )
+    finally:  # also of trials that were stopped
+        summaries = study.table(finished_trials, cases)
+        if picture is not None and finished_trials:
+            pictures().draw_trials(summaries, picture)
     if parquet is not None and out is not None:
         table_to_parquet(out, parquet, KINDS)
-    summaries = study.table(finished_trials, cases)
-    if picture is not None:
-        pictures().draw_trials(summaries, picture)
     rows = [asdict(summary) for summary in summaries]
     if as_json:
         settings = {"seeds": list(seed_range), "start_spread_m": start_spread}
@@ -265,13 +274,14 @@ def _run(
     start_spread: float,
     where: _SimulationPlace,
     out: Path | None,
-) -> list[study.Trial]:
-    """Run the trials that the table ``out`` lacks, and return all."""
+    finished: list[study.Trial],
+) -> None:
+    """Add all trials to ``finished``; those that the table ``out`` lacks are run."""
     table = None
     if out is not None:
         configs = {case: study.config_digest(case, changes) for case in cases}
         table = TrialsTable(out, configs, start_spread)
-    finished = table.finished(planned) if table else []
+    finished += table.finished(planned) if table else []
     done = {(trial.case, trial.seed) for trial in finished}
     missing = [item for item in planned if item not in done]
     with table or nullcontext():
@@ -285,7 +295,6 @@ def _run(
             LOGGER.debug("%s", trial)
             if table:
                 table.add(trial)
-    return finished
 
 
 def _check_keys(keys: list[str]) -> None:

@@ -28,7 +28,7 @@ def draw_comparison(runs: Sequence[ComparedRun], path: Path) -> None:
         )
         for title, unit, key, time_key in (
             ("Centre of mass from the path", "m", "path_error_m", "pose_s"),
-            ("Forward speed", "m/s", "speed_m_s", "pose_s"),
+            ("Speed of the centre of mass, mean of 2 s", "m/s", "speed_m_s", "pose_s"),
             ("Highest current of a joint", "A", "current_a", "cycle_s"),
             ("Measured minus sent, RMS of the joints", "rad", "tracking_rms_rad", "cycle_s"),
         )

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -24,7 +25,7 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
     down = -(-len(gaits) // across)
     with style():
         figure = Figure(figsize=(WIDTH_IN, 0.7 + 2.3 * down), layout="constrained")
-        axes = figure.subplots(down, across, squeeze=False)
+        axes = figure.subplots(down, across, squeeze=False, sharey=True)
         for panel in axes.flat[len(gaits) :]:
             panel.set_axis_off()
         for panel, gait in zip(axes.flat, gaits, strict=False):
@@ -48,21 +49,28 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
 
 
 def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str, str]) -> None:
-    is_measured = False
+    drawn = 0
     for robot, colour in colours.items():
-        some = [r for r in rows if r["robot"] == robot and r["cycles"]]
+        some = [
+            row
+            for row in rows
+            if row["robot"] == robot
+            and row["cycles"]
+            and 0.0 < number(row, "cost_of_transport") < np.inf
+        ]
+        drawn += len(some)
         paces = [pace(row) for row in some]
         cost = [number(r, "cost_of_transport") for r in some]
-        is_measured = is_measured or any(value > 0.0 for value in cost)
         axes.scatter(paces, cost, s=11, color=colour, alpha=0.75, linewidths=0)
         for r, x, y in zip(some, paces, cost, strict=True):
             if r["number"] == "0":
                 axes.scatter([x], [y], s=70, facecolors="none", edgecolors=colour)
-    axes.set_title(gait)
+    left_out = len(rows) - drawn
+    axes.set_title(gait + f": {left_out} of {len(rows)} without a cost" * bool(left_out))
     axes.set_ylabel("cost of transport")
     axes.set_xlabel(f"pace ({UNITS[GAITS[gait].aim]})")
     axes.xaxis.set_major_locator(MaxNLocator(4))
-    if is_measured:  # else none moved far enough to have a cost
+    if drawn:  # else none moved far enough to have a cost
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=7))
         axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from matplotlib.patches import Rectangle
 
 from snakewalk.config.colours import BLUE, INK, PALE, RED
@@ -17,6 +17,8 @@ from snakewalk.controller.studies.trials import CaseSummary
 matplotlib.use("Agg")
 
 _SHARE = LinearSegmentedColormap.from_list("share", [RED, "#f7f2e4", BLUE])
+_BRIGHT = 0.5
+"""Brightness of a cell from which its text is dark (ours)."""
 _CAUSES = 3
 """Largest number of lines about causes in a cell."""
 
@@ -90,6 +92,8 @@ def _draw_cell(panel: Axes, x: int, y: int, row: CaseSummary) -> None:
     share = complete / row.runs if row.runs else 0.0
     colour = _SHARE(share) if row.runs else PALE
     panel.add_patch(Rectangle((x - 0.48, y - 0.48), 0.96, 0.96, color=colour, linewidth=0))
+    red, green, blue, _ = to_rgba(colour)
+    ink = INK if 0.3 * red + 0.59 * green + 0.11 * blue > _BRIGHT else "white"
     causes = [f"{count} {cause}" for cause, count in _shown_causes(row)]
     panel.text(
         x,
@@ -99,6 +103,6 @@ def _draw_cell(panel: Axes, x: int, y: int, row: CaseSummary) -> None:
         va="center",
         fontsize=9,
         fontweight="bold",
-        color=INK,
+        color=ink,
     )
-    panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=8.5, color=INK)
+    panel.text(x, y + 0.12, "\n".join(causes), ha="center", va="top", fontsize=8.5, color=ink)

@@ -9,6 +9,7 @@ import scipy.signal
 from snakewalk.controller.metrics.path_error import (
     distance_m,
     fitted_parabolas,
+    ground_speed_m_s,
     length_m,
     path_error_m,
     smooth_track_m,
@@ -58,6 +59,16 @@ def test_a_crossing_branch_is_not_the_way() -> None:
 
 def test_a_path_of_one_place() -> None:
     assert distance_m(np.array([[3.0, 4.0]]), np.zeros((2, 2)), UNKNOWN) == pytest.approx(5.0)
+
+
+def test_a_body_that_goes_sideways_has_the_speed_of_its_centre() -> None:
+    """The speed of the links along themselves is 0 there: it is no speed over the ground."""
+    times = np.linspace(0.0, 5.0, 251)
+    points = np.column_stack([0.1 * times, 0.2 * times])
+    speed_m_s = ground_speed_m_s(pose_along(points, times))
+    assert np.isnan(speed_m_s).tolist() == (times <= 2.0).tolist()
+    assert speed_m_s[times > 2.0] == pytest.approx(np.hypot(0.1, 0.2))
+    assert ground_speed_m_s(pose_along(points[:0], times[:0])).shape == (0,)
 
 
 def test_lengths() -> None:

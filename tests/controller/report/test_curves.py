@@ -43,6 +43,6 @@ def test_panels_of_a_dead_reckoned_pose_state_it(record: RunRecord) -> None:
     named = [each for each in titles[1] if "dead-reckoned" in each]
     assert named == [
         "<b>distance from the path, m, dead-reckoned</b>",
-        "<b>forward speed, m/s, dead-reckoned</b>",
+        "<b>speed, m/s, dead-reckoned</b>",
     ]
     assert [each.replace(", dead-reckoned", "") for each in titles[1]] == titles[0]

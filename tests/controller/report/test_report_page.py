@@ -75,7 +75,7 @@ def test_the_page_stands_alone(hills: Path) -> None:
     html = hills.read_text(encoding="utf-8")
     *sources, link = parsed(html).sources
     assert link == "summary.json", "no log stands beside this page"
-    assert len(sources) == 7
+    assert len(sources) == 6
     for source in sources:
         assert source.startswith("data:image/svg+xml;base64,")
         svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))

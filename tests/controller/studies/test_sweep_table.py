@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib import rc_context
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.parquet import table_to_parquet
@@ -44,6 +45,16 @@ def test_a_sweep_in_which_no_body_moved_has_a_picture(tmp_path: Path) -> None:
         rows.add(POINTS[0], replace(row(0.0), cost_of_transport=nan))
     draw_sweep(read_table(table), picture)
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_points_without_a_cost_are_counted(tmp_path: Path) -> None:
+    path, picture = tmp_path / "sweep.csv", tmp_path / "sweep.svg"
+    with SweepTable(path) as rows:
+        for point, cost in zip(POINTS[:4], (0.5, 1.0, nan, -1.0), strict=True):
+            rows.add(point, replace(row(0.2), cost_of_transport=cost))
+    with rc_context({"svg.fonttype": "none"}):
+        draw_sweep(read_table(path), picture)
+    assert "lateral-undulation: 2 of 4 without a cost" in picture.read_text(encoding="utf-8")
 
 
 def test_columns_are_unique() -> None:

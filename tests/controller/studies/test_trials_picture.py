@@ -41,6 +41,7 @@ def test_a_cell_a_case(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {text.get_text() for text in walk.texts} == {"4 of 4", ""}
     words = [text.get_text() for text in serpenoid.texts]
     assert words[-2:] == ["0 of 3", "2 climb\n1 slip"]
+    assert {text.get_color() for text in (*walk.texts, *serpenoid.texts[-2:])} == {"white"}
     best, worst = serpenoid.patches[0], serpenoid.patches[-1]
     assert best.get_facecolor() == plots._SHARE(1.0)
     assert worst.get_facecolor() == plots._SHARE(0.0)
