@@ -9,7 +9,7 @@ from enum import IntEnum, IntFlag
 from typing import ClassVar
 
 from snakewalk.config.servo_catalogue import servo_model
-from snakewalk.config.servo_model import ServoModel
+from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.protocol.protocol1 import (
     BROADCAST_ID,
     Error1,
@@ -106,10 +106,14 @@ class Decoder1:
         ]
         return ", ".join(alarms) or "ok"
 
+    def _decode(self, cell: RegisterRow, data: bytes) -> int:
+        """Value of a register whose bytes begin ``data``; servos of another make override it."""
+        return int.from_bytes(data[: cell.size], "little")
+
     def _values(self, address: int, data: bytes) -> dict[str, object]:
         end = address + len(data)
         texts: dict[str, object] = {
-            name: int.from_bytes(data[cell.address - address :][: cell.size], "little")
+            name: self._decode(cell, data[cell.address - address :])
             for name, cell in self._registers.items()
             if address <= cell.address and cell.address + cell.size <= end
         }

@@ -26,6 +26,7 @@ from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.track.bone_motion import from_points
 
 CHAIN = HeightChain(flicks())
+NAMES = tuple(f"spine_{k:02d}" for k in range(5))
 FLIP = np.array([1.0, -1.0, 1.0])
 
 
@@ -131,7 +132,7 @@ def test_the_tongue_of_the_skin_is_as_far_out_as_its_height() -> None:
     held = Weights(np.zeros((3, 3), dtype=np.int64), np.tile([0.0, 1.0, 0.0], (3, 1)))
     rest = points[0, :-1]
     rig, texture = rig_with_tongue(
-        Rig(mesh, held, rest, np.arange(5) - 1), 1.0, np.zeros((24, 4, 3), dtype=np.uint8)
+        Rig(mesh, held, rest, np.arange(5) - 1, NAMES), 1.0, np.zeros((24, 4, 3), dtype=np.uint8)
     )
     assert texture is not None
     for frame, height in enumerate((0.0, 0.5, 1.0)):
@@ -152,7 +153,9 @@ def test_a_tongue_is_a_round_stem_with_two_mirrored_tips(length_m: float) -> Non
         faces=np.eye(3, dtype=int),
     )
     held = Weights(np.zeros((3, 3), dtype=np.int64), np.tile([0.0, 1.0, 0.0], (3, 1)))
-    rig, _ = rig_with_tongue(Rig(mesh, held, np.zeros((5, 3)), np.arange(5) - 1), length_m, None)
+    rig, _ = rig_with_tongue(
+        Rig(mesh, held, np.zeros((5, 3)), np.arange(5) - 1, NAMES), length_m, None
+    )
     corners_m = rig.mesh.vertices[3:] / length_m
     front, root = corners_m[:, 0].max(), corners_m[:, 0].min()
     assert front == pytest.approx(-2.0 * RADIUS)
