@@ -19,7 +19,7 @@ from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture, refuse_to_overwrite
 from snakewalk.controller.track.analysis import analyse as measure
 from snakewalk.controller.track.choice import Choice
-from snakewalk.controller.track.readers.load import load_track
+from snakewalk.controller.track.readers.load import choice_among, load_track
 
 
 @command(
@@ -51,7 +51,7 @@ def analyse(
     analyses = []
     pairs = list(zip(recordings, files, strict=True))
     for name, file in show_progress(pairs, "recordings", len(pairs)):
-        analysis = measure(load_track(name, choice=choice))
+        analysis = measure(load_track(name, choice=choice_among(name, recordings, choice)))
         if file is not None:
             from snakewalk.controller.capture.plots.analysis import draw_analysis  # noqa: PLC0415  --picture: an extra
 

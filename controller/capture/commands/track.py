@@ -29,6 +29,7 @@ from snakewalk.controller.console.result_files import (
 )
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.generated import EMBEDDED
+from snakewalk.controller.track.readers.load import choice_among
 from snakewalk.controller.track.readers.writers import SUFFIXES, write_track
 from snakewalk.controller.track.track import UNSURE_HEAD
 
@@ -76,7 +77,7 @@ def track(
             name,
             robot,
             world,
-            choice=choice,
+            choice=choice_among(name, names, choice),
         )
         for name in show_progress(names, "recordings", len(names))
     ]

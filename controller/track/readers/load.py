@@ -1,6 +1,6 @@
 """The entry for recordings: a shipped name, a file of figures, or a file of bodies."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -21,6 +21,11 @@ from snakewalk.controller.track.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.track.readers.tables import load_csv
 from snakewalk.controller.track.readers.wcon import load_wcon, zipped_text
 from snakewalk.controller.track.track import Track
+
+
+def choice_among(name: str, names: Sequence[str], choice: Choice) -> Choice:
+    """Return the choice for one of several recordings: it is for files if there are any."""
+    return ALL if name in EMBEDDED and not {*names} <= {*EMBEDDED} else choice
 
 
 def load_track(

@@ -203,7 +203,8 @@ def test_a_servo_that_is_not_as_it_was_set_stops_the_run(change: Callable[[Rig],
     rig.link.enable()
     rig.cycles(20)
     change(rig)
-    cause = "it has rebooted" if change is _boots_with_torque else "another program writes to it"
+    has_booted = change in (_boots_with_torque, _boots_with_torque_on_its_next_goal)
+    cause = "it has rebooted" if has_booted else "another program writes to it"
     with pytest.raises(SafetyTrippedError, match=rf"joint pitch_02 \(ID 2\): .*: {cause}"):
         rig.cycles(49)
     assert rig.registers("Torque Enable") == [0] * 4

@@ -135,7 +135,7 @@ FAULTS = {
     "alarm": (player("overheating", 1), "overheating"),
     "setting": (
         player("write", 1, 'register = "Position P Gain"\nvalue = 3\n'),
-        "Position P Gain is 3, not",
+        "Position P Gain is 3, was",
     ),
     "limit": (
         player("write", 1, 'register = "PWM Limit"\nvalue = 300\n'),
