@@ -475,6 +475,7 @@ class ServoChain:
         """
         self._check_pause()
         self._send_goals(command.goal_rad)
+        self._check_pause()
         self._sent_at_s = self._clock.now_s()
 
     def _check_pause(self) -> None:
