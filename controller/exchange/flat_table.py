@@ -14,7 +14,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.joint_names import numbered_joint_names
 from snakewalk.config.robot import JointConfig
 from snakewalk.config.units import end_of
-from snakewalk.controller.runlog.column import ANY, JOINT, LINK, Column, Table
+from snakewalk.controller.runlog.column import ANY, JOINT, LINK, ROWS, Column, Table, release
 from snakewalk.controller.runlog.encode import encode
 from snakewalk.controller.runlog.evidence import PoseEvidence
 from snakewalk.controller.runlog.record import Header, RunRecord
@@ -84,7 +84,10 @@ def write_csv(table: FlatTable, path: Path) -> int:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(table.columns)
-        writer.writerows(zip(*(_texts(cells) for cells in table.columns.values()), strict=True))
+        for start in range(0, table.row_count, ROWS):  # a long log is not in memory as texts
+            parts = (cells[start : start + ROWS] for cells in table.columns.values())
+            writer.writerows(zip(*map(_texts, parts), strict=True))
+            release(table.columns.values())
     return table.row_count
 
 

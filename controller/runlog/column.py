@@ -5,7 +5,7 @@ and curves read.
 """
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from mmap import ACCESS_READ, MADV_DONTNEED, mmap
@@ -223,6 +223,16 @@ ROWS: Final = 4096
 """Rows of a long log that are in memory at once (ours)."""
 
 
+def release(columns: Iterable[Any]) -> None:
+    """Remove the rows of columns that are stored in files from memory; they can be read again."""
+    for column in columns:
+        owner = column
+        while isinstance(owner, np.ndarray):
+            owner = owner.base
+        if isinstance(owner, memoryview) and isinstance(owner.obj, mmap):
+            owner.obj.madvise(MADV_DONTNEED)
+
+
 def by_rows(function: Callable[..., Any], *columns: Any) -> Any:
     """Return ``function`` of columns (n, ...) without a copy of a whole column in memory.
 
@@ -233,9 +243,7 @@ def by_rows(function: Callable[..., Any], *columns: Any) -> Any:
     results = []
     for start in range(0, len(columns[0]), ROWS):
         results.append(function(*(column[start : start + ROWS] for column in columns)))
-        for column in columns:
-            if isinstance(column.base, mmap):
-                column.base.madvise(MADV_DONTNEED)
+        release(columns)
     return np.concatenate(results)
 
 

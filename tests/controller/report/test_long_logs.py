@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 import pytest
 
 from snakewalk.controller.metrics.summary import summary
+from snakewalk.controller.runlog.column import StoredColumn, release
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.view.commands.demo import RECORDED
 from tests.helpers.long_log import pack_early, repeat_log
@@ -35,6 +37,23 @@ def test_the_columns_of_a_long_log_give_the_same_summary(
     expected = summary(read_log(log).from_torque_on())
     pack_early(monkeypatch, 2)
     assert summary(read_log(log).from_torque_on()).to_dict() == expected.to_dict()
+
+
+def file_pages_kb() -> int:
+    """Size of the pages of mapped files that are in memory."""
+    status = Path("/proc/self/status").read_text(encoding="utf-8")
+    return int(status.split("RssFile:")[1].split()[0])
+
+
+def test_rows_of_a_stored_column_leave_the_memory_and_can_be_read_again(tmp_path: Path) -> None:
+    rows = np.random.default_rng(0).normal(size=(4000, 256))  # 8 MB
+    column = StoredColumn(tmp_path, rows).mapped()
+    before_kb = file_pages_kb()
+    assert np.array_equal(column, rows)
+    assert file_pages_kb() > before_kb + 7000
+    release([column.reshape(1000, -1)[:, 1]])
+    assert file_pages_kb() < before_kb + 1000
+    assert np.array_equal(column, rows)
 
 
 @pytest.mark.nightly("reads an hour of 16 servos")
