@@ -39,7 +39,7 @@ second, and on a busy machine late by a second."""
 _START_S: Final = 60.0
 """Longest time without a request before an observer has shown a cycle (ours): building a scene
 needs seconds."""
-_STEP_MAX_S: Final = 0.1
+STEP_MAX_S: Final = 0.1
 """Largest part of the time between two checks that counts (ours)."""
 _RECEIVE_BYTES: Final = 1 << 18
 _HEAD: Final = 4
@@ -111,7 +111,7 @@ class RunEnd:
         Call it in every cycle; time in which the run itself stands still does not count.
         """
         if self._owes_request:
-            self._silent_s += min(max(now_s - self._checked_s, 0.0), _STEP_MAX_S)
+            self._silent_s += min(max(now_s - self._checked_s, 0.0), STEP_MAX_S)
         self._checked_s = now_s
         return self._silent_s > (SILENT_S if self._requests > 1 else _START_S)
 

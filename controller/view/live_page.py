@@ -160,8 +160,10 @@ class _LivePage:
         """Send inputs with the earliest time at which they can have begun."""
         since_s = min(self._collected_s, self._freshness.take())
         self._collected_s = self._freshness.now_s()
-        for command in self._commands():
+        commands = self._commands()
+        if commands:
             self._stop.operators.note_command()
+        for command in commands:
             self._end.command(timed(command, since_s))
         are_lost = self._stop.operators.are_lost()
         if are_lost != self._are_lost:

@@ -16,11 +16,11 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.observer_process import ObserverProcess
-from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE
+from snakewalk.controller.runlog.row_line import COURSE, GAIT, PICTURE, SILENT_S
 from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dead_man import DeadMan
-from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST, SILENT_S
+from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST
 
 _PICTURE_S: Final = 0.5
 """Pictures of a camera are shown no more often (ours)."""

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 from typing import Final
 
-SILENT_S: Final = 3.0
-"""A browser that steers and answers no ping for this time is lost (ours): a reload is faster."""
+from snakewalk.controller.runlog.row_line import SILENT_S, STEP_MAX_S
+
 _RECENT_S: Final = 2.0
 """Longest time from an input in a browser until its command is sent (ours)."""
-_STEP_MAX_S: Final = 0.1
-"""Largest part of the time between two checks that counts (ours): the machine may stand still."""
 _TABS_MAX: Final = 1000
 OPERATOR_LOST: Final = "operator lost"
 OPERATOR_BACK: Final = "operator back"
@@ -16,7 +14,10 @@ OPERATOR_BACK: Final = "operator back"
 
 
 class Operators:
-    """Which browsers have steered, by the name of their tab, and which of them still answer."""
+    """Which browsers have steered, by the name of their tab, and which of them still answer.
+
+    One that answers no ping for as long as an observer may be silent is lost; a reload is faster.
+    """
 
     def __init__(self, now_s: Callable[[], float]) -> None:
         self._now_s = now_s
@@ -45,9 +46,9 @@ class Operators:
     def are_lost(self) -> bool:
         """Whether a browser that steers is gone; call it often."""
         now_s = self._now_s()
-        step_s = min(now_s - self._checked_s, _STEP_MAX_S)
+        step_s = min(now_s - self._checked_s, STEP_MAX_S)
         for tab, silent_s in self._silent_s.items():
-            is_heard = self._heard_s[tab] > self._checked_s - _STEP_MAX_S
+            is_heard = self._heard_s[tab] > self._checked_s - STEP_MAX_S
             self._silent_s[tab] = 0.0 if is_heard else silent_s + step_s
         self._checked_s = now_s
         return any(silent_s > SILENT_S for silent_s in self._silent_s.values())
