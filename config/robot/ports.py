@@ -19,7 +19,7 @@ def port_fault(port: str) -> str | None:
         return None
     schemes = [f"{scheme_name}://" for scheme_name in URL_SCHEMES]
     return (
-        f"a port cannot be a {scheme}:// URL; use {', '.join(schemes[:-1])} or {schemes[-1]}, "
+        f"a port cannot be a URL of {scheme}://; use {', '.join(schemes[:-1])} or {schemes[-1]}, "
         "or the path of a device"
     )
 

@@ -49,6 +49,15 @@ def test_the_length_unit_scales_speeds_and_nothing_else() -> None:
     )
 
 
+def test_a_derivative_of_the_turning_rate_would_not_slow_an_even_turn() -> None:
+    # Eq. 8 takes the derivative of O, and the text says that O itself is the rate of turning.
+    time_s = np.arange(100) * 0.04
+    turn_rad_s = np.gradient(0.7 * time_s, time_s)
+    printed = LAW.steady_m_s(0.5, np.gradient(turn_rad_s, time_s))
+    np.testing.assert_allclose(printed, LAW.steady_m_s(0.5), atol=1e-9)
+    np.testing.assert_allclose(LAW.steady_m_s(0.5) - LAW.steady_m_s(0.5, turn_rad_s), 0.2 * 0.7)
+
+
 def test_printed_norms_would_never_slow_a_body_down() -> None:
     # Eq. 9: |dv/dt| = |F| - |T|. A norm is not negative, so a coasting body must not lose speed.
     speed, dt = 1.0, 0.04

@@ -284,7 +284,7 @@ def test_only_three_schemes_of_pyserial_open(
             assert opened.pop() == url
         else:
             for use in (NetworkPort, open_port, check_port_name, check_ports_table):
-                with pytest.raises(InputError, match=f"a port cannot be a {scheme}:// URL; use"):
+                with pytest.raises(InputError, match=f"a port cannot be a URL of {scheme}://; use"):
                     use(url)
     assert opened == []
     assert not list(tmp_path.iterdir())
@@ -331,7 +331,7 @@ def test_commands_reject_a_url_that_writes_to_a_file(
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
-    assert f"{words[-1]}: a port cannot be a spy:// URL" in capsys.readouterr().err
+    assert f"{words[-1]}: a port cannot be a URL of spy://" in capsys.readouterr().err
     assert precious.read_text() == "results"
 
 

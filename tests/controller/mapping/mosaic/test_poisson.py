@@ -20,6 +20,18 @@ def test_a_model_that_is_only_moved_stays_as_it_is() -> None:
     np.testing.assert_allclose(continued(values, given, shape), shape + moved, atol=1e-9)
 
 
+def test_values_at_the_edge_of_the_picture_would_bend_a_model_that_is_only_moved() -> None:
+    """Eq. 5 gives Z on the whole border, and the outer part of it has no other model to be met."""
+    shape, given = grid()
+    moved = np.where(given[..., None], shape + 1.0, shape)
+    edge = np.ones_like(given)
+    edge[1:-1, 1:-1] = False
+    free = continued(moved, given, shape) - shape
+    printed = continued(moved, given | edge, shape) - shape
+    np.testing.assert_allclose(free, 1.0, atol=1e-9)
+    assert np.ptp(printed[1:-1, 4:-1]) > 0.5
+
+
 def test_eq_6_holds_at_each_unknown_pixel_and_no_other_map_has_less_of_eq_5() -> None:
     shape, given = grid()
     rng = np.random.default_rng(4)
