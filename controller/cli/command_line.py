@@ -256,9 +256,9 @@ class CommandGroup(TyperGroup):
         try:
             code = super().main(args, prog_name, complete_var, False, *more, **options)
         except Exception as error:
-            if hasattr(error, "format_message"):  # an error of typer's or click's
+            if hasattr(error, "exit_code"):  # an error of typer's or click's
                 _print_fault(error)
-                raise SystemExit(getattr(error, "exit_code", 2)) from None
+                raise SystemExit(error.exit_code) from None
             if type(error).__name__ != "Abort":
                 raise
             print("snakewalk: aborted", file=sys.stderr)

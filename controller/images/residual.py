@@ -75,14 +75,9 @@ def is_ghost(image: DeepImage, background: DeepImage, silhouette: Silhouette) ->
     body = silhouette.mask.astype(np.uint8)
     box = np.ones((3, 3), dtype=np.uint8)
     outline = cv2.dilate(body, box) != cv2.erode(body, box)
-    outline_gradient, other = (
-        _gradient(image[window], outline),
-        _gradient(background[window], outline),
-    )
-    difference = outline_gradient - other
-    return float((outline_gradient * difference).sum()) < _EDGES * float(
-        (difference * difference).sum()
-    )
+    gradient = _gradient(image[window], outline)
+    difference = gradient - _gradient(background[window], outline)
+    return float((gradient * difference).sum()) < _EDGES * float((difference * difference).sum())
 
 
 def _gradient(image: DeepImage, places: Bools) -> Floats:
@@ -97,8 +92,6 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
     distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
     rest = (same > least) & (distance_px > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
-    if count < 2:
-        return 0.0
     y, x = np.nonzero(rest)
     part = label[rest]
     near = np.zeros(count, dtype=bool)

@@ -8,6 +8,7 @@ import resource
 import signal
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, Final, NamedTuple
@@ -138,6 +139,7 @@ class _Forks:
 
         A file that cannot be collected, as one of a loop's machine code, has no tests here.
         """
+        import_module("snakewalk.controller.report.figures.sections")  # by a fixture, in each fork
         session.testsfailed = 0
         functions = _functions(self._file)
         read, write = os.pipe()

@@ -45,11 +45,10 @@ def walk_figure(record: RunRecord) -> Figure | None:
         label = f"wide waves, {is_wide.mean():.0%}"
         if is_wide.any():
             states.fill_between(
-                number,
+                np.add.outer(number, (-0.5, 0.5)).ravel(),
                 0.0,
                 1.0,
-                where=is_wide,
-                step="mid",
+                where=np.repeat(is_wide, 2),
                 color=GREY,
                 alpha=0.25,
                 linewidth=0.0,

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from snakewalk.config.world import FrictionConfig
+from snakewalk.controller.kinematics.links import BodyView
 from snakewalk.controller.mechanics import rigid_motion
-from snakewalk.controller.mechanics.friction_filter import FoundFriction
+from snakewalk.controller.mechanics.friction_filter import FoundFriction, FrictionFilter
 from snakewalk.controller.runtime.friction_monitor import (
     SPAN_S,
     FrictionMonitor,
@@ -13,6 +14,7 @@ from snakewalk.controller.runtime.friction_monitor import (
     OnTwin,
     Span,
 )
+from snakewalk.controller.walk.twin import seen_state
 from snakewalk.drivers.types import BodyPose
 from tests.helpers.sliding_body import CYCLE_S, FILE, ROBOT, joints_rad, posed, sliding
 
@@ -120,11 +122,47 @@ def test_what_cannot_be_foretold_changes_nothing() -> None:
     assert monitor.alarm_text.startswith("friction not estimated")
 
 
-class Diverges:
-    """A twin whose physics comes to no end."""
+class Foretells(Notes):
+    """A model of ground that is 3 % above the file's friction."""
+
+    def slid(self, span: Span, friction: FrictionConfig) -> np.ndarray:
+        super().slid(span, friction)
+        logs = np.log([friction.along / FILE.along, friction.across / FILE.across]) - 0.03
+        return np.asarray(span.slid + np.array([[0.3, 0.1], [0.2, -0.3], [0.0, 0.4]]) @ logs)
+
+
+def test_after_four_confirmed_spans_one_in_four_is_replayed_as_the_news_of_all_four() -> None:
+    model = Foretells()
+    monitor = FrictionMonitor(FILE, model, CYCLE_S, lambda friction: None)
+    view = posed(joints_rad(0.0), 0.3, np.array([1.0, 2.0]))
+    told = [monitor.update(view, joints_rad(0.0)) for _ in range(12 * CYCLES + 5)]
+    found = {k: each for k, each in enumerate(told) if each is not None}
+    assert list(found) == [CYCLES * span + 4 for span in (1, 2, 3, 4, 8, 12)]
+    of_spans = FrictionFilter(FILE, model.sigma.tolist())
+    for each, count in zip(found.values(), (1, 1, 1, 1, 4, 4), strict=True):
+        span = model.asked[0][0]
+        predicted = [model.slid(span, friction) for friction in of_spans.hypotheses()]
+        assert each == of_spans.update(span.slid, np.array(predicted), count * SPAN_S)
+
+
+def test_a_slide_is_seen_from_the_mean_heading_at_its_begin() -> None:
+    """From (2, -1) and 0.5 rad 0.3 m ahead, 0.1 m to the left and 0.2 rad to the left."""
+    ahead, left = np.array([np.cos(0.5), np.sin(0.5)]), np.array([-np.sin(0.5), np.cos(0.5)])
+    begin_m = np.array([2.0, -1.0])
+    places = (begin_m + 7.0, 2.1), (begin_m, 0.5), (begin_m + 0.3 * ahead + 0.1 * left, 0.7)
+    views = tuple(posed(joints_rad(0.0), heading, centre_m) for centre_m, heading in places)
+    np.testing.assert_allclose(Span(views, (), CYCLE_S).slid, [0.3, 0.1, 0.2], atol=1e-9)
+
+
+class Replays:
+    """A twin that moves as the views; without them it diverges."""
+
+    def __init__(self, views: tuple[BodyView, ...] = ()) -> None:
+        self.states = iter([seen_state(ROBOT, view) for view in views])
+        self.asked: list[object] = []
 
     def use_friction(self, friction: FrictionConfig) -> None:
-        pass
+        self.asked.append(friction)
 
     def begin(
         self,
@@ -134,16 +172,25 @@ class Diverges:
         now_rad: np.ndarray,
         dt_s: float,
     ) -> None:
-        pass
+        for pose, angles in ((before, before_rad), (now, now_rad)):
+            seen, seen_rad = next(self.states, (pose, angles))
+            np.testing.assert_array_equal(pose.head_in_world_m, seen.head_in_world_m)
+            np.testing.assert_array_equal(angles, seen_rad)
 
     def step(self, goal_rad: np.ndarray, dt_s: float) -> tuple[BodyPose, np.ndarray]:
+        self.asked.append(goal_rad[0])
+        for state in self.states:
+            return state
         raise RuntimeError("the physics diverged")
 
 
-def test_a_twin_that_diverges_tells_nothing() -> None:
+def test_a_twin_that_diverges_tells_nothing_and_another_where_it_came_to() -> None:
     views = tuple(sliding(FILE, 0.1))
-    span = Span(views, tuple(joints_rad(0.0) for _ in views[2:]), CYCLE_S)
-    assert np.isnan(OnTwin(ROBOT, Diverges).slid(span, FILE)).all()
+    span = Span(views, tuple(np.full(ROBOT.joint_count, k) for k in range(4)), CYCLE_S)
+    assert np.isnan(OnTwin(ROBOT, Replays).slid(span, FILE)).all()
+    twin = Replays(views)
+    np.testing.assert_allclose(OnTwin(ROBOT, lambda: twin).slid(span, FILE), span.slid, atol=1e-9)
+    assert twin.asked == [FILE, 0.0, 1.0, 2.0, 3.0]
 
 
 def test_news_are_notable_changes_in_words() -> None:
