@@ -334,7 +334,7 @@ def _denser(points: Floats, path: SplinePath, bad_s_m: Floats) -> Floats:
             point, nearest, window_m=2.0 * float(np.hypot(*(point - before))) + 0.1
         )
         ends.append(nearest)
-    worst = np.unique(np.clip(np.searchsorted(ends, bad_s_m) - 1, 0, len(points) - 2))
+    worst = np.searchsorted(ends, bad_s_m) - 1
     split = {int(piece) + step for piece in worst for step in (-1, 0, 1)}
     out = [points[0]]
     for piece, (before, point) in enumerate(pairwise(points)):

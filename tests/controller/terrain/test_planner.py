@@ -125,7 +125,15 @@ def test_the_spline_is_checked_again_and_held_to_the_polygon() -> None:
     points = np.array([(0.0, -1.7), (0.33, 0.85), (1.7, 0.35)])
     corners = at_once(planner._polygon(points, planner.graph))
     assert not planner.relief.safe(*looked_at(SplinePath(corners)).T).all()
-    assert planner.relief.safe(*looked_at(planner.plan(points)).T).all()
+    there, back = planner.plan(points), planner.plan(points[::-1])
+    assert planner.relief.safe(*looked_at(there).T).all()
+    # sides on both sides of an unsafe place are halved: the way back is the same
+    share = np.linspace(0.0, 1.0, 50)
+    np.testing.assert_allclose(
+        back.position((1.0 - share) * back.length_m),
+        there.position(share * there.length_m),
+        atol=1e-3,
+    )
 
 
 def test_bad_places_are_named_with_the_nearest_safe_one() -> None:
