@@ -7,6 +7,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from snakewalk.config import colours
 from snakewalk.config.arrays import Floats, Image, Ints
@@ -161,15 +162,16 @@ def _mark(
 ) -> None:
     """Add a waypoint: a pole and a ring."""
     z = 0.0 if ground is None else float(ground.elevation_m(x, y))
-    _add(spec.worldbody, _CYLINDER, (0.008, 0.15, 0), (x, y, z + 0.15), AHEAD).name = name
+    pole = _add(spec.worldbody, _CYLINDER, (0.008, 0.15, 0), AHEAD, pos=(x, y, z + 0.15))
+    pole.name = name
     if hollow:
-        spec.geom(name).rgba = HIDDEN
+        pole.rgba = HIDDEN
     ring = _ring(ground, x, y, radius_m)
     for part, (before, other) in enumerate(itertools.pairwise(ring)):
-        of_ring = f"{name}ring{part}"
-        _add(spec.worldbody, _CAPSULE, (0.007, 0, 0), (), AHEAD, (*before, *other)).name = of_ring
+        piece = _rod(spec.worldbody, 0.007, AHEAD, (*before, *other))
+        piece.name = f"{name}ring{part}"
         if hollow and part % 2:
-            spec.geom(of_ring).rgba = HIDDEN
+            piece.rgba = HIDDEN
 
 
 def _replace_robot(spec: mujoco.MjSpec, bones: int) -> None:
@@ -202,15 +204,25 @@ def _ring(ground: HeightField | None, x: float, y: float, radius_m: float) -> Fl
 def _add(
     body: mujoco.MjsBody,
     kind: mujoco.mjtGeom,
-    size: Sequence[float],
-    pos: Sequence[float],
+    size: ArrayLike,
     rgba: Rgba,
-    ends: Sequence[float] | None = None,
+    **place: Sequence[float],
 ) -> mujoco.MjsGeom:
-    place = {"pos": pos} if ends is None else {"fromto": ends}
     return body.add_geom(
         type=kind, size=size, rgba=rgba, contype=0, conaffinity=0, mass=0, group=1, **place
     )
+
+
+def _rod(
+    body: mujoco.MjsBody, radius_m: float, rgba: Rgba, ends: Sequence[float]
+) -> mujoco.MjsGeom:
+    return _add(body, _CAPSULE, np.full(3, radius_m), rgba, fromto=ends)
+
+
+def _ball(
+    body: mujoco.MjsBody, radius_m: float, rgba: Rgba, place: Sequence[float] = (0, 0, 0)
+) -> None:
+    _add(body, _SPHERE, np.full(3, radius_m), rgba, pos=place)
 
 
 def _light(spec: mujoco.MjSpec, robot: RobotConfig, fine: bool) -> None:
@@ -260,7 +272,6 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
             width=512,
             height=512,
         )
-        repeat = [1.0, 1.0]
     else:
         spec.add_texture(
             name="ground",
@@ -270,8 +281,7 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
             width=TEXELS,
             height=TEXELS,
         )
-        repeat = [1.0, 1.0]
-    material = spec.add_material(name="ground", texrepeat=repeat, texuniform=ground is None)
+    material = spec.add_material(name="ground", texuniform=ground is None)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
     material.specular = 0.05
     material.shininess = 0.1
@@ -292,7 +302,7 @@ def _print(spec: mujoco.MjSpec, name: str, sheet: FloorPrint) -> None:
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
     size = 0.5 * sheet.side_m, 0.5 * sheet.side_m, 0.001
     place = *sheet.place_m, 0.001
-    geom = _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_PLANE, size, place, (1, 1, 1, 1))
+    geom = _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_PLANE, size, (1, 1, 1, 1), pos=place)
     geom.name = name
     geom.material = name
     geom.group = 0
@@ -307,7 +317,7 @@ def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) 
         spec.texture("ground").rgb1, spec.texture("ground").rgb2 = SHALLOW
     middle_m, size_m = water
     surface = *(0.5 * size_m).tolist(), 0.001
-    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, tuple(middle_m.tolist()), SURFACE)
+    _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, SURFACE, pos=middle_m.tolist())
 
 
 def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
@@ -352,30 +362,21 @@ def _skin(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         thick = thickness[i]
         low = thick - radii_m[i]  # the belly stays on the ground
         ends = (0.0, 0.0, low, -lengths_m[i], 0.0, low)
-        _add(body, _CAPSULE, (thick, 0, 0), (), BACK[i % 2], ends)
+        _rod(body, thick, BACK[i % 2], ends)
     _legs(spec, robot)
     _mast(spec, robot)
     head = spec.body("link0")
     r = radii_m[0]
     half = lengths_m[0] / 2
-    _add(head, _ELLIPSOID, (half * 1.25, r * 1.02, r * 0.78), (half * 0.2, 0, -0.2 * r), HEAD)
-    neck = (-0.6 * half, 0, -0.2 * r, -half, 0, -0.2 * r)
-    _add(head, _CAPSULE, (r * 0.8, 0, 0), (), HEAD, neck)
+    skull = (half * 1.25, r * 1.02, r * 0.78)
+    _add(head, _ELLIPSOID, skull, HEAD, pos=(half * 0.2, 0, -0.2 * r))
+    _rod(head, r * 0.8, HEAD, (-0.6 * half, 0, -0.2 * r, -half, 0, -0.2 * r))
     for side in (-1.0, 1.0):
-        eye = (half * 0.62, side * r * 0.62, r * 0.30)
-        _add(head, _SPHERE, (r * 0.24, 0, 0), eye, EYE)
-        pupil = (half * 0.72, side * r * 0.74, r * 0.36)
-        _add(head, _SPHERE, (r * 0.14, 0, 0), pupil, PUPIL)
+        _ball(head, r * 0.24, EYE, (half * 0.62, side * r * 0.62, r * 0.30))
+        _ball(head, r * 0.14, PUPIL, (half * 0.72, side * r * 0.74, r * 0.36))
         fork = (half * 1.9, 0, -0.35 * r, half * 2.2, side * r * 0.3, -0.3 * r)
-        _add(head, _CAPSULE, (r * 0.05, 0, 0), (), TONGUE, fork)
-    _add(
-        head,
-        _CAPSULE,
-        (r * 0.06, 0, 0),
-        (),
-        TONGUE,
-        (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r),
-    )
+        _rod(head, r * 0.05, TONGUE, fork)
+    _rod(head, r * 0.06, TONGUE, (half * 1.3, 0, -0.35 * r, half * 1.9, 0, -0.35 * r))
 
 
 def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
@@ -388,8 +389,8 @@ def _mast(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
     back = middle - 0.012
     top = config.height_m
     half = 0.5 * config.baseline_m + 0.008
-    _add(body, _CAPSULE, (0.004, 0, 0), (), PUPIL, (back, 0, 0, back, 0, top))
-    _add(body, _CAPSULE, (0.010, 0, 0), (), PUPIL, (back, -half, top, back, half, top))
+    _rod(body, 0.004, PUPIL, (back, 0, 0, back, 0, top))
+    _rod(body, 0.010, PUPIL, (back, -half, top, back, half, top))
 
 
 def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
@@ -403,11 +404,11 @@ def _legs(spec: mujoco.MjSpec, robot: RobotConfig) -> None:
         end = pair.segments_m[joint.place] * joint.outward
         thick = pair.foot_radius_m
         colour = BACK[joint.place % 2]
-        _add(body, _CAPSULE, (thick, 0, 0), (), colour, (0, 0, 0, 0, end, 0))
+        _rod(body, thick, colour, (0, 0, 0, 0, end, 0))
         if joint.place:  # the round ends of both segments overlap
-            _add(body, _SPHERE, (1.04 * thick, 0, 0), (0, 0, 0), colour)
+            _ball(body, 1.04 * thick, colour)
         if joint.has_foot:
-            _add(body, _SPHERE, (1.02 * thick, 0, 0), (0, end, 0), HEAD)
+            _ball(body, 1.02 * thick, HEAD, (0, end, 0))
 
 
 def _animal(spec: mujoco.MjSpec, look: SkinLook) -> None:
