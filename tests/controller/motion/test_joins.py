@@ -1,6 +1,5 @@
 """Any motion joined to any other, at any time: no step, and within the robot's limits."""
 
-from collections.abc import Iterator
 from copy import deepcopy
 from functools import cache
 from itertools import cycle, product
@@ -303,68 +302,3 @@ def test_a_robot_without_the_joints_refuses_the_join() -> None:
     relay = SourceSwitch(robot, Hold(np.zeros(16)))
     with pytest.raises(InputError, match="needs pitch joints"):
         relay.join(GaitMotion(make_gait("rolling"), other))
-
-
-PLAYED_S = 0.002
-
-
-def played(recording: Recorded) -> Iterator[np.ndarray]:
-    nowhere = BodyView(np.zeros((17, 3)), np.tile(np.eye(3), (17, 1, 1)), np.zeros(3))
-    while not recording.done:
-        yield recording.step(PLAYED_S, nowhere)
-
-
-def test_a_recording_faster_than_the_robot_is_slowed_and_a_bad_one_refused() -> None:
-    robot = ROBOTS["yaw16"]
-    time_s, joints = wave(robot)
-    quick = Recorded(robot, time_s / 10.0, joints)
-    assert quick.slowed > 2.0
-    assert quick.pace().speed_rad_s.max() <= 0.9 * robot.joint_speed_limit_rad_s + 1e-9
-    for recording in (quick, Recorded(robot, time_s, joints)):
-        goals = np.array([joints[0], *played(recording)])
-        np.testing.assert_allclose(goals[-1], joints[-1], atol=1e-12)
-        acceleration = np.abs(np.diff(goals[:-1], 2, axis=0)).max(axis=0) / PLAYED_S**2
-        assert (acceleration <= 1.01 * recording.pace().acceleration_rad_s2 + 1e-6).all()
-        assert (recording.pace().acceleration_rad_s2 <= 0.9 * 25.0 + 1e-6).all()
-        assert np.abs(np.diff(goals[:3], axis=0)).max() < 1e-6, "from rest"
-    with pytest.raises(InputError, match="16 joints"):
-        Recorded(robot, time_s, joints[:, :3])
-    with pytest.raises(InputError, match="must grow"):
-        Recorded(robot, time_s[::-1], joints)
-    with pytest.raises(
-        InputError, match=r"joint \w+ \(ID \d+\) bends to .* in frame \d+; its limit"
-    ):
-        Recorded(robot, time_s, 5.0 * joints)
-
-
-@pytest.mark.parametrize(("axis", "needs"), [("y", (True, False)), ("p", (False, True))])
-def test_a_recording_needs_the_joints_that_it_moves(axis: str, needs: tuple[bool, bool]) -> None:
-    robot = ROBOTS["alternating16"]
-    time_s = np.arange(0.0, 4.0, 0.1)
-    joints = np.zeros((len(time_s), robot.joint_count))
-    joints[:, robot.yaw_joints if axis == "y" else robot.pitch_joints] = (
-        0.1 * np.sin(time_s)[:, None]
-    )
-    recording = Recorded(robot, time_s, joints)
-    assert (recording.needs.yaw, recording.needs.pitch) == needs
-
-
-@pytest.mark.parametrize("seconds", [0.4, 1.0, 3.0])
-def test_a_fast_recording_has_longer_ramps_before_it_is_slowed_further(seconds: float) -> None:
-    """The ramps take at most the recording's own time, and joints accelerate within the limit."""
-    robot = ROBOTS["yaw16"]
-    time_s = np.linspace(0.0, seconds, 40)
-    joints = np.outer(0.6 * time_s / seconds, np.ones(robot.joint_count))
-    recording = Recorded(robot, time_s, joints)
-    ramp_s = recording.duration_s - seconds * recording.slowed
-    assert 0.0 < ramp_s <= seconds * recording.slowed + 1e-9
-    most = recording.pace().acceleration_rad_s2.max()
-    assert most <= 0.9 * robot.joint_acceleration_limit_rad_s2 * (1.0 + 1e-6)
-    speed = 0.6 / (seconds * recording.slowed)
-    assert recording.pace().speed_rad_s == pytest.approx(speed, rel=1e-6)
-    # a quintic ramp to a speed accelerates by 15/8 of speed over time
-    assert most == pytest.approx(1.875 * speed / ramp_s, rel=0.02)
-    is_slowed_for_the_ramp = recording.slowed > max(
-        1.0, 0.6 / seconds / (0.9 * robot.joint_speed_limit_rad_s) + 1e-9
-    )
-    assert not is_slowed_for_the_ramp or ramp_s == pytest.approx(seconds * recording.slowed)

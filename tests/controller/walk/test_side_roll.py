@@ -1,6 +1,8 @@
 """Side rolls: what is predicted of them, when they are chosen, and how they are joined."""
 
+import re
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -76,20 +78,27 @@ class Scene:
         self.rolls._planner.best = lambda pose, walker, target_m: plan  # type: ignore[method-assign]
         self.rolls.course._missed_before = 0
         self.roll_rad = 0.0
+        self.bends = self.turns = True
+        """Whether the joints follow, and whether the body turns when it rolls."""
+        self.carried_m_s = np.zeros(3)
+        """Velocity of the body while it rolls."""
+        self.centre_m = np.array([*self.prepared.run.start_m, 0.0])
         self.rolls.begin(self.view(np.zeros(16)))
 
     def view(self, joint_rad: np.ndarray) -> BodyView:
         at = pose_at(np.array([*self.prepared.run.start_m, 0.0])[:2], 1.2)
         turned = at.rotation @ rotation_by(np.array([self.roll_rad, 0.0, 0.0]))
         view = body_in_world(self.prepared.robot, at._replace(rotation=turned), joint_rad)
-        return view._replace(centre_m=np.array([*self.prepared.run.start_m, 0.0]))
+        return view._replace(centre_m=self.centre_m)
 
     def step(self) -> np.ndarray:
         """One cycle; joints that follow at once, and a body that rolls on its ground."""
-        view = self.view(self.rolls.goal_rad())
+        view = self.view(self.rolls.goal_rad() if self.bends else np.zeros(16))
         self.rolls._walker.outlook = self.progress
         under_way = self.rolls._rolling
         if under_way is not None:
+            self.centre_m = self.centre_m + self.carried_m_s * DT_S
+        if under_way is not None and self.turns:
             self.roll_rad -= under_way._plan.side * 2.0 * np.pi * under_way._hz * DT_S
         return self.rolls.step(DT_S, view)
 
@@ -129,6 +138,69 @@ def test_walk_and_roll_are_joined_within_the_joints_limits(plan: RollPlan) -> No
     assert np.abs(speed).max() <= 1.05 * limit
     hard = np.abs(np.diff(speed, axis=0)).max() / DT_S
     assert hard <= 1.5 * scene.prepared.robot.joint_acceleration_limit_rad_s2
+
+
+@pytest.mark.parametrize(
+    ("nearer_m_s", "sinks_m_s", "turns", "lasts_s"),
+    [
+        (0.1, 0.0, True, 1.95),  # the join makes a twentieth of the last turn
+        (0.0, 0.0, True, 3.0),  # nothing gained
+        (-0.2, 0.0, True, 0.75),  # 15 cm are lost
+        (0.1, 0.2, True, 0.5),  # 10 cm down
+        (0.1, 0.0, False, 4.5),  # the time of the join and of three turns
+    ],
+)
+def test_a_roll_ends_when_it_is_done_or_leads_nowhere(
+    nearer_m_s: float, sinks_m_s: float, turns: bool, lasts_s: float
+) -> None:
+    planned = 2 if nearer_m_s > 0.0 else 16
+    scene = Scene(replace(at_once(2.0), turns=planned))
+    ahead = -scene.centre_m[:2] / np.hypot(*scene.centre_m[:2])  # the target is at (0, 0)
+    scene.carried_m_s = np.array([*(nearer_m_s * ahead), -sinks_m_s])
+    scene.turns = turns
+    while not scene.rolls.rolling:
+        scene.step()
+        assert not scene.rolls.done
+    steps = 0
+    while scene.rolls.rolling:
+        scene.step()
+        steps += 1
+        assert not scene.rolls.done
+    assert steps * DT_S == pytest.approx(lasts_s, abs=0.07)
+    said = re.fullmatch(r"rolled (.*) turns in (.*) s, (.*) m; walks on", scene.events[1])
+    assert said is not None
+    rolled, time_s, gone_m = (float(number) for number in said.groups())
+    assert rolled == pytest.approx(lasts_s * turns, abs=0.15)
+    assert time_s == pytest.approx(lasts_s, abs=0.1)
+    assert gone_m == pytest.approx(lasts_s * abs(nearer_m_s), abs=0.02)
+
+
+def test_between_two_rolls_the_walk_travels_half_a_body() -> None:
+    scene = Scene(at_once(2.0))
+    travelled_m = 0.0
+    while len(scene.events) < 3:
+        scene.step()
+        if len(scene.events) == 2:
+            travelled_m += scene.rolls.pulse_m_s * DT_S
+        assert travelled_m < scene.prepared.robot.length_m
+    assert scene.events[2].startswith("rolls uphill")
+    assert travelled_m > 0.4 * scene.prepared.robot.length_m
+
+
+@pytest.mark.parametrize("is_straight", [True, False])
+def test_a_body_that_does_not_lie_as_the_arc_needs_walks_on(is_straight: bool) -> None:
+    """Its joints have not bent, or it lies on its side; later it rolls."""
+    scene = Scene(arc(2.0))
+    scene.bends = not is_straight
+    for _ in range(600):
+        scene.step()
+        if scene.rolls.decision is not None and not is_straight:
+            scene.roll_rad = 1.5
+    assert not scene.events
+    scene.bends, scene.roll_rad = True, 0.0
+    while not scene.events:
+        scene.step()
+    assert scene.rolls.rolling
 
 
 @pytest.mark.fast_cases(1)
