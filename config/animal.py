@@ -18,10 +18,10 @@ class SectionConfig(Strict):
 
     at: Place = Field(description="place along the body, 0 the head's tip")
     half_width: float = Field(
-        ge=0.0, le=0.5, description="half of the width of the body here, in body lengths"
+        ge=0.0, le=0.5, description="half of the body's width at this place, in body lengths"
     )
     half_height: float = Field(
-        ge=0.0, le=0.5, description="half of the height of the body here, in body lengths"
+        ge=0.0, le=0.5, description="half of the body's height at this place, in body lengths"
     )
     lift: float = Field(
         0.0, ge=-0.5, le=0.5, description="height of the section's middle above the body's axis"
@@ -33,18 +33,26 @@ class FinConfig(Strict):
 
     at: Place = Field(description="middle of the root along the body")
     chord: float = Field(gt=0.0, le=0.8, description="length of the root")
-    around_deg: float = Field(ge=-180.0, le=180.0, description="90 the back, 0 left, -90 the belly")
+    around_deg: float = Field(
+        ge=-180.0,
+        le=180.0,
+        description="angle of the fin's root around the body: 90 the back, 0 left, -90 the belly",
+    )
     span: float = Field(gt=0.0, le=0.5, description="length of the fin from root to tip")
     sweep: float = Field(
         0.0, ge=-0.5, le=0.5, description="backward distance of the tip's middle from the root's"
     )
-    tip_chord: float = Field(0.4, gt=0.0, le=2.0, description="the tip's length over the root's")
-    thickness: float = Field(0.004, gt=0.0, le=0.05, description="half of it, at the root")
-    paired: bool = Field(False, description="the same on the other side")
+    tip_chord: float = Field(
+        0.4, gt=0.0, le=2.0, description="length of the fin's tip over the length of its root"
+    )
+    thickness: float = Field(
+        0.004, gt=0.0, le=0.05, description="half of the fin's thickness at its root"
+    )
+    paired: bool = Field(False, description="whether the other side of the body has an equal one")
 
     @property
     def mirrored(self) -> Self:
-        """The fin on the other side."""
+        """The fin of a pair on the other side of the body."""
         return self.model_copy(update={"around_deg": 180.0 - self.around_deg})
 
 
@@ -52,7 +60,7 @@ class SkinConfig(Strict):
     """A body to be covered by PDE patches."""
 
     name: str = Field(description="name of the body")
-    source: str = Field(description="where the figures come from")
+    source: str = Field(description="source of the figures")
     sections: tuple[SectionConfig, ...] = Field(min_length=4, description="head to tail")
     fins: tuple[FinConfig, ...] = Field((), description="fins on the body")
     back_rgb: tuple[Channel, Channel, Channel] = Field(
@@ -111,7 +119,9 @@ class LegPairConfig(Strict):
         0.0, description="angle of the blade to the lower segment; its lower end ahead"
     )
     upper: float = Field(gt=0.0, le=0.5, description="length from hip or shoulder to knee or elbow")
-    lower: float = Field(gt=0.0, le=0.5, description="length from there to the next joint or foot")
+    lower: float = Field(
+        gt=0.0, le=0.5, description="length from knee or elbow to the next joint or foot"
+    )
     cannon: float = Field(
         0.0, ge=0.0, le=0.5, description="length of metacarpus or metatarsus; 0: none"
     )
@@ -144,8 +154,8 @@ class LegPairConfig(Strict):
     )
     knee: Literal["out", "ahead", "behind"] = Field(description="where knee or elbow points")
     duty: float = Field(gt=0.1, lt=0.95, description="share of the cycle on the ground")
-    left: Cycles = Field(description="when the left foot comes down, in cycles")
-    right: Cycles = Field(description="when the right foot comes down, in cycles")
+    left: Cycles = Field(description="phase at which the left foot comes down, in cycles")
+    right: Cycles = Field(description="phase at which the right foot comes down, in cycles")
     lift: float = Field(ge=0.0, le=0.3, description="height of a step")
     turn_rad: float = Field(
         0.0, ge=0.0, le=1.2, description="angle by which the girdle turns to either side"
@@ -172,8 +182,10 @@ class LegPairConfig(Strict):
 class OrnamentConfig(Strict):
     """A horn, an ear or a beard: a cone on the body; lengths over the body's."""
 
-    at: Place = Field(description="place along the body that carries it")
-    root: Point = Field(description="ahead of that place, to the left and above the axis")
+    at: Place = Field(description="place along the body that carries the ornament")
+    root: Point = Field(
+        description="offset of the ornament's base from this place: ahead, left, up"
+    )
     tip: Point = Field(
         description="place of the tip in body lengths, from the base of the ornament"
     )
@@ -182,12 +194,12 @@ class OrnamentConfig(Strict):
         (0.0, 0.0, 0.0), description="offset of the ornament's middle from the line to its tip"
     )
     swing_rad: float = Field(0.0, ge=0.0, le=1.2, description="amplitude of the swing, once a step")
-    paired: bool = Field(False, description="the same on the other side")
+    paired: bool = Field(False, description="whether the other side of the body has an equal one")
     dark: bool = Field(False, description="whether the ornament has the colour of the skin's bands")
 
     @property
     def mirrored(self) -> Self:
-        """The ornament on the other side."""
+        """The ornament of a pair on the other side of the body."""
         ends = {"root": self.root, "tip": self.tip, "bow": self.bow}
         return self.model_copy(update={name: (x, -y, z) for name, (x, y, z) in ends.items()})
 
@@ -196,7 +208,7 @@ class AnimalConfig(Strict):
     """An animal on four legs that goes straight: prototype of a motion along a path."""
 
     name: str = Field(description="name of the animal")
-    source: str = Field(description="where the figures come from")
+    source: str = Field(description="source of the figures")
     skin: str = Field(
         description="skin of the body: a shipped skin, or a .toml in the folder of this file"
     )
@@ -204,7 +216,9 @@ class AnimalConfig(Strict):
     height: float = Field(
         gt=0.0, le=1.5, description="height of the body's axis over the body's length"
     )
-    stride: float = Field(gt=0.0, le=3.0, description="way of a cycle, body lengths")
+    stride: float = Field(
+        gt=0.0, le=3.0, description="distance travelled per cycle, in body lengths"
+    )
     cycle_s: float = Field(gt=0.02, le=20.0, description="duration of a cycle")
     leg_pairs: tuple[LegPairConfig, LegPairConfig] = Field(description="front, then hind")
     feet: Literal["footfall", "gc-printed"] = Field(

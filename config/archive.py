@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FREE_BYTES: Final = 16_000_000
-"""Any file may expand to this (ours): a mask of zeros is packed a thousandfold."""
+"""Size to which any file may expand (ours): a mask of zeros is packed a thousandfold."""
 MOST_RATIO: Final = 100
 MOST_BYTES: Final = 1_000_000_000
 """Largest ratio of unpacked to packed size, and largest unpacked size, above ``FREE_BYTES``
@@ -203,7 +203,7 @@ def check_members(file: Path, members: Sequence[zipfile.ZipInfo], *, text: bool 
 
     """
     if any(m.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for m in members):
-        raise ValueError("is packed in another way than deflate")
+        raise ValueError("uses a compression other than deflate")
     check_expansion(file, file.stat().st_size, sum(m.file_size for m in members), text=text)
 
 

@@ -109,7 +109,7 @@ class Assumptions:
         if len(asked) > 1:
             key, (_, likely) = next(iter(self._questions.items()))
             pattern = f"*.{key.rpartition('.')[2]}={likely:.4g}"
-            asked.append(f"or answer several at once, by a *: --assume '{pattern}'")
+            asked.append(f"or give several values at once with a *: --assume '{pattern}'")
         if asked:
             raise InputError(asked)
         unused = [key for key in self._values if key not in self._answered]

@@ -35,17 +35,19 @@ class NoiseFault(_Lasting):
         "answers",
         description="packets that change: those of the servos, those of the host, or both",
     )
-    by_s: float | None = Field(None, gt=0.0, description="delay and late: by how much")
+    by_s: float | None = Field(
+        None, gt=0.0, description="delay of the packets, if change is delay or late"
+    )
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> Self:
         slow = self.kind in ("delay", "late")
         if slow and self.of != "answers":
-            raise ValueError(f"{self.kind}: only answers can be slow; leave 'of' out")
+            raise ValueError(f"{self.kind}: only replies can be slow; leave 'of' out")
         if not slow and self.by_s is not None:
             raise ValueError(f"{self.kind}: has no 'by_s'")
         if self.ids and self.of != "answers":
-            raise ValueError("'ids' are those of answers; a question goes to the whole bus")
+            raise ValueError("'ids' selects replies; a request goes to the whole bus")
         return self
 
 
@@ -87,7 +89,7 @@ class WriteFault(_Lasting):
     )
     value: int = Field(description="raw value that is written")
     every_s: float | None = Field(
-        None, ge=1e-3, description="it writes again and again; not given: once"
+        None, ge=1e-3, description="time between repeated writes; not given: one write"
     )
 
     @model_validator(mode="after")
@@ -109,7 +111,9 @@ class ReadingFault(_Lasting):
         alias="register",
         description="register with the constant value, named as in the control table",
     )
-    value: int | None = Field(None, description="not given: the value at the beginning")
+    value: int | None = Field(
+        None, description="constant value of the sensor; not given: its value when the fault begins"
+    )
 
 
 class TripFault(_Fault):

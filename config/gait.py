@@ -55,7 +55,8 @@ class GaitConfig(Strict):
         (), description="later gaits at rising times: tables of `at_s`, `name`, `parameters`"
     )
     ashore: AshoreConfig | None = Field(
-        None, description="along waypoints: how it goes on where it cannot swim; default: it swims"
+        None,
+        description="a table [gait.ashore]: gait along waypoints on land; default: none",
     )
     by: GaitChangeMethod = BLEND
 
@@ -75,10 +76,13 @@ class GaitSetConfig(Strict):
         description="gait whose parameters this file has; `snakewalk gait list` shows all"
     )
     robot: str = Field(description="shipped robot that the parameters are for")
-    world: str | None = Field(None, description="default: the gait's own")
+    world: str | None = Field(
+        None, description="world of `snakewalk gait run`; default: the gait's own"
+    )
     parameters: Parameters = Field(
         {}, description="values of gait parameters by name; the others keep their defaults"
     )
     compliance: ComplianceConfig | None = Field(
-        None, description="joint goals that yield to measured current; default: they do not"
+        None,
+        description="a table [compliance]: joints yield to measured current; default: they do not",
     )

@@ -94,7 +94,7 @@ class TrackerConfig(Strict):
 
     rate_hz: float = Field(50.0, ge=1.0, le=1000.0, description="poses a second")
     noise_m: float = Field(0.0, ge=0.0, le=1.0, description="standard deviation of each coordinate")
-    noise_deg: float = Field(0.0, ge=0.0, le=90.0, description="the same of each angle")
+    noise_deg: float = Field(0.0, ge=0.0, le=90.0, description="standard deviation of each angle")
     correlation_s: float = Field(
         0.0, ge=0.0, le=60.0, description="time over which the noise keeps its value; 0: white"
     )

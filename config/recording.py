@@ -9,7 +9,7 @@ class EpisodeConfig(Strict):
     """A stretch of the motion, as made by the head and passed on to the tail."""
 
     cycles: float = Field(gt=0.0, le=100.0, description="duration in cycles of the wave")
-    gain: float = Field(1.0, gt=0.0, le=3.0, description="bends over the measured ones")
+    gain: float = Field(1.0, gt=0.0, le=3.0, description="factor on the measured bends")
     waves: float | None = Field(
         None, gt=0.1, le=5.0, description="number of waves on the body; default: measured"
     )
@@ -20,7 +20,7 @@ class RecordingConfig(Strict):
     """A travelling wave of tangent angle with an envelope, and the episodes it goes through."""
 
     name: str = Field(description="name of the recording")
-    source: str = Field(description="the animal, and who recorded it")
+    source: str = Field(description="animal, and source of the recording")
     licence: str = Field(description="licence of the recording that was measured")
     rate_hz: float = Field(gt=0.0, description="frames per second")
     length_m: float = Field(gt=0.0, description="length of the animal")

@@ -80,7 +80,7 @@ class PitchConfig(Strict):
     )
 
     def set_up(self, robot: RobotConfig) -> RobotConfig:
-        """Return the robot with these settings; those of single joints stay."""
+        """Return the robot with these settings; settings of single joints stay."""
         given = {
             "pitch_p_gain": self.p_gain,
             "pitch_current_limit_a": self.current_limit_a,
@@ -316,7 +316,7 @@ class SafetyConfig(Strict):
         return robot.over_current_a if self.current_limit_a is None else self.current_limit_a
 
     def voltage_limits_v(self, servo: ServoConfig) -> tuple[float, float]:
-        """Least and greatest supply of these servos: the run's, else the robot's."""
+        """Least and greatest supply voltage of the servos: the run's, else the robot's."""
         low_v, high_v = servo.supply_limits_v
         return (
             low_v if self.voltage_min_v is None else self.voltage_min_v,
@@ -400,7 +400,8 @@ class RunConfig(Strict):
         description='a table [repertoire], for motion = "repertoire": recorded actions',
     )
     compliance: ComplianceConfig | None = Field(
-        None, description="joint goals that yield to measured current; default: they do not"
+        None,
+        description="a table [compliance]: joints yield to measured current; default: they do not",
     )
     pose: PoseName | None = Field(
         None,
@@ -409,7 +410,8 @@ class RunConfig(Strict):
     )
     deviation: DeviationConfig = Field(
         DeviationConfig(),
-        description="of a simulated body and ground from their files: nothing in the run knows",
+        description="deviation of the simulated body and ground from their files, "
+        "hidden from the run",
     )
     camera: CameraConfig = CameraConfig()
     mapping: MappingConfig | None = Field(

@@ -49,7 +49,7 @@ def in_words(fault: dict[str, Any], unknown_key: str = "") -> str:
         "bool_parsing": "must be true or false",
         "finite_number": "must be a finite number",
         "union_tag_invalid": f"kind {tag!r} is unknown; use one of {expected_tags}",
-        "union_tag_not_found": "needs a key kind, which says what it is",
+        "union_tag_not_found": "needs a key kind",
         "literal_error": f"must be {context.get('expected')}",
         "enum": f"must be {context.get('expected')}",
         "greater_than": f"must be over {bounds.get('gt', 0):g}",

@@ -280,7 +280,7 @@ class PoleObstacle(Strict):
     length_m: float = Field(3.0, gt=0.1, le=50.0, description="length of the pole")
     upright: bool = Field(
         True,
-        description="whether it rises from the floor; otherwise it lies along x above the floor",
+        description="whether the obstacle rises from the floor; otherwise it lies along x above",
     )
     at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of the obstacle's middle")
     friction: float = Field(
@@ -303,7 +303,7 @@ class PipeObstacle(Strict):
     length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the pipe")
     upright: bool = Field(
         True,
-        description="whether it rises from the floor; otherwise it lies along x above the floor",
+        description="whether the obstacle rises from the floor; otherwise it lies along x above",
     )
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
     friction: float = Field(

@@ -16,7 +16,7 @@ from snakewalk.config.constants import GRAVITY_M_S2
 CORRECTION_1_S: Final = 0.5
 """Rate of the correction of the up direction (ours): an error falls to a third in two seconds."""
 _REST_TOLERANCE: Final = 0.15
-"""A force that differs from gravity by a greater part says nothing of up (ours)."""
+"""Largest relative difference from gravity of a force that shows the direction up (ours)."""
 _LONGEST_PAUSE_S: Final = 0.2
 """Longest pause between readings that a correction counts, s (ours)."""
 

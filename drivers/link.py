@@ -69,7 +69,7 @@ class HoldingLink(Protocol):
 
     @property
     def is_holding(self) -> bool:
-        """Whether it holds."""
+        """Whether the link holds."""
         ...
 
 

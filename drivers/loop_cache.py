@@ -35,10 +35,10 @@ class _Temporary(caching.UserWideCacheLocator):  # type: ignore[misc]  # numba h
         with suppress(FileExistsError):
             os.mkdir(self.folder, mode=0o700)
         info = os.lstat(self.folder)
-        is_mine = not hasattr(os, "getuid") or (
+        is_own_folder = not hasattr(os, "getuid") or (
             info.st_uid == os.getuid() and not info.st_mode & 0o022
         )
-        if not (stat.S_ISDIR(info.st_mode) and is_mine):
+        if not (stat.S_ISDIR(info.st_mode) and is_own_folder):
             raise PermissionError(self.folder)
         super().ensure_cache_path()
 

@@ -18,7 +18,7 @@ def raised_priority() -> Iterator[None]:
     On Linux it is the least real-time priority (``SCHED_RR``), which needs a superuser or
     ``rtprio`` (``limits.conf(5)``); otherwise lower niceness, which also needs a superuser.
     """
-    restore = _real_time() or _nicer()
+    restore = _real_time() or _lower_niceness()
     try:
         yield
     finally:
@@ -47,7 +47,7 @@ def _real_time() -> Callable[[], None] | None:
     return lambda: os.sched_setscheduler(0, *before)
 
 
-def _nicer() -> Callable[[], None] | None:
+def _lower_niceness() -> Callable[[], None] | None:
     """Lower the niceness; return a function that restores it, or None."""
     try:
         before = os.getpriority(os.PRIO_PROCESS, 0)

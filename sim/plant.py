@@ -93,9 +93,9 @@ class Mounting:
     """Mounting of S servos on the plant's shafts: ``servo angle = sign * shaft angle + zero``."""
 
     sign: Floats
-    """(S,) -1 where a servo turns the other way round than its shaft, else 1."""
+    """(S,) -1 for a servo that turns against its shaft, else 1."""
     zero_rad: Floats
-    """(S,) where the servo stands, from its own zero, when the shaft is at 0."""
+    """(S,) angle of the servo from its own zero when the shaft is at 0."""
 
     @staticmethod
     def of(robot: RobotConfig) -> "Mounting":

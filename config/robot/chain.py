@@ -93,7 +93,7 @@ class RobotConfig(JointValues):
                     f"links: length_m of links {k} and {k + 1} is 0: a module has two axes at most"
                 )
         if self.body_profile is not None and len(set(radii_m)) > 1:
-            raise ValueError("links: radius_m and body_profile: one of them says the radii")
+            raise ValueError("links: radius_m and body_profile: both state the radii; remove one")
         if self.body_radius_m != max(radii_m):
             raise ValueError(
                 f"body_radius_m = {self.body_radius_m:g}: the thickest link has radius_m = "
@@ -121,7 +121,7 @@ class RobotConfig(JointValues):
             raise ValueError(f"servo IDs would run to {max(ids)}; the bus has 0 to {LAST_ID}")
         twice = sorted(servo_id for servo_id, count in Counter(ids).items() if count > 1)
         if twice:
-            raise ValueError(f"joints: ID {', '.join(map(str, twice))} is of more than one joint")
+            raise ValueError(f"joints: ID {', '.join(map(str, twice))} is the ID of several joints")
         return self
 
     @model_validator(mode="after")

@@ -36,7 +36,7 @@ def initial_gains(robot: JointValues) -> dict[str, int]:
 
 
 def initial_joint_gains(robot: JointValues) -> dict[int, dict[str, int]]:
-    """Return such gains of joints whose servos are of another model than `[servo]`, by joint."""
+    """Return gains of single joints that a register of their servo model cannot hold, by joint."""
     gains_by_joint: dict[int, dict[str, int]] = {}
     for joint, (joint_config, facts) in enumerate(
         zip(robot.joints, robot.servo_records, strict=False)

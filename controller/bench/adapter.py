@@ -36,7 +36,7 @@ def permission(device: str) -> Finding:
 
 
 def latency_timer(timer_ms: int | None, device: str) -> Finding:
-    """How long the USB adapter's driver holds bytes back; None where it does not say."""
+    """Time for which the USB adapter's driver keeps bytes; None if unknown."""
     check = "latency timer"
     if timer_ms is None:
         return Finding(check, "ok", "not a USB adapter with a latency timer")

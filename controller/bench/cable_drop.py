@@ -210,7 +210,7 @@ def leads_of(robot: RobotConfig, voltage_v: Floats) -> tuple[Cabling, str]:
         return Cabling.of(robot, robot.power), ""
     end = robot.servo_ids[0] if voltage_v[0] >= voltage_v[-1] else robot.servo_ids[-1]
     power = PowerConfig(inject_ids=(end,))
-    return Cabling.of(robot, power), f"; taken for granted: power comes in at ID {end}"
+    return Cabling.of(robot, power), f"; assumed: power enters at ID {end}"
 
 
 def cable_finding(robot: RobotConfig, voltage_v: Floats, drawn_a: Floats) -> Finding:

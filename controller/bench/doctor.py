@@ -50,7 +50,7 @@ _STILL_DPS = 5.0
 
 
 def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
-    """Ping it and read it for a fifth of a second.
+    """Ping the IMU and read it for a fifth of a second.
 
     Raises:
         PortError: the port vanished.
@@ -92,7 +92,7 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
 OnStep = Callable[[str], None]
 """Function that gets the name of each step."""
 _DIFFERING_REGISTERS = ("Realtime Tick", "Present Temperature")
-"""Registers that differ between two servos, however alike they are."""
+"""Registers that always differ between two servos."""
 _FEETECH_MEASURED = ("Present Position", "Present Temperature")
 _MOST_PINGED = 6
 """Largest number of missing servos that are pinged at each baud rate; for more a broadcast is
@@ -242,8 +242,8 @@ def _presence(
         new = factory_servos(
             port, {*present_ids, *others}, silent, noisy=noisy, on_progress=on_progress
         )
-    already = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
-    findings += [] if new is None or already else [new]
+    at_factory_baud = {i for i, rate in elsewhere.items() if rate == FACTORY_BAUD}
+    findings += [] if new is None or at_factory_baud else [new]
     return findings
 
 
@@ -428,7 +428,7 @@ def _moving(
             f"{shown_subject(fast, 'report', robot.label_of_servo)} a velocity, but stands"
         )
         return [Finding("velocity sensor", "warn", motion_text, _NO_VELOCITY)]
-    motion_text = f"{shown_subject(turned, 'move', robot.label_of_servo)} while the doctor looks"
+    motion_text = f"{shown_subject(turned, 'move', robot.label_of_servo)} during the check"
     remedy = "does it fall, or does another program move it? run doctor again when it lies still"
     return [Finding("motion", "warn", motion_text, remedy)]
 

@@ -58,7 +58,7 @@ class StopOutcome:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Its ports; the run's name where it holds none."""
+        """Ports of the run; its name if it has none."""
         return self.ports or (self.what,)
 
     def to_dict(self) -> dict[str, object]:
@@ -111,17 +111,17 @@ def _is_button_of_run(button: PressedButton, run: str) -> bool:
     return run in (meant_run.name, str(meant_run.process)) or where in (path, os.path.dirname(path))
 
 
-def stop_runs(buttons: Iterable[PressedButton], who: str) -> list[StopOutcome]:
+def stop_runs(buttons: Iterable[PressedButton], sender: str) -> list[StopOutcome]:
     """Press all buttons, then wait for each run; escalate where one does not answer."""
     clock = WallClock()
     with ExitStack() as stack:
         opened = [stack.enter_context(button) for button in buttons]
         for button in opened:
-            button.press(who)
+            button.press(sender)
         return [_wait_for_end(button, clock) for button in opened]
 
 
-def stop_holders(ports: Iterable[str], who: str) -> list[StopOutcome]:
+def stop_holders(ports: Iterable[str], sender: str) -> list[StopOutcome]:
     """Stop programs of ours that have a port open, for which no folder of this login has a button.
 
     A run of another login is found by the device. A program without a button is terminated.
@@ -133,7 +133,7 @@ def stop_holders(ports: Iterable[str], who: str) -> list[StopOutcome]:
                 continue
             button = _button_of(holder)
             if button is not None:
-                outcomes += stop_runs([button], who)
+                outcomes += stop_runs([button], sender)
             elif holder.is_ours:
                 outcomes.append(_terminate_program(holder, port))
     return outcomes
@@ -206,7 +206,7 @@ def _wait_for_end(button: PressedButton, clock: WallClock) -> StopOutcome:
     said = button.end
     safe = said is not None and "torque off failed" not in said and "torque may be on" not in said
     if said is None:
-        said = "it ended without a word" if not button.is_held else "it does not end"
+        said = "it ended without a message" if not button.is_held else "it does not end"
         safe = not run.ports and not button.is_held
     return StopOutcome(
         run.name, how, said, safe, round(after_s, 4), run.process, run.ports, run.folder
@@ -233,12 +233,12 @@ class Stop:
         port = self.port
         if run is not None and port is not None:
             raise InputError("stop: a run and --port exclude each other; leave one out")
-        who = f"snakewalk stop (process {os.getpid()})"
-        outcomes = stop_runs(runs_of(port, run), who)
+        sender = f"snakewalk stop (process {os.getpid()})"
+        outcomes = stop_runs(runs_of(port, run), sender)
         if run is not None and not outcomes:
-            raise InputError(f"{run}: no such run is under way")
+            raise InputError(f"{run}: no such run is active")
         devices = [] if outcomes else _free_ports(port)
-        outcomes_of_holders = stop_holders(devices, who)
+        outcomes_of_holders = stop_holders(devices, sender)
         if outcomes_of_holders:
             outcomes = outcomes_of_holders
             devices = []

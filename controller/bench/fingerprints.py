@@ -87,7 +87,7 @@ def fingerprint_finding(
         return Finding("fingerprint", "warn", text, "the next run on the port completes the file")
     if not lines:
         return Finding("fingerprint", "ok", f"the servos are as in {file.path}")
-    remedy = "if it is meant: snakewalk doctor --accept --robot FILE"
+    remedy = "if it is intended: snakewalk doctor --accept --robot FILE"
     return Finding("fingerprint", "fail", "; ".join(lines), remedy)
 
 

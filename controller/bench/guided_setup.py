@@ -18,7 +18,7 @@ _GAIT: Final = "lateral-undulation"
 _GENTLE: Final = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
 """Options of the first motion: slow, and with little torque (ours)."""
 _DEAD_RECKONED: Final = 3
-"""Exit code of a run that did what it should, without a measured pose."""
+"""Exit code of a successful run without a measured pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class GuidedSetup:
         folder.mkdir(parents=True, exist_ok=True)
 
     def carry_on(self) -> None:
-        """Do the steps that are left.
+        """Run the remaining steps.
 
         Raises:
             SystemExit: the person stops; with the exit code of the last command of the step.

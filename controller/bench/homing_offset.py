@@ -90,14 +90,14 @@ def homing_written(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> Iterat
             _write(bus, offset)
         yield
     except DriverError as error:
-        raise BusError(f"{error}; {_put_back(bus, tried)}") from error
+        raise BusError(f"{error}; {_restore_offsets(bus, tried)}") from error
     except BaseException:
-        _put_back(bus, tried)
+        _restore_offsets(bus, tried)
         raise
 
 
 def without_zeros(robot: RobotConfig) -> RobotConfig:
-    """The robot whose servos know where straight is."""
+    """The robot whose servos store the straight pose as zero."""
     joints = tuple(joint.model_copy(update={"zero_rad": 0.0}) for joint in robot.joints)
     return robot.model_copy(update={"joints": joints})
 
@@ -121,7 +121,7 @@ def _write(bus: DynamixelBus, offset: HomingOffset) -> None:
         )
 
 
-def _put_back(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> str:
+def _restore_offsets(bus: DynamixelBus, offsets: Sequence[HomingOffset]) -> str:
     """Write the old offsets again, and report the result."""
     faults = []
     for offset in offsets:

@@ -54,10 +54,10 @@ def second_master(overheard: Overheard) -> Finding:
         return Finding(
             check,
             "warn",
-            f"none; but {overheard.noise_bytes} bytes came that nobody asked for",
+            f"none; but {overheard.noise_bytes} bytes came without a request",
             "a floating data line: termination, pull-ups, ground; or another baud rate's traffic",
         )
-    return Finding(check, "ok", f"nobody else talks within {OVERHEAR_S:g} s")
+    return Finding(check, "ok", f"no other packets within {OVERHEAR_S:g} s")
 
 
 def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) -> Finding | None:
@@ -77,10 +77,10 @@ def noise(pings: Sequence[Probe], reads: Sequence[Probe], overheard: Overheard) 
     damaged = {p.servo_id for p in probes if p.damaged}
     if not damaged:
         return None
-    sometimes = {p.servo_id for p in probes if 0 < p.damaged < p.requests}
+    damaged_ids = {p.servo_id for p in probes if 0 < p.damaged < p.requests}
     present = {p.servo_id for p in probes if p.damaged or p.answered}
-    everybody = len(present) > 1 and damaged == present
-    if not (overheard.noise_bytes or len(sometimes) > 1 or everybody):
+    are_all_damaged = len(present) > 1 and damaged == present
+    if not (overheard.noise_bytes or len(damaged_ids) > 1 or are_all_damaged):
         return None
     bad = sum(p.damaged for p in probes)
     asked = sum(p.requests for p in probes if p.servo_id in present)

@@ -43,7 +43,7 @@ class PortLines:
         for line, ids in self.lines:
             if ids is None or servo_id in ids:
                 return open_servo(line, servo_id, line.latency_s)
-        raise InputError(f"--port {self.port}: has no ID {servo_id}; say which port it is on")
+        raise InputError(f"--port {self.port}: has no ID {servo_id}; give its port")
 
     def misplaced(self, servos_of_lines: Iterable[tuple[str, int]]) -> list[str]:
         """Servos that answer where ``--port`` does not have them, in words.
@@ -97,6 +97,6 @@ def _check_segments(port: str, segments: Sequence[tuple[str, tuple[int, ...]]]) 
         for servo_id in sorted({i for i in ids if ids.count(i) > 1})
     ]
     if SIMULATED in names:
-        faults.append(f"--port {port}: {SIMULATED} is of runs: there is nobody to serve")
+        faults.append(f"--port {port}: {SIMULATED} works in runs only")
     if faults:
         raise InputError(faults)

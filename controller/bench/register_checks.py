@@ -128,11 +128,15 @@ class _Checks:
                 "to writes",
                 verb="do not reply",
                 remedy=f"a run sets {self._entry('Status Return Level')} to {all_reply}; other "
-                "programs wait in vain",
+                "programs get no reply",
             ),
             self._homing(),
             self._bits(
-                "drive mode", "Drive Mode", REVERSE, "turn the other way round", "as meant?"
+                "drive mode",
+                "Drive Mode",
+                REVERSE,
+                "have a reversed direction",
+                "is this intended?",
             ),
             self._bits(
                 "drive mode", "Drive Mode", TORQUE_ON_BY_GOAL, "switch torque on at any goal"
@@ -213,7 +217,7 @@ class _Checks:
                     0 < servo.values.get("PWM Limit", full[servo.joint]) < full[servo.joint]
                 ),
                 f"a {self._entry('PWM Limit')} below {shown}: weak and slow",
-                remedy=f"set it to {shown}, unless it is meant",
+                remedy=f"set it to {shown}, unless it is intended",
             ),
             self._finding_on_servos(
                 "goal PWM",
@@ -281,7 +285,7 @@ class _Checks:
         if not servos:
             return None
         texts, commands = map("; ".join, zip(*servos, strict=True))
-        return Finding(register.lower(), "warn", texts, f"as meant? else {commands}")
+        return Finding(register.lower(), "warn", texts, f"is this intended? if not: {commands}")
 
     def _watchdog(self) -> list[Finding | None]:
         return [
@@ -343,7 +347,7 @@ class _Checks:
         return Finding("pose", "ok", "every joint stands within its limits")
 
     def _exchanged_servos(self) -> Finding | None:
-        """Servos that were other joints in the last run, as far as they have had power since."""
+        """Servos that moved other joints in the last run, if their power stayed on since."""
         robot = self._robot
         others = [
             f"{robot.joint_label(servo.joint)} was {robot.joint_label(servo.values[IDENTITY] - 1)}"

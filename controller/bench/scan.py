@@ -42,7 +42,7 @@ class ScanResult:
     firmware: int | None
     baud: int
     secondary_id: int | None = None
-    """Another ID whose writes it obeys as well, silently; None: none."""
+    """Second ID whose writes the servo obeys without a reply, or None."""
 
     def to_dict(self) -> dict[str, object]:
         """For JSON."""
@@ -50,7 +50,7 @@ class ScanResult:
 
 
 def pick_port(port: str | None) -> str:
-    """The port that was asked for, or the only one there is.
+    """The requested port, or the only one.
 
     Raises:
         PortError: no port was named and none or several exist; or several were named.
@@ -178,18 +178,18 @@ def _answers(
     baud = port.getBaudRate()
     replies: dict[int, StatusPacket] = {}
     state = "sound"
-    same = 0
+    same_count = 0
     for turn in range(_MOST_BROADCASTS):
         answer = broadcast_ping(port)
         new = [reply for reply in answer.replies if reply.servo_id not in replies]
         replies |= {reply.servo_id: reply for reply in new}
-        same = 0 if new else same + 1
+        same_count = 0 if new else same_count + 1
         if answer.noise_bytes:
             noise[baud] = noise.get(baud, 0) + answer.noise_bytes
             state = "noisy" if state == "sound" and replies else state
         if turn and (new or len(answer.replies) < len(replies)):
             state = "lossy"
-        if same >= _SILENT_PINGS[state] and turn:
+        if same_count >= _SILENT_PINGS[state] and turn:
             break
         if not replies and not (patient and baud in _LIKELY):
             break

@@ -1,4 +1,4 @@
-"""The other side: each servo against the robot that was described."""
+"""Checks of each servo against the robot's file."""
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
@@ -103,7 +103,7 @@ def _missing_remedy(
 ) -> str:
     if len(others) == len(missing) == 1:
         return (
-            f"if servo {others[0]} is meant: snakewalk bus set --port {port} --id {others[0]} "
+            f"if servo {others[0]} is correct: snakewalk bus set --port {port} --id {others[0]} "
             f"--new-id {missing[0]}"
         )
     if len(others) >= len(missing) or (others and len(missing) == len(expected)):
@@ -148,15 +148,16 @@ def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = 
     requests = sum(p.requests for p in probes)
     if noisy:
         duplicates_text = (
-            f"no servo answers twice in {requests} requests; more the noise does not let see"
+            f"no servo answers twice in {requests} requests; noise hides further checks"
         )
         return Finding(check, "ok", duplicates_text)
-    never = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
-    if never:
+    damaged_ids = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
+    if damaged_ids:
         return Finding(
             check,
             "fail",
-            f"{shown_subject(never, 'answer')} with damaged bytes only: two servos have this ID",
+            f"{shown_subject(damaged_ids, 'answer')} with damaged bytes only: "
+            "two servos have this ID",
             _DUPLICATE_REMEDY,
         )
     damaged = sorted({p.servo_id for p in probes if p.damaged})
@@ -179,7 +180,7 @@ def silent_to_reads(servo_ids: Sequence[int]) -> Finding | None:
         "fail",
         f"{shown_subject(servo_ids, 'reply')} to pings and not to reads: Status Return Level(68) "
         "is 0, or the answer is lost",
-        "a run sets it to 2, unheard; else write 2 to address 68",
+        "a run sets it to 2 without a reply; else write 2 to address 68",
     )
 
 

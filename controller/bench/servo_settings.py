@@ -178,7 +178,7 @@ def restart(bus: DynamixelBus, servo_id: int) -> tuple[str, str]:
 def _raw(
     bus: DynamixelBus, request: SettingsRequest, faults: list[str]
 ) -> dict[str, tuple[int, str]]:
-    """Register to value and what it means; limits first, then ID, then baud rate."""
+    """Value and meaning by register; limits first, then ID, then baud rate."""
     values: dict[str, tuple[int, str]] = {}
     for field, register in _LIMITS.items():
         value = getattr(request, field)

@@ -74,8 +74,8 @@ def supply_under_load(bus: ChainBus, robot: RobotConfig, safety: SafetyConfig) -
         text = f"the wiggle ended: {wiggled.fault}"
         return [Finding(check, "fail", text, "remove the cause first"), *cables]
     if not enough:
-        text = f"only {len(wiggled.voltage_v)} readings of all servos were whole"
-        return [Finding(check, "fail", text, "see what line says: cables, plugs, a common ground")]
+        text = f"only {len(wiggled.voltage_v)} readings of all servos were complete"
+        return [Finding(check, "fail", text, "see the check line: cables, plugs, a common ground")]
     lowest_v, rest_v = wiggled.voltage_v.min(axis=0), float(wiggled.rest_v.min())
     sag_v = float((wiggled.rest_v - lowest_v).max())
     supply_text = f"{rest_v:.1f} V at rest, {lowest_v.min():.1f} V in motion"

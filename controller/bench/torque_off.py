@@ -98,7 +98,7 @@ def only_port() -> str:
 
 
 def _scan_module() -> Any:
-    """Import it when it is needed: it is slow to import."""
+    """Import the bus on use: the import is slow."""
     from snakewalk.controller.bench import scan  # noqa: PLC0415  slow to import
 
     return scan

@@ -68,11 +68,11 @@ class ForeignReplies:
 
     @property
     def ids(self) -> frozenset[int]:
-        """All of these IDs."""
+        """All missing and unlisted IDs."""
         return frozenset((*self.models, *(i for ids in self.protocol_1.values() for i in ids)))
 
     def findings(self, robot_model: str) -> list[Finding]:
-        """Findings about them; nothing without any."""
+        """Findings about unlisted devices; empty without any."""
         findings = []
         for model in dict.fromkeys(self.models.values()):
             ids = [i for i, name in self.models.items() if name == model]

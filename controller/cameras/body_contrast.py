@@ -47,7 +47,7 @@ class BodyContrast:
     coded: Image
     """(h, w[, 3]) picture as the camera sent it."""
     floors: tuple[Image, ...]
-    """(h, w[, 3]) each: a pixel that one of them explains is floor."""
+    """(h, w[, 3]) backgrounds: a pixel that one of them explains is floor."""
     near: NDArray[np.uint8]
     """(h, w) 255 where the body can be."""
     origin_px: Floats

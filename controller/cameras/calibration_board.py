@@ -61,7 +61,7 @@ class CalibrationBoard:
 
     pattern: BoardPattern = BoardPattern.CHARUCO
     squares: tuple[int, int] = (7, 5)
-    """Across, down; also of a chessboard, whose inner corners are one fewer each way."""
+    """Squares across and down; a chessboard has one inner corner fewer in each direction."""
     square_m: float = 0.036
 
     def __post_init__(self) -> None:

@@ -85,7 +85,7 @@ class CameraCheck:
         self._joint_rad: deque[Floats] = deque(maxlen=_READS)
         self._latest: Image | None = None
         self._looks, self._found = 0, dict.fromkeys(camera.marker_places_m, 0)
-        self._looked_s = self._lined_s = -np.inf
+        self._looked_s = self._line_time_s = -np.inf
         self._window = slice(None), slice(None)
         self.markers: Markers = {}
         """Markers of the last picture in which they were searched."""
@@ -100,8 +100,8 @@ class CameraCheck:
         self._frame_s.append(time_s)
         self._latest = image
         self._light.append(float(image[::_SPARSE, ::_SPARSE].mean()))
-        if self._joint_s and time_s - self._lined_s >= _LINE_S:
-            self._lined_s = time_s
+        if self._joint_s and time_s - self._line_time_s >= _LINE_S:
+            self._line_time_s = time_s
             self._add_line(image, time_s)
         if time_s - self._looked_s < _SEARCH_PERIOD_S:
             return
@@ -147,7 +147,7 @@ class CameraCheck:
 
         """
         if self._latest is None:
-            raise InputError("the camera has handed over no frame")
+            raise InputError("the camera has delivered no frame")
         size_px = (self._latest.shape[1], self._latest.shape[0])
         times = np.array(self._frame_s)
         gaps_s = np.diff(times)

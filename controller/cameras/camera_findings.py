@@ -70,12 +70,12 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
         remedy = "snakewalk pose markers, and their places in [camera.markers_m]"
         return [Finding("markers", "warn", f"none are named{extra_text}", remedy)]
     shown = ", ".join(f"{name} in {100.0 * share:.0f} %" for name, share in report.seen.items())
-    seldom = [name for name, share in report.seen.items() if share < _LEAST_SEEN]
-    steady = len(report.seen) - len(seldom)
+    rarely_seen = [name for name, share in report.seen.items() if share < _LEAST_SEEN]
+    steady = len(report.seen) - len(rarely_seen)
     if steady >= len(report.seen):
         first = Finding("markers", "ok", f"all {steady} found in every picture, or nearly")
     else:
-        lost = ", ".join(str(name) for name in seldom)
+        lost = ", ".join(str(name) for name in rarely_seen)
         first = Finding(
             "markers",
             "warn" if steady >= FEWEST else "fail",

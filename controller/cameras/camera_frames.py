@@ -33,5 +33,7 @@ def require_whole_body(detection: LineDetection, camera: str) -> LineDetection:
 
     """
     if detection.status is not FrameStatus.GOOD:
-        raise InputError(f"{camera}: the robot is not seen whole at its start: {detection.status}")
+        raise InputError(
+            f"{camera}: the robot is not completely visible at its start: {detection.status}"
+        )
     return detection

@@ -32,7 +32,7 @@ class LatencyFit:
     correlation: float
     """Correlation of the shapes' changes."""
     fault: str = ""
-    """Why it must not be believed; empty where it may."""
+    """Reason for rejecting the latency; empty if it is valid."""
 
 
 _NO_FIT: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
@@ -56,7 +56,7 @@ def fit_latency(
     if min(len(finite_lines), len(joint_s)) < _LEAST_SAMPLES:
         return replace(
             _NO_FIT,
-            fault=f"the whole body was seen in {len(finite_lines)} frames, its joints were read "
+            fault=f"the complete body was seen in {len(finite_lines)} frames, its joints were read "
             f"{len(joint_s)} times; {_LEAST_SAMPLES} are needed of each",
         )
     origin = pose_at(np.zeros(2), 0.0)
@@ -69,7 +69,7 @@ def fit_latency(
     delays = np.arange(_EARLIEST_S, _LATEST_S + 1e-9, _STEP_S)
     inside = (frame_s - _LATEST_S >= joint_s[0]) & (frame_s - _EARLIEST_S <= joint_s[-1])
     if inside.sum() < _LEAST_SAMPLES:
-        return replace(_NO_FIT, fault="it looked too short: frames and joints hardly overlap")
+        return replace(_NO_FIT, fault="the check was too short: frames and joints hardly overlap")
     frame_s = frame_s[inside]
     expected = np.stack(
         [

@@ -103,16 +103,16 @@ class CameraPose:
     def row(self) -> dict[str, Any]:
         """Return a row of the log about the newest frame that was used; it has its own time."""
         now_s = self._history[-1].time_s
-        nothing = float("nan")
-        fixed_s = nothing if self._fixed_s is None else self._fixed_s
-        variance = np.full((3, 3), nothing) if self.covariance is None else self.covariance
+        no_value = float("nan")
+        fixed_s = no_value if self._fixed_s is None else self._fixed_s
+        variance = np.full((3, 3), no_value) if self.covariance is None else self.covariance
         return {
             "age_s": now_s - fixed_s,
             "position_sd_m": float(np.sqrt(0.5 * variance[:2, :2].trace())),
             "heading_sd_rad": float(np.sqrt(variance[2, 2])),
             "latency_s": 0.0,
             "sequence": self.used - 1,
-            "arrival_s": nothing,
+            "arrival_s": no_value,
             "fault": "",
             "is_confirmed": 1,
         }
@@ -208,7 +208,7 @@ class CameraPose:
         if self._gap != (blind_s > GAP_S):
             self._gap = not self._gap
             self._on_event(
-                f"the camera has lost the body: {self._reason or 'no frame came'}; reckoning on"
+                f"the camera has lost the body: {self._reason or 'no frame came'}; dead reckoning"
                 if self._gap
                 else "the camera has the body again"
             )

@@ -40,7 +40,7 @@ OnFrame = Callable[[Image, CameraCheck, float], None]
 """(H, W, 3) red, green, blue; the check so far; time (s)."""
 
 
-def nobody(image: Image, check: CameraCheck, time_s: float) -> None:
+def show_nothing(image: Image, check: CameraCheck, time_s: float) -> None:
     """Ignore a frame."""
 
 
@@ -70,7 +70,7 @@ class CameraWatch:
         device = self._camera.device
         return "simulated" if device is None else device
 
-    def check(self, seconds: float, on_frame: OnFrame = nobody) -> CameraCheck:
+    def check(self, seconds: float, on_frame: OnFrame = show_nothing) -> CameraCheck:
         """Measure.
 
         Raises:

@@ -151,7 +151,7 @@ class DeviceCamera:
         while not self._stop.is_set():
             is_read, frame = self._device.read()
             if not is_read:
-                self._found.put(InputError(f"{self._name}: hands over no more frames"))
+                self._found.put(InputError(f"{self._name}: delivers no more frames"))
                 return
             taken += 1
             try:

@@ -26,7 +26,7 @@ class LensCalibration:
     rms_px: float
     """Root mean square distance of corners from where the lens puts them."""
     view_rms_px: Floats
-    """(V,) the same of each view; NaN of those left out."""
+    """(V,) residual of each view; NaN for omitted views."""
     focal_error_px: float
     """Standard error of the focal length."""
     centre_error_px: float
@@ -81,14 +81,14 @@ def calibrate_lens(views: Sequence[BoardView | None], size_px: tuple[int, int]) 
     while True:
         calibrated = _calibrated_lens(used, size_px, len(views))
         usual = float(np.nanmedian(calibrated.view_rms_px))
-        keep = {
+        good_views = {
             k: view
             for k, view in used.items()
             if calibrated.view_rms_px[k] <= _OUTLIER * usual + 0.1
         }
-        if len(keep) in (len(used), *range(FEWEST_VIEWS)):
+        if len(good_views) in (len(used), *range(FEWEST_VIEWS)):
             return calibrated
-        used = keep
+        used = good_views
 
 
 def _calibrated_lens(

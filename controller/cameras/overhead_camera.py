@@ -311,11 +311,11 @@ class OverheadDetector:
         corners = np.array(
             [[0.0, 0.0], [size_px[0], 0.0], [0.0, size_px[1]], list(size_px)], dtype=float
         )
-        floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.now_from_then)
+        floor_from_px = first.model.floor_from_px @ np.linalg.inv(move.present_from_earlier)
         back = np.linalg.inv(self.model.floor_from_px) @ floor_from_px
         off = np.hypot(*(projected(back, corners) - corners + self.model.moved_px).T)
-        same = reference.left_out == now.left_out and reference.undone == now.undone
-        if same and off.max() < (_MOVED_CAMERA_PX if now.undone else np.inf):
+        is_unchanged = reference.left_out == now.left_out and reference.undone == now.undone
+        if is_unchanged and off.max() < (_MOVED_CAMERA_PX if now.undone else np.inf):
             return self
         if not now.undone:
             return replace(self, bump=now, first=first)
@@ -324,7 +324,8 @@ class OverheadDetector:
         grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(float)
         lens = first.model.lens
         then = projected(
-            np.linalg.inv(move.now_from_then), grid if lens is None else lens.undistorted(grid)
+            np.linalg.inv(move.present_from_earlier),
+            grid if lens is None else lens.undistorted(grid),
         )
         places_px = (then if lens is None else lens.distorted(then)).astype(np.float32)
         ground = np.asarray(

@@ -83,7 +83,7 @@ class TrackedPose:
     covariance: Floats
     """(3, 3) of the head's x, y (m) and of its heading (rad)."""
     fault: str
-    """Why it must not be used; empty where it may."""
+    """Reason for rejecting the pose; empty if it is valid."""
     bump: Bump | None = None
     """Bump of the camera since it was set up."""
 
@@ -305,8 +305,10 @@ def _fit_tips(
     if blocks is None or tracked.fault:
         return tracked
     radius_m = robot.body_radius_m
-    vague = error_m > _OFF_IN_BLOCKS * radius_m or tracked.sigma_m > blocks.sigma_limit * radius_m
-    return replace(tracked, fault=str(blocks)) if vague else tracked
+    is_inaccurate = (
+        error_m > _OFF_IN_BLOCKS * radius_m or tracked.sigma_m > blocks.sigma_limit * radius_m
+    )
+    return replace(tracked, fault=str(blocks)) if is_inaccurate else tracked
 
 
 def _covariance(robot: RobotConfig, look: _Comparison, head_m: Floats, alike: float) -> Floats:

@@ -21,7 +21,7 @@ from snakewalk.controller.capture.small_body.film_fit import (
     with_least_errors,
     with_tip_errors,
 )
-from snakewalk.controller.capture.verification.film_check import goes_on_faintly, verified
+from snakewalk.controller.capture.verification.film_check import has_faint_continuation, verified
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -57,7 +57,7 @@ class UnusableFilmError(InputError):
             super().__init__(f"{name}: {len(skeletons)} frame: two or more are needed")
             return
         self.reason = worst = max(dict.fromkeys(reasons), key=reasons.count)
-        advice = _ADVICE.get(worst, f"the body is never seen whole: {worst}")
+        advice = _ADVICE.get(worst, f"the body is never completely visible: {worst}")
         super().__init__(f"{name}: {advice} ({reasons.count(worst)} of {len(skeletons)} frames)")
 
 
@@ -193,7 +193,9 @@ def captured_from(
     least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
     expected[solved] = np.maximum(expected[solved], least)
     expected[[not skeleton.status.has_points for skeleton in skeletons]] = np.nan
-    goes_on = not detections.shows_tips(skeletons) and goes_on_faintly(skeletons, detections.store)
+    goes_on = not detections.shows_tips(skeletons) and has_faint_continuation(
+        skeletons, detections.store
+    )
     if goes_on or detections.is_unclear(skeletons):
         skeletons, expected = _without_tail(skeletons, expected)
     return Capture(

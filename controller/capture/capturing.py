@@ -278,9 +278,9 @@ def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
     if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
         reason = max(dict.fromkeys(unclear), key=unclear.count)
         raise InputError(
-            f"{options.recording}: only {used} of {len(captured.status)} frames show a whole body, "
-            f"and these are rough; mostly: {reason}; use other light, or give --background, --roi "
-            "or --threshold"
+            f"{options.recording}: only {used} of {len(captured.status)} frames show a complete "
+            f"body, and these are rough; mostly: {reason}; use other light, or give --background, "
+            "--roi or --threshold"
         )
 
 

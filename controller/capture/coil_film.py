@@ -276,9 +276,9 @@ class _Film:
         self, chains: Sequence[Floats], shapes: Sequence[Shape], ends: tuple[Floats, Floats]
     ) -> Floats:
         """(K,) distance of another solution of about the same cost, working px."""
-        ways = self._least_costs(chains, shapes, ends)
+        path_costs = self._least_costs(chains, shapes, ends)
         out = np.zeros(len(shapes))
-        for n, row in enumerate(ways):
+        for n, row in enumerate(path_costs):
             for chain, cost in zip(chains[1:], row[1:], strict=True):
                 if cost < row[0] + _RIVAL:
                     out[n] = max(out[n], self._distance(chain[n], chains[0][n]))
@@ -423,8 +423,8 @@ class _Film:
     ) -> list[tuple[Floats, Floats]]:
         """Information and push that the frames before each frame add."""
         tie = self.change
-        nothing = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
-        out = [nothing]
+        no_information = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+        out = [no_information]
         for n in range(len(systems) - 1):
             full = systems[n] + out[n][0] + tie
             ahead = np.linalg.solve(full, np.column_stack([tie, push[n] + out[n][1]]))
@@ -442,9 +442,9 @@ class _Film:
         if strange[n]:
             return FrameStatus.COIL_UNLIKE, np.nan
         neighbour_gaps = best.apart[max(0, n - _NEIGHBOURS) : n + _NEIGHBOURS + 1]
-        leaps = best.steps > _STEP
-        leaps[:-1] |= strange
-        tied = not leaps[: n + 1].any() or not leaps[n + 1 :].any()
+        has_large_steps = best.steps > _STEP
+        has_large_steps[:-1] |= strange
+        tied = not has_large_steps[: n + 1].any() or not has_large_steps[n + 1 :].any()
         if neighbour_gaps.max() > _AGREE * self.body.length or not tied:
             return FrameStatus.COIL_TWO_WAYS, np.nan
         frame_error_px = np.hypot(_OF_FIT * best.error[n], _OF_MODEL * self.misfit)
@@ -467,7 +467,7 @@ def _unsolved_skeleton(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
 
 
 def _nearest_turns(values: Floats, reference: Floats) -> Floats:
-    """The same body, its angles nearest to those of another by whole turns."""
+    """The body with its angles moved by full turns next to those of another body."""
     turns = np.rint((values[3:] - reference[3:]).mean() / (2.0 * np.pi))
     out = values.copy()
     out[3:] -= 2.0 * np.pi * turns

@@ -78,7 +78,7 @@ def _check_frames(corrections: Corrections, count: int, name: str) -> None:
             )
         twice = [k for k, times in Counter(frames).items() if times > 1]
         if twice:
-            raise InputError(f"{name}: {key}: frame {twice[0]} stands there twice")
+            raise InputError(f"{name}: {key}: frame {twice[0]} is listed twice")
 
 
 def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:

@@ -137,7 +137,7 @@ def joined(
     sign = _signs(parts)
     score, by = _head_of(parts, sign)
     if sum(film_part.used for film_part in parts) < 2:
-        raise InputError(f"{name}: the body is never seen whole; look at --sheet")
+        raise InputError(f"{name}: the body is never completely visible; look at --sheet")
     count = sum(film_part.frames for film_part in parts)
     arrays: dict[str, Floats] = {}
     status: list[FrameStatus] = []
@@ -184,12 +184,12 @@ def _head_of(parts: Sequence[FinishedPart], sign: Sequence[int]) -> tuple[float,
     weights = [part.used * (part.head_by != "given" or _GIVEN_WEIGHT) for part in parts]
     if not any(weights):
         return 0.0, "taper"
-    odds = [
+    likelihoods = [
         weight * s * float(np.arctanh(min(part.head_sure, _SUREST)))
         for weight, part, s in zip(weights, parts, sign, strict=True)
     ]
-    strongest = int(np.argmax(np.abs(odds)))
-    return float(np.tanh(sum(odds) / sum(weights))), parts[strongest].head_by
+    strongest = int(np.argmax(np.abs(likelihoods)))
+    return float(np.tanh(sum(likelihoods) / sum(weights))), parts[strongest].head_by
 
 
 def _reversed_capture(capture: Capture) -> Capture:

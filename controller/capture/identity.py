@@ -52,9 +52,9 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
     """
     point = body.points_px - body.points_px.mean(axis=0)
     there = before.points_px - before.points_px.mean(axis=0)
-    same = float(np.sqrt(((point - there) ** 2).sum(axis=1)).mean())
+    same_order_px = float(np.sqrt(((point - there) ** 2).sum(axis=1)).mean())
     other = float(np.sqrt(((point[::-1] - there) ** 2).sum(axis=1)).mean())
-    return (other - same) / max(other + same, 1e-9)
+    return (other - same_order_px) / max(other + same_order_px, 1e-9)
 
 
 def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:

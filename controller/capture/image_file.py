@@ -24,7 +24,7 @@ class StoredImage:
     size: int
     shape: tuple[int, ...]
     dtype: np.dtype[Any] | None
-    """None: a PNG."""
+    """Shape of a raw array; None: a PNG."""
 
 
 @dataclass(slots=True)

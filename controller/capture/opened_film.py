@@ -23,11 +23,11 @@ class OpenedFilm:
     footage: Footage
     region: Region
     first: DeepImage
-    """First frame, whole."""
+    """Complete first frame."""
     some: tuple[DeepImage, ...]
     """Frames spread over the film, cut to the region."""
     one_size: bool
-    """Whether all of these have the same size."""
+    """Whether all images have the same size."""
     in_colour: bool
     background: DeepImage | None
     """Background that the user gave, cut to the region."""

@@ -56,11 +56,11 @@ def check_options(options: CaptureOptions) -> None:
 
     """
     if options.cropped and options.background is not None:
-        raise InputError("--cropped and --background: a camera that moves has no one background")
+        raise InputError("--cropped and --background: a moving camera has no single background")
     if options.cropped and options.trail is not None:
         raise InputError("--cropped and --trail: the camera must stand still; leave one out")
     if options.length_m is not None and options.marker is not None:
-        raise InputError("--length-m and --marker both give the scale: say one of them")
+        raise InputError("--length-m and --marker both give the scale; leave one out")
     if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
         raise InputError(f"--length-m: the animal must be longer than 0 m, not {options.length_m}")
     if options.threshold is not None and not 0.0 < options.threshold < float("inf"):

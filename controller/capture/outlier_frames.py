@@ -65,11 +65,11 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     spread = 1.4826 * np.median(np.abs(radius / median - 1.0), axis=0)
     most = np.maximum(_THICK, _SPREADS * spread)
     # after a coil the other end may be first, which makes no body thick
-    ways = [
+    orders = [
         ((radius_order / median - 1.0) / most).max(axis=1)
         for radius_order in (radius, radius[:, ::-1])
     ]
-    thick = np.minimum(*ways)
+    thick = np.minimum(*orders)
     for n, k in enumerate(good):
         if thick[n] > 1.0 or length[n] < -1.0 or area[n] < -1.0:
             out[k] = no_skeleton(FrameStatus.SHORT)

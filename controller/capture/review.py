@@ -52,7 +52,7 @@ def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:
         if scale * longest < _SMALLEST_SIDE_PX:
             raise InputError(
                 f"{name}: a page with pictures of {count} frames would be too large for a browser; "
-                "capture a part of the film, or look at less of the picture by --roi"
+                "capture a part of the film, or choose a part of the picture with --roi"
             )
     return scale
 

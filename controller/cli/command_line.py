@@ -104,15 +104,15 @@ def former_name(words: Sequence[str], names: Collection[str]) -> tuple[str, str]
     for count in (2, 1):
         old = " ".join(words[:count])
         new = FORMER.get(old, "")
-        if not new or not _words_below(new, names):
+        if not new or not _following_words(new, names):
             continue
-        kinds = _words_below(old, names)
+        kinds = _following_words(old, names)
         if not kinds or (new.startswith(f"{old} ") and _is_argument(words[count:], kinds)):
             return old, new
     return None
 
 
-def _words_below(words: str, names: Collection[str]) -> list[str]:
+def _following_words(words: str, names: Collection[str]) -> list[str]:
     """Return the words that follow, an empty one for a command of this name."""
     return [
         f"{name} ".removeprefix(f"{words} ") for name in names if f"{name} ".startswith(f"{words} ")

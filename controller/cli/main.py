@@ -96,7 +96,7 @@ _INTERRUPTED = 130
 
 
 def leave_out_avx512() -> None:
-    """Have numpy, which is not imported yet, do without what makes other last bits."""
+    """Disable instructions of numpy, before its import, that change the last bits."""
     os.environ.setdefault("NPY_DISABLE_CPU_FEATURES", _LEFT_OUT)
 
 

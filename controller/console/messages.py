@@ -158,7 +158,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
         yield
         LOGGER.debug("done")
     except BaseException as error:
-        _tell_end(error)
+        _report_end(error)
         raise
     finally:
         warnings.showwarning = shown
@@ -168,7 +168,7 @@ def messages(level: str, file: Path | None = None) -> Iterator[None]:
         LOGGER.propagate = True
 
 
-def _tell_end(error: BaseException) -> None:
+def _report_end(error: BaseException) -> None:
     elsewhere = {FAULT: True}
     if isinstance(error, InputError):
         for line in error.faults:

@@ -84,7 +84,7 @@ class Plugin:
 
     @property
     def is_builtin(self) -> bool:
-        """Whether it is snakewalk's own."""
+        """Whether the plug-in is snakewalk's own."""
         return self.package.startswith(f"{OWN}.")
 
     def load(self) -> Any:

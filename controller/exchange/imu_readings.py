@@ -26,7 +26,7 @@ class ImuReadings:
     rate_rad_s: Floats
     """(N, 3) about the link's forward, left and up axes."""
     link_m: Floats
-    """(N, 3) where the link was, as the run's pose says; zero where nothing says it."""
+    """(N, 3) position of the link by the run's pose; zero if unknown."""
 
 
 def imu_readings(record: RunRecord) -> ImuReadings:

@@ -236,7 +236,7 @@ class RosMessages:
         world = pose_frame(record.header)
         unknown = self._floats(np.diag([UNKNOWN_VARIANCE] * 6).ravel())
         variance = [_variance(position_sd_m)] * 3 + [_variance(heading_sd_rad)] * 3
-        nothing = self._xyz("Vector3", [0.0, 0.0, 0.0])
+        zero_vector = self._xyz("Vector3", [0.0, 0.0, 0.0])
         for k, time_s in enumerate(frames.time_s.tolist()):
             place = frames.translation_m[k, 0]
             turn = frames.quaternion[k, 0]
@@ -247,7 +247,9 @@ class RosMessages:
             )
             twist = self._new_message(
                 "geometry_msgs/msg/TwistWithCovariance",
-                twist=self._new_message("geometry_msgs/msg/Twist", linear=nothing, angular=nothing),
+                twist=self._new_message(
+                    "geometry_msgs/msg/Twist", linear=zero_vector, angular=zero_vector
+                ),
                 covariance=unknown,
             )
             yield self._row(

@@ -34,7 +34,7 @@ def draw(out: Path) -> None:
 
 def _draw(out: Path) -> None:
     robot = load_robot(ROBOT)
-    nowhere = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
+    origin_frame = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
     motion = CpgMotion(robot, np.zeros(robot.joint_count))
     angles: list[NDArray[np.float64]] = []
     speeds: list[NDArray[np.float64]] = []
@@ -43,7 +43,7 @@ def _draw(out: Path) -> None:
         taken_s = motion.become(GAITS[name]()) if name else motion.stop()
         changes.append((len(angles) * STEP_S, name or "rest", taken_s))
         for _ in range(round((taken_s + (STAY_S if name else 1.0)) / STEP_S)):
-            angles.append(motion.step(STEP_S, nowhere))
+            angles.append(motion.step(STEP_S, origin_frame))
             speeds.append(motion.velocity_rad_s())
     time_s = STEP_S * np.arange(len(angles))
     figure = Figure(figsize=(WIDTH_IN, 5.4), layout="constrained")

@@ -61,7 +61,7 @@ _RC: Final[dict[Any, Any]] = {
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Everything drawn inside looks alike."""
+    """Draw with the common style inside this context."""
     with mpl.rc_context(_RC):
         yield
 

@@ -41,7 +41,7 @@ STEP_RAD = 0.3
 STIFF_M_RAD = 1e-5
 """Distance that is given up rather than bend a joint by a radian: picks one of many fits."""
 DONE = 1e-7
-"""Metres and radians of a round that is the last."""
+"""Largest change, in metres and radians, of the last round."""
 
 
 class SpaceCurve:
@@ -53,7 +53,7 @@ class SpaceCurve:
             raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         if not np.isfinite(points).all() or steps.min() <= 0.0:
-            raise InputError("a backbone curve's points are finite, no two in a row the same")
+            raise InputError("a backbone curve's points must be finite, and neighbours must differ")
         spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
         fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
         steps = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)

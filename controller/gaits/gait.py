@@ -32,9 +32,9 @@ class Needs:
     legs: bool = False
     """Whether two pairs of legs are used."""
     leg_axes: str = ""
-    """Axes of each of these legs from the hip; empty: whatever they are."""
+    """Axes of each leg from the hip; empty: any axes."""
     wheels: bool = False
-    """Whether it advances only on a belly that slides along easily and across badly."""
+    """Whether the gait needs a belly that slides more easily along than across."""
 
     def check(self, robot: "RobotConfig", what: str) -> None:
         """Reject a robot that lacks the joints.
@@ -98,7 +98,7 @@ class Gait(ABC):
     world: ClassVar[str] = "isotropic"
     """Shipped world of the gait's runs, where none is given."""
     p_gain: ClassVar[int | None] = None
-    """Register 84 of every servo where the robot's own would squeeze too hard."""
+    """P gain (register 84) of every servo if the robot's own would squeeze too hard."""
     steered_by: ClassVar[str | None] = None
     """Parameter that steers the gait along waypoints, positive to the left; None: the gait is not
     steered."""

@@ -78,7 +78,7 @@ class LegGait(Gait, ABC):
         return joints
 
     def _bend(self, robot: "RobotConfig", phase_rad: Floats, joints: Floats) -> None:
-        """Turn each girdle furthest when its legs are.
+        """Turn each girdle most when its legs have swung most.
 
         At phase 0 of its offset the left front leg is foremost: the front girdle is turned right by
         half of the bend, the hind one left.

@@ -68,7 +68,7 @@ class Compression:
 
     @property
     def explains_faults(self) -> bool:
-        """Whether it is strong enough that a pose is rejected for no other reason."""
+        """Whether the compression alone is strong enough to reject a pose."""
         return self.quality is None or self.quality < _USUAL_QUALITY
 
 

@@ -93,8 +93,10 @@ def follow_tail(
     clear = [0.0]
     rows, columns = level.shape
     for _ in range(round(_MOST_LENGTHENING * length)):
-        ways = angle + _FAN_RAD * _FAN
-        ridge_levels = _ridge(level, np.broadcast_to(tip, (len(ways), 2)), ways, half) / noise
+        directions = angle + _FAN_RAD * _FAN
+        ridge_levels = (
+            _ridge(level, np.broadcast_to(tip, (len(directions), 2)), directions, half) / noise
+        )
         best = int(np.argmax(ridge_levels - np.abs(_FAN)))
         ahead_px = 1.0
         if ridge_levels[best] < _CLEAR:
@@ -119,16 +121,16 @@ def follow_tail(
     return FollowedTail(np.array(points), clearness)
 
 
-def _ridge(level: NDArray[np.float32], start: Floats, ways: Floats, half: float) -> Floats:
+def _ridge(level: NDArray[np.float32], start: Floats, directions: Floats, half: float) -> Floats:
     """(W,) mean contrast along a ray from each point (W, 2), less that of its clearer side."""
     along = np.arange(1.0, _DIRECTION_PX + 1.0)
-    unit = np.column_stack([np.cos(ways), np.sin(ways)])
+    unit = np.column_stack([np.cos(directions), np.sin(directions)])
     side = np.column_stack([-unit[:, 1], unit[:, 0]])
     middle = start[:, None] + along[None, :, None] * unit[:, None]
     ring = half + _GROUND_GAP_PX
     across = np.array([-0.5 * half, 0.0, 0.5 * half, -ring, ring])
     places = middle[:, :, None] + across[:, None] * side[:, None, None]
-    x, y = np.moveaxis(places.reshape(len(ways), -1, 2), -1, 0).astype(np.float32)
+    x, y = np.moveaxis(places.reshape(len(directions), -1, 2), -1, 0).astype(np.float32)
     shown = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     shown_level = np.asarray(shown, dtype=float).reshape(places.shape[:-1]).mean(axis=1)
     return np.asarray(shown_level[:, :3].mean(axis=1) - shown_level[:, 3:].max(axis=1))
@@ -148,8 +150,8 @@ def _noise(level: NDArray[np.float32], half: float, free: Bools) -> float | None
     if len(x) < _SAMPLES:
         return None
     some = np.linspace(0, len(x) - 1, _SAMPLES).round().astype(int)
-    ways = np.linspace(0.0, 12.0 * np.pi, _SAMPLES)
-    ridge = _ridge(level, np.column_stack([x[some], y[some]]).astype(float), ways, half)
+    directions = np.linspace(0.0, 12.0 * np.pi, _SAMPLES)
+    ridge = _ridge(level, np.column_stack([x[some], y[some]]).astype(float), directions, half)
     return float(1.4826 * np.median(np.abs(ridge - np.median(ridge))))
 
 

@@ -274,8 +274,8 @@ def _wide_end(line: Floats, deep: Floats) -> int | None:
     behind = min(place + max(2, round(1.5 * most)), len(line) - 1)
     ahead = line[place] - line[behind]
     every = max(1, min(place, round(0.5 * most)))
-    ways = line[: place + 1 - every] - line[every : place + 1]
-    straight = ways @ ahead / np.maximum(np.hypot(*ways.T) * np.hypot(*ahead), 1e-9)
+    directions = line[: place + 1 - every] - line[every : place + 1]
+    straight = directions @ ahead / np.maximum(np.hypot(*directions.T) * np.hypot(*ahead), 1e-9)
     return place if float(straight.min()) < _HOOK_COSINE else None
 
 

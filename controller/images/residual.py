@@ -49,12 +49,12 @@ def check_residual(
     ground = background[window]
     body = np.zeros(window_image.shape[:2], dtype=bool)
     body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
-    same = _soft(contrast(window_image, ground, polarity))
+    soft_level = _soft(contrast(window_image, ground, polarity))
     level = 2.0 * silhouette.threshold
-    mass = float(same[body].sum())
+    mass = float(soft_level[body].sum())
     least = max(silhouette.noise_level, _WEAK_LEVEL * level)
     tips = skeleton.points_px[[0, -1]] - [low_x, low_y]
-    if _beyond_tips(same, body, tips, wide, least) > _PART * mass:
+    if _beyond_tips(soft_level, body, tips, wide, least) > _PART * mass:
         return FrameStatus.PART
     if ghosts and polarity is not Polarity.BOTH:
         least = max(silhouette.noise_level, _GHOST_WEAK * level)
@@ -87,10 +87,12 @@ def _gradient(image: DeepImage, places: Bools) -> Floats:
     return np.asarray(slopes, dtype=float)
 
 
-def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least: float) -> float:
+def _beyond_tips(
+    soft_level: DeepImage, body: Bools, tips: Floats, wide: float, least: float
+) -> float:
     """Summed contrast of residuals that start at a tip and lead away from the body."""
     distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
-    rest = (same > least) & (distance_px > 1.5)
+    rest = (soft_level > least) & (distance_px > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
     y, x = np.nonzero(rest)
     part = label[rest]
@@ -98,7 +100,7 @@ def _beyond_tips(same: DeepImage, body: Bools, tips: Floats, wide: float, least:
     for tip in tips:
         near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR_WIDTHS * wide + 2.0]] = True
     away = rest & (distance_px > _AWAY_WIDTHS * wide)
-    return float(same[away & near[label]].sum())
+    return float(soft_level[away & near[label]].sum())
 
 
 def _ghost(

@@ -151,7 +151,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
                 f"{start_heading_rad:g}: expected 0 to {min(body.limit_rad):g}, and at least 0"
             )
         self.limit_rad: Floats = np.array(body.limit_rad)
-        """(J,) what an action of 1 means."""
+        """(J,) angle of an action of 1."""
         self.action_space = spaces.Box(-1.0, 1.0, (body.joint_count,), dtype=np.float32)
         ends = np.repeat([np.pi, _LARGEST_SPEED_RAD_S, _CURRENT_A], body.joint_count)
         self._end = np.concatenate(
@@ -183,14 +183,14 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def view(self) -> BodyView:
-        """The body as it was measured last.
+        """The last measured state of the body.
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has begun.
 
         """
         if self._view is None:
-            raise gymnasium.error.ResetNeeded("call reset before a look at the body")
+            raise gymnasium.error.ResetNeeded("call reset before reading the body")
         return self._view
 
     def reset(

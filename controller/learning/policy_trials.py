@@ -53,7 +53,7 @@ class PolicyTrialResult:
     energy_j_m: float
     """Electrical energy of the motors, integrated in every physics step, for a metre of it."""
     course_rad: float
-    """Direction of that line; x is 0."""
+    """Heading of the measured line; x is 0."""
     slowed_to: float
     """Lowest rate of derating."""
     verdict: RunVerdict

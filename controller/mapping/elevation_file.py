@@ -125,7 +125,7 @@ _TURNS: Final = {
 }  # fmt: skip
 """Order and signs of the axes that turn one up, without mirroring."""
 _MESH_SAMPLES: Final = 200
-"""Along the longer side of a mesh whose spacing is not given (ours)."""
+"""Number of samples along the longer side of a mesh without a given spacing (ours)."""
 
 
 @dataclass(frozen=True, slots=True)

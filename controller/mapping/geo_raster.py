@@ -34,9 +34,9 @@ from snakewalk.controller.mapping.raster_file import (
 MOST_STRIPPED_CELLS: Final = 1_000_000_000
 """Most cells of a raster that is read in strips (ours)."""
 _MOST_CELLS: Final = 4 * MOST_SAMPLES
-"""Cells that are read at once: a finer spacing than two cells makes too many samples of more."""
+"""Largest number of cells that are read at once; more would make too many samples."""
 _STRIP_CELLS: Final = 2_000_000
-"""Read at once (ours)."""
+"""Largest number of cells in a window that is read at once (ours)."""
 _COARSER: Final = 2.0
 """Spacing of a map over a raster's from which strips are read (ours)."""
 _CACHE_BYTES: Final = 64_000_000
@@ -44,7 +44,7 @@ _CACHE_BYTES: Final = 64_000_000
 _COLOURS: Final = ("palette", "red", "green", "blue", "alpha", "hue", "cyan", "magenta")
 """Meanings of a band (GDAL's color interpretation) that exclude heights."""
 _DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
-"""Largest cell that may be one of degrees: a minute, 1.8 km (ours)."""
+"""Largest cell in degrees: a minute, 1.8 km (ours)."""
 
 
 def read_geo_raster(
@@ -113,11 +113,13 @@ def _read(
     if not (math.isclose(turn.b, 0.0) and math.isclose(turn.d, 0.0)):
         raise InputError(f"{file}: its rows do not run west to east: warp it north up")
     if units.cell is None and turn.is_identity and opened.crs is None:
-        raise InputError(f"{file}: says no size of its cells: --cell, between two samples")
+        raise InputError(
+            f"{file}: states no size of its cells; give --cell, the distance between two samples"
+        )
     unit = units.unit or _horizontal_unit(file, opened)
     dx, dy = (abs(turn.a), abs(turn.e)) if units.cell is None else (units.cell,) * 2
-    everything = slice(0, opened.height), slice(0, opened.width)
-    all_cells = _cells(file, opened, unit, (dx, dy), everything)
+    full_window = slice(0, opened.height), slice(0, opened.width)
+    all_cells = _cells(file, opened, unit, (dx, dy), full_window)
     rows, columns = raster_window(
         file, opened.shape, all_cells.dx_m, all_cells.dy_m, crop, turn.e < 0.0, MOST_STRIPPED_CELLS
     )
@@ -180,10 +182,10 @@ class _Strips:
             row_of = row_of[::-1]
         samples = int(row_of.max()) + 1, int(column_of.max()) + 1
         if samples[0] * samples[1] > MOST_SAMPLES:
-            enough_m = spacing_m * math.sqrt(samples[0] * samples[1] / MOST_SAMPLES)
+            coarse_m = spacing_m * math.sqrt(samples[0] * samples[1] / MOST_SAMPLES)
             raise InputError(
                 f"{self._opened.name}: {samples[1]} by {samples[0]} samples are over "
-                f"{MOST_SAMPLES}; use a --spacing of {enough_m:.3g} m of the file or more, or "
+                f"{MOST_SAMPLES}; use a --spacing of {coarse_m:.3g} m of the file or more, or "
                 "--crop a part"
             )
         out = np.full(samples, np.nan)
@@ -300,8 +302,10 @@ def _height_unit(
         )
     stated = band or vertical
     if stated is not None:
-        same = horizontal == stated
-        return stated, [] if same and stated == "m" else [f"heights are in {stated}, as it states"]
+        are_equal = horizontal == stated
+        return stated, [] if are_equal and stated == "m" else [
+            f"heights are in {stated}, as it states"
+        ]
     if horizontal in (DEGREE, "m"):
         return "m", ["the file states no unit of heights: metres"]
     raise InputError(

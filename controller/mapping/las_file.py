@@ -196,7 +196,7 @@ def _read(
         else (corner + np.array(window[:2]), corner + np.array(window[2:]))
     )
     counts_by_class: dict[int, int] = {}
-    withheld = 0
+    withheld_count = 0
     kept = []
     total = 0
     kept_count = 0
@@ -205,8 +205,8 @@ def _read(
         points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
         kinds = np.asarray(chunk.classification)
         kept_count += len(points)
-        held_back = np.asarray(chunk.withheld, dtype=bool)
-        withheld += int(held_back.sum())
+        held_back = np.asarray(chunk.withheld_count, dtype=bool)
+        withheld_count += int(held_back.sum())
         inside = ~held_back & ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
         for kind, number in zip(*np.unique(kinds[inside], return_counts=True), strict=True):
             counts_by_class[int(kind)] = counts_by_class.get(int(kind), 0) + int(number)
@@ -226,8 +226,8 @@ def _read(
     if kept_count < count:
         raise InputError(f"states {count} points, and holds {kept_count}")
     notes = _class_notes(counts_by_class, classes, bool(ground), len(points))
-    if withheld:
-        notes.append(f"{withheld} withheld points are left out")
+    if withheld_count:
+        notes.append(f"{withheld_count} withheld points are left out")
     return points, notes
 
 

@@ -54,7 +54,7 @@ class RasterUnits:
     height_step: float | None = None
     """Height of a step of one of the file's values, in the unit; needed of pictures."""
     no_data: float | None = None
-    """Value of cells that hold nothing, besides those that the file declares."""
+    """Value of empty cells, in addition to the file's own."""
     height_unit: str | None = None
     """Unit of heights, a name in ``UNITS_M``; None: the file's, or else ``unit``."""
 
@@ -75,9 +75,13 @@ def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Rast
     else:
         values = _picture(file) if ending == ".png" else _array(file)
     if ending == ".png" and units.height_step is None:
-        raise InputError(f"{file}: a picture says no heights: --height-step, of one grey level")
+        raise InputError(
+            f"{file}: a picture states no heights; give --height-step, the height of one grey level"
+        )
     if units.cell is None:
-        raise InputError(f"{file}: says no size of its cells: --cell, between two samples")
+        raise InputError(
+            f"{file}: states no size of its cells; give --cell, the distance between two samples"
+        )
     if units.unit == DEGREE:
         raise InputError(
             f"{file}: states no latitude, so degrees cannot be converted to lengths; add --unit m"

@@ -227,10 +227,10 @@ def rectify(calibration: StereoCalibration, left: Image, right: Image) -> Rectif
                 f"centre is ({k[0, 2]:.0f}, {k[1, 2]:.0f}): it is of pictures of another size"
             )
     ideal = not (c.distortion_left.any() or c.distortion_right.any() or c.translation_m[1:].any())
-    same = np.allclose(np.delete(c.k_left, 2), np.delete(c.k_right, 2)) and np.isclose(
+    are_equal = np.allclose(np.delete(c.k_left, 2), np.delete(c.k_right, 2)) and np.isclose(
         c.k_left[0, 0], c.k_left[1, 1]
     )
-    if ideal and same and np.allclose(c.rotation, np.eye(3)):
+    if ideal and are_equal and np.allclose(c.rotation, np.eye(3)):
         offset_px = float(c.k_right[0, 2] - c.k_left[0, 2])
         centre = float(c.k_left[0, 2]), float(c.k_left[1, 2])
         is_visible = np.ones((rows, columns), bool)

@@ -16,10 +16,10 @@ def draw_terrain_map(relief: Relief, file: Path, title: str) -> None:
     """Draw a map: hatched where unknown, blue where a path may go."""
     ground = relief.ground
     w, h = ground.size_m
-    wide_in = WIDTH_IN
+    index_width = WIDTH_IN
     with style():
-        tall_in = float(np.clip(0.8 * wide_in * h / w, 3.0, 8.5)) + 1.2
-        figure = Figure(figsize=(wide_in, tall_in), layout="constrained", dpi=110)
+        tall_in = float(np.clip(0.8 * index_width * h / w, 3.0, 8.5)) + 1.2
+        figure = Figure(figsize=(index_width, tall_in), layout="constrained", dpi=110)
         axes = figure.subplots(1, 1)
         draw_ground(axes, ground)
         mesh_m = np.meshgrid(*ground.axes_m)

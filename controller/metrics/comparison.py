@@ -33,7 +33,7 @@ class Difference:
     """Whether it has a tolerance; else it is reported only."""
 
     @property
-    def same(self) -> bool:
+    def is_equal(self) -> bool:
         """Whether every row agrees."""
         return self.first_s is None
 
@@ -48,19 +48,19 @@ class Comparison:
     differences: tuple[Difference, ...]
 
     @property
-    def same(self) -> bool:
+    def is_equal(self) -> bool:
         """Whether the replay equals the original within the tolerances."""
-        return self.cycles[0] == self.cycles[1] and all(d.same for d in self.differences)
+        return self.cycles[0] == self.cycles[1] and all(d.is_equal for d in self.differences)
 
     @property
     def identical(self) -> bool:
         """Whether no digit differs."""
-        return self.same and all(d.largest == 0.0 for d in self.differences)
+        return self.is_equal and all(d.largest == 0.0 for d in self.differences)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
-            "same": self.same,
+            "same": self.is_equal,
             "identical": self.identical,
             "same_config": self.same_config,
             "cycles": list(self.cycles),
@@ -86,7 +86,7 @@ class Comparison:
             head += "; the configurations differ"
         if self.identical:
             return (f"{head}: the replay is the same to the last digit of the log",)
-        order = sorted(self.differences, key=lambda d: np.inf if d.same else (d.first_s or 0.0))
+        order = sorted(self.differences, key=lambda d: np.inf if d.is_equal else (d.first_s or 0.0))
         return (head, *(_line(d) for d in order))
 
 
@@ -146,7 +146,7 @@ def _difference(
 def _line(d: Difference) -> str:
     if d.largest == 0.0:
         return f"{d.name}: same in {d.rows} rows"
-    if d.same:
+    if d.is_equal:
         judged = "within its tolerance" if d.decides else "not judged"
         return f"{d.name}: {judged}; {d.largest:.3g} at most, {d.rms:.3g} RMS"
     where = f", {d.first_name}" if d.first_name else ""

@@ -219,8 +219,8 @@ def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
     bears = np.array([shape != "none" for shape in header.robot.link_shapes])
     touches = bears & (links[:-1, :, 2] < radius_m + CLEAR_M)
     slid_m = float((across * touches).sum()) / links.shape[1]
-    gone_m = float(np.linalg.norm((centre[-1] - centre[0])[:2]))
-    return slid_m / gone_m if gone_m > 1e-3 else float("nan")
+    displacement_m = float(np.linalg.norm((centre[-1] - centre[0])[:2]))
+    return slid_m / displacement_m if displacement_m > 1e-3 else float("nan")
 
 
 def _link_rotations(robot: RobotConfig, head: Floats, joint_rad: Floats) -> Floats:

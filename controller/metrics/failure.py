@@ -120,7 +120,7 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
 
 
 def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
-    """Distance that the body moved otherwise than along itself, and how steep the ground falls.
+    """Distance that the body moved across itself, and slope of the ground in this direction.
 
     The slope is the mean under the body's centre, over a quarter of its length in the direction of
     the slide; 0 without a ground.

@@ -60,12 +60,12 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     """
     step = np.diff(path_m, axis=0)
     length = np.hypot(*step.T)
-    keep = length > 1e-9
-    if not keep.any():
+    has_length = length > 1e-9
+    if not has_length.any():
         return np.asarray(np.hypot(*(points_m - path_m[0]).T))
-    a = path_m[:-1][keep]
-    step = step[keep]
-    length = length[keep]
+    a = path_m[:-1][has_length]
+    step = step[has_length]
+    length = length[has_length]
     end = np.cumsum(length)
     t = np.einsum("nmi,mi->nm", points_m[:, None] - a, step) / length**2
     low = np.zeros(len(a))

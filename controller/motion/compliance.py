@@ -48,9 +48,9 @@ class Compliance:
         if len(self._scale):
             wanted_rad = self._scaled_yield(goal_rad, load_a, state.valid, dt_s)
         else:
-            keep = self._remaining_share(dt_s)
+            share = self._remaining_share(dt_s)
             rest_rad = load_a / config.stiffness_a_rad
-            wanted_rad = keep * self._yield_rad + (1.0 - keep) * rest_rad
+            wanted_rad = share * self._yield_rad + (1.0 - share) * rest_rad
         wanted_rad = np.clip(wanted_rad, -config.yield_limit_rad, config.yield_limit_rad)
         # prevents wind-up beyond a joint limit
         wanted_rad = np.clip(
@@ -77,9 +77,9 @@ class Compliance:
         windows = len(self._scale)
         push = np.bincount(self._window, bends_rad * load_a, windows)
         square = np.bincount(self._window, bends_rad * bends_rad, windows) + _STRAIGHT_WINDOW_RAD**2
-        keep = self._remaining_share(dt_s)
+        share = self._remaining_share(dt_s)
         rest = push / (square * self._config.stiffness_a_rad)
-        self._scale = np.clip(keep * self._scale + (1.0 - keep) * rest, -1.0, 1.0)
+        self._scale = np.clip(share * self._scale + (1.0 - share) * rest, -1.0, 1.0)
         return np.where(self._yields, goal_rad * self._scale[self._window], 0.0)
 
 

@@ -43,11 +43,11 @@ class Part:
 
     @property
     def time_s(self) -> float:
-        """Time until it has settled."""
+        """Time until the change has settled."""
         return SETTLE / min(self.gain, self.clock_gain)
 
     def begin(self, cpg: Cpg) -> None:
-        """Set it as the target of the oscillators."""
+        """Set the gait as the target of the oscillators."""
         cpg.set_pattern(self.pattern, self.gain, self.clock_gain)
 
 

@@ -61,12 +61,12 @@ class GaitMotion(MotionWrapper):
 
     @property
     def done(self) -> bool:
-        """Whether it rests after ``stop`` or its duration."""
+        """Whether the motion rests after ``stop`` or its duration."""
         return self._stop_profile.over
 
     @property
     def stopping(self) -> bool:
-        """Whether it is coming to rest, or rests."""
+        """Whether the motion is coming to rest, or rests."""
         return self._stop_profile.begun
 
     def change(self, **values: Any) -> float:

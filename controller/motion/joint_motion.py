@@ -87,7 +87,8 @@ def radians(where: str, angles: Floats, unit: str | None, hint: str) -> Floats:
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
     likely = "deg" if largest > 2.0 * np.pi else "rad"
     raise InputError(
-        f"{where} states no unit of angles, which go to {largest:.3g}; say --unit {likely} ({hint})"
+        f"{where} states no unit of angles, which go to {largest:.3g}; "
+        f"give --unit {likely} ({hint})"
     )
 
 
@@ -158,7 +159,7 @@ def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion
         )
     time_s = motion.time_s[is_complete]
     if len(time_s) < 2:
-        raise InputError(f"{where}: {len(time_s)} whole rows of joint angles; a motion needs 2")
+        raise InputError(f"{where}: {len(time_s)} complete rows of joint angles; a motion needs 2")
     step_s = np.diff(time_s)
     usual_s = float(np.median(step_s))
     missing = int(np.rint(step_s / usual_s - 1.0).clip(0).sum())
@@ -191,20 +192,21 @@ def _by_number(names: Sequence[str], joint_names: Sequence[str], where: str) -> 
             a mapping.
 
     """
-    theirs, ours = _by_stem(names), _by_stem(joint_names)
-    if len(theirs) == 1:
-        return dict(zip(joint_names, *theirs.values(), strict=True))
+    file_name, joint_name = _by_stem(names), _by_stem(joint_names)
+    if len(file_name) == 1:
+        return dict(zip(joint_names, *file_name.values(), strict=True))
     pairs = {
         joint: name
-        for stem, joints in ours.items()
-        for other, file_names in theirs.items()
+        for stem, joints in joint_name.items()
+        for other, file_names in file_name.items()
         if len(joints) == len(file_names) and _words(stem) & _words(other)
         for joint, name in zip(joints, file_names, strict=True)
     }
-    if len(theirs) == len(ours) and sorted(pairs.values()) == sorted(names):
+    if len(file_name) == len(joint_name) and sorted(pairs.values()) == sorted(names):
         return pairs
     options = " ".join(
-        f"--joint {ours}={theirs}" for ours, theirs in zip(joint_names, names, strict=True)
+        f"--joint {joint_name}={file_name}"
+        for joint_name, file_name in zip(joint_names, names, strict=True)
     )
     raise InputError(
         f"{where}: the names of its joints do not state their order on the body; in the order of "
@@ -237,13 +239,15 @@ def onto_robot(
     """
     joint_names = robot.joint_names
     names = motion.names
-    for ours, theirs in asked.items():
-        if ours not in joint_names:
-            raise InputError(f"--joint {ours}={theirs}: {robot.name} has {', '.join(joint_names)}")
-        if theirs not in (*names, REST):
-            raise InputError(f"--joint {ours}={theirs}: {where} has {', '.join(names)}")
+    for joint_name, file_name in asked.items():
+        if joint_name not in joint_names:
+            raise InputError(
+                f"--joint {joint_name}={file_name}: {robot.name} has {', '.join(joint_names)}"
+            )
+        if file_name not in (*names, REST):
+            raise InputError(f"--joint {joint_name}={file_name}: {where} has {', '.join(names)}")
     pairs = {name: asked.get(name, name) for name in joint_names}
-    lost = [name for name, theirs in pairs.items() if theirs not in (*names, REST)]
+    lost = [name for name, file_name in pairs.items() if file_name not in (*names, REST)]
     source = "name"
     if lost and not asked and len(lost) == len(joint_names) == len(names):
         pairs = _by_number(names, joint_names, where)
@@ -257,10 +261,10 @@ def onto_robot(
         )
     zeros = np.zeros(len(motion.time_s))
     columns = [
-        zeros if theirs == REST else motion.joint_rad[:, names.index(theirs)]
-        for theirs in (pairs[name] for name in joint_names)
+        zeros if file_name == REST else motion.joint_rad[:, names.index(file_name)]
+        for file_name in (pairs[name] for name in joint_names)
     ]
-    listed = ", ".join(f"{ours} = {theirs}" for ours, theirs in pairs.items())
+    listed = ", ".join(f"{joint_name} = {file_name}" for joint_name, file_name in pairs.items())
     lines = [f"joints by {source}: {listed}"]
     unused = [name for name in names if name not in pairs.values()]
     if unused:

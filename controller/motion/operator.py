@@ -96,14 +96,16 @@ class Operator(MotionWrapper):
         for key in keys[:_KEYS_MAX]:
             self._press(key)
         if len(keys) > _KEYS_MAX:
-            self._refuse(f"{len(keys)} keys at once; only the first {_KEYS_MAX} are carried out")
+            self._refuse(f"{len(keys)} keys at once; only the first {_KEYS_MAX} count")
         self._refusals.step(self._time_s)
         change = dt_s / HALT_S
         before = self._rate
         is_enabled_now = self._held()
         if is_enabled_now != self._was_held:
             self._was_held = is_enabled_now
-            self._report("held: it moves" if is_enabled_now else "let go: it stands in its shape")
+            self._report(
+                "held: it moves" if is_enabled_now else "button released: the body holds its shape"
+            )
         halted = self._halted and not self.motion.stopping
         target = 0.0 if halted or not is_enabled_now else 1.0
         self._rate += min(max(target - self._rate, -change), change)
@@ -149,7 +151,7 @@ class Operator(MotionWrapper):
                 self._report(f"{name} = {text} is outside {span.low:g} to {span.high:g}")
             self._set_parameter(name, value)
         else:
-            self._refuse(f"{name}={text}: no number for a parameter of this gait")
+            self._refuse(f"{name}={text}: is not a number for a parameter of this gait")
 
     def _nudge(self, name: str, sign: float) -> None:
         step = sign * self._ranges()[name].step

@@ -90,7 +90,7 @@ class PartedRecording:
 
     @property
     def done(self) -> bool:
-        """Whether it has been played."""
+        """Whether the recording has been played."""
         return self._at == len(self._parts) - 1 and self._parts[-1].done
 
     def goal_rad(self) -> Floats:

@@ -89,7 +89,7 @@ class Layer(Strict):
         description="weights of the network, one row for each output"
     )
     """(outputs, inputs) weights of the layer."""
-    bias: tuple[float, ...] = Field(description="one for each output")
+    bias: tuple[float, ...] = Field(description="biases, one for each output")
     """(outputs,) biases of the layer."""
 
 
@@ -112,7 +112,9 @@ class Policy(Strict):
     observation: tuple[str, ...] = Field((), description="names of the network's inputs")
     origin: Origin
     wave: PolicyWave = PolicyWave()
-    network: tuple[Layer, ...] = Field((), description="changes the wave; without it, it stays")
+    network: tuple[Layer, ...] = Field(
+        (), description="network that changes the wave; default: the wave stays the same"
+    )
 
     @model_validator(mode="after")
     def _layers_fit(self) -> Self:

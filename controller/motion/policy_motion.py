@@ -77,7 +77,7 @@ class PolicyMotion:
 
     @property
     def done(self) -> bool:
-        """Whether it rests after its duration."""
+        """Whether the motion rests after its duration."""
         return self._stop_profile.over
 
     def goal_rad(self) -> Floats:

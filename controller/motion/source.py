@@ -50,7 +50,7 @@ class MotionSource(Protocol):
 
     @property
     def done(self) -> bool:
-        """Whether it has ended and rests."""
+        """Whether the motion has ended and rests."""
         ...
 
     def goal_rad(self) -> Floats:

@@ -14,7 +14,7 @@ class StopProfile:
     def __init__(self) -> None:
         self._since_stop_s: float | None = None
         """Time since ``stop``; it runs backwards after ``go_on``."""
-        self._goes_on = False
+        self._is_resuming = False
 
     @property
     def begun(self) -> bool:
@@ -23,7 +23,7 @@ class StopProfile:
 
     @property
     def over(self) -> bool:
-        """Whether it rests."""
+        """Whether the motion rests."""
         return self._since_stop_s is not None and self._since_stop_s >= STOP_S
 
     @property
@@ -37,24 +37,24 @@ class StopProfile:
 
     def stop(self) -> None:
         """Slow down from now on."""
-        self._goes_on = False
+        self._is_resuming = False
         if self._since_stop_s is None:
             self._since_stop_s = 0.0
 
     def go_on(self) -> None:
         """Return to full rate from now on."""
-        self._goes_on = self._since_stop_s is not None
+        self._is_resuming = self._since_stop_s is not None
 
     def step(self, dt_s: float) -> float:
         """Advance by ``dt_s``; return the advance of the motion's own time, s."""
         if self._since_stop_s is None:
             return dt_s
         before = self.rate
-        if self._goes_on:
+        if self._is_resuming:
             self._since_stop_s = min(self._since_stop_s, STOP_S) - dt_s
             if self._since_stop_s <= 0.0:
                 self._since_stop_s = None
-                self._goes_on = False
+                self._is_resuming = False
         else:
             self._since_stop_s += dt_s
         return 0.5 * (before + self.rate) * dt_s

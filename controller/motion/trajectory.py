@@ -135,7 +135,7 @@ def _checked_trajectory(given: JointTrajectory) -> JointTrajectory:
             "velocities and accelerations, or none at all"
         )
     if not 0 < len(time_s) <= POINTS_MAX:
-        raise InputError(f"trajectory: {len(time_s)} points; 1 to {POINTS_MAX} are taken")
+        raise InputError(f"trajectory: {len(time_s)} points; 1 to {POINTS_MAX} are accepted")
     if not (np.isfinite(time_s).all() and (np.diff(time_s) > 0.0).all() and time_s[0] >= 0.0):
         raise InputError("trajectory: time_from_start must grow from point to point, from 0 on")
     _, velocity, acceleration = values
@@ -145,14 +145,14 @@ def _checked_trajectory(given: JointTrajectory) -> JointTrajectory:
     if velocity is None and acceleration is not None:
         raise InputError("trajectory: has accelerations but no velocities; add velocities")
     if velocity is not None and np.abs(velocity[-1]).max() > _REST_SPEED_RAD_S:
-        raise InputError("trajectory: its last point is its end: the velocities there must be 0")
+        raise InputError("trajectory: the velocities of its last point must be 0")
     return JointTrajectory(given.joints, time_s, *values)  # type: ignore[arg-type]
 
 
 def _without_first_point(given: JointTrajectory, angle_rad: Floats) -> JointTrajectory:
     """Drop a first point at 0 s, if the named joints (K,) are there."""
     if len(given.time_s) == 1:
-        raise InputError("trajectory: its only point is at 0 s; say by when it is to be reached")
+        raise InputError("trajectory: its only point is at 0 s; give it a time above 0")
     away = np.abs(given.position_rad[0] - angle_rad)
     worst = int(np.argmax(away))
     if away[worst] > START_RAD:

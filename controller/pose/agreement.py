@@ -14,7 +14,7 @@ from snakewalk.controller.pose.motion_history import Moment
 from snakewalk.controller.pose.tracked_body import HeadMeasurement
 
 WINDOW_S: Final = 4.0
-"""Time that is compared at once, one to two waves of a walk (ours)."""
+"""Duration of a comparison, one to two waves of a walk (ours)."""
 LEAST_S: Final = 2.5
 """Least time that is compared."""
 SAMPLE_S: Final = 0.04
@@ -43,7 +43,7 @@ reckoning knows no hills, and single windows of sound sources have 0.57 to 1.75.
 TURNED_DEG: Final = 45.0
 """Direction of the swing beyond which the frame is turned (ours)."""
 UNIT: Final = 20.0
-"""A swing that is this many times larger than expected has another unit (ours)."""
+"""Least ratio of measured to expected swing that shows another unit (ours)."""
 WINDOWS: Final = 5
 """Windows before the scale is judged on hills, or its accuracy stated (ours)."""
 ENDS: Final = 8
@@ -78,7 +78,7 @@ class Agreement:
 
     @property
     def fault(self) -> str | None:
-        """How the source contradicts the joints; None while it does not."""
+        """Contradiction between source and joints; None while they agree."""
         if self._named is not None and self._doubt_s >= NAMED_S and not self.has_agreed:
             return self._named
         if self._doubt_s < DOUBT_S:
@@ -148,17 +148,17 @@ class Agreement:
 
     def _judge(self) -> None:
         columns = (np.array(column) for column in zip(*self._rows, strict=True))
-        times, measured_m, measured_rad, reckoned_m, reckoned_rad = columns
+        times, measured_m, measured_rad, predicted_m, predicted_rad = columns
         line = np.column_stack([np.ones(len(times)), times - times.mean()])
-        expected = _detrended_values(np.unwrap(reckoned_rad), line)
+        expected = _detrended_values(np.unwrap(predicted_rad), line)
         turns = _detrended_values(np.unwrap(measured_rad), line)
         if float(np.sqrt(np.mean(expected**2))) < LEAST_TURN_RAD:
             return
         share = float(turns @ expected / (expected @ expected))
         related = float(expected @ turns) / _size(expected, turns)
-        off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(reckoned_rad))
+        off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(predicted_rad))
         slow_rad = off_rad - _detrended_values(off_rad, line)
-        steps = np.diff(reckoned_m) * np.exp(1j * slow_rad[:-1])
+        steps = np.diff(predicted_m) * np.exp(1j * slow_rad[:-1])
         way_m = np.concatenate([[0.0], np.cumsum(steps)])
         swing = _detrended_values(way_m, line)
         if self._is_level and times[-1] - self._summed_s >= WINDOW_S:
@@ -215,8 +215,8 @@ class _Row(NamedTuple):
     time_s: float
     measured_m: complex
     measured_rad: float
-    reckoned_m: complex
-    reckoned_rad: float
+    predicted_m: complex
+    predicted_rad: float
 
 
 def _mirrored_swing(related: float, shape: Floats, swing: Floats) -> str | None:

@@ -182,7 +182,7 @@ class ExternalPose:
         """Poses that arrived, that were used, that never arrived, that were rejected; restarts of
         the sender; and slides after which poses were used again."""
 
-    def keep(self, early: list[ArrivedPose]) -> None:
+    def store_poses(self, early: list[ArrivedPose]) -> None:
         """Accept poses that arrived before the first joint state."""
         self._early += early
 

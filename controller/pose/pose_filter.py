@@ -258,8 +258,8 @@ def _turn_between(first: Floats, two: Floats) -> float:
 def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Return the gain (3, 3) of a measurement, and the covariance after it."""
     gain = prior @ np.linalg.inv(prior + noise)
-    keep = np.eye(3) - gain
-    after = keep @ prior @ keep.T + gain @ noise @ gain.T
+    remainder = np.eye(3) - gain
+    after = remainder @ prior @ remainder.T + gain @ noise @ gain.T
     return gain, 0.5 * (after + after.T)
 
 

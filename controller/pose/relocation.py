@@ -26,7 +26,7 @@ STEP_SD: Final = 5.0
 """Noise of two poses that may add to a step, in standard deviations (ours)."""
 SETTLED_S: Final = 1.0
 LEAST: Final = 5
-"""The poses of this time must agree with the joints, at least this many (ours)."""
+"""Time, and least number of poses in it, that must agree with the joints (ours)."""
 SETTLED_M: Final = 0.05
 SETTLED_RAD: Final = 0.2
 SETTLED_SD: Final = 5.0

@@ -95,8 +95,10 @@ class SimulatedTracker:
         drawn = deviation * self._rng.standard_normal(6)
         if config.correlation_s == 0.0:
             return drawn
-        keep = np.exp(-1.0 / (config.rate_hz * config.correlation_s)) if self._sequence else 0.0
-        self._noise = keep * self._noise + np.sqrt(1.0 - keep * keep) * drawn
+        correlation = (
+            np.exp(-1.0 / (config.rate_hz * config.correlation_s)) if self._sequence else 0.0
+        )
+        self._noise = correlation * self._noise + np.sqrt(1.0 - correlation * correlation) * drawn
         return self._noise
 
     def _begins(self, every_s: float) -> bool:

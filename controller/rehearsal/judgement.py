@@ -28,7 +28,7 @@ class Judgement:
     truly_reached: int
     """Waypoints that the body truly came to, in order, within their radius and 2 cm."""
     reached_as_stated: int
-    """The same within their radius and the accuracy that the run states."""
+    """Waypoints truly reached within their radius and the accuracy that the run states."""
     closest_m: tuple[float, ...]
     """Least distance of the true body from each waypoint, after the waypoint before."""
     verdict: str
@@ -170,8 +170,8 @@ def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
 def _off_path_m(truth: Truth, record: RunRecord) -> Floats:
     """Distance (n,) of the true body from the nearest of the run's paths."""
     centre_m = truth.centre_m[:: _stride(truth), :2]
-    anywhere = np.full(len(centre_m), np.nan)
-    off = [distance_m(centre_m, path_m[:, :2], anywhere) for _, path_m in record.paths]
+    unknown_along_m = np.full(len(centre_m), np.nan)
+    off = [distance_m(centre_m, path_m[:, :2], unknown_along_m) for _, path_m in record.paths]
     return np.asarray(np.min(off, axis=0))
 
 

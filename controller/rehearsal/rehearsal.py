@@ -270,7 +270,7 @@ def generator(seed: int) -> np.random.Generator:
 
 
 def moved(start: Place, rng: np.random.Generator) -> Place:
-    """Draw where the robot truly is laid down; the run does not know it."""
+    """Draw the true start pose of the robot, which the run does not know."""
     moved_m = START_SD_M * rng.standard_normal(2)
     turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
     return replace(

@@ -199,4 +199,4 @@ class Wandering:
                 return places_m[:count]
             tried = corner + self._random.random((count + 8, 2)) * 0.8 * np.array(ground.size_m)
             places_m = np.concatenate([places_m, tried[self._safe(tried)]])
-        raise InputError(f"a ground that is nowhere under {STEEP_RAD:g} rad: no place to go to")
+        raise InputError(f"a ground that is nowhere under {STEEP_RAD:g} rad: no destination exists")

@@ -27,11 +27,11 @@ class SegmentCycle:
     done = False
 
     def __init__(self, segment: Segment, robot: RobotConfig) -> None:
-        self._once = segment.kind == "brake"
-        end = segment.goal_rad[-1:] if self._once else segment.goal_rad[:1]
+        self._plays_once = segment.kind == "brake"
+        end = segment.goal_rad[-1:] if self._plays_once else segment.goal_rad[:1]
         goals = np.concatenate([segment.goal_rad, end])
         time_s = segment.frame_s * np.arange(len(goals))
-        if self._once:
+        if self._plays_once:
             self._spline = CubicSpline(time_s, goals, bc_type=("not-a-knot", "clamped"))
         else:
             self._spline = CubicSpline(time_s, goals, bc_type="periodic")
@@ -50,12 +50,12 @@ class SegmentCycle:
 
     @property
     def cycles(self) -> float:
-        """Gone through so far."""
+        """Time of the segment so far."""
         return self.gone_s / self.duration_s
 
     @property
     def _at_s(self) -> float:
-        if self._once:
+        if self._plays_once:
             return min(self.gone_s, self.duration_s)
         return self.gone_s % self.duration_s
 
@@ -64,7 +64,7 @@ class SegmentCycle:
         return np.asarray(self._spline(self._at_s), dtype=float)
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) present speeds of the goals."""
         return np.asarray(self._spline(self._at_s, 1), dtype=float)
 
     def pace(self) -> Pace:
@@ -102,12 +102,12 @@ class RepertoireMotion(MotionWrapper):
 
     @property
     def done(self) -> bool:
-        """Whether it has come to rest."""
+        """Whether the motion has come to rest."""
         return self._stop_profile.over
 
     @property
     def stopping(self) -> bool:
-        """Whether it is coming to rest, or has."""
+        """Whether the motion is coming to rest, or rests."""
         return self._stop_profile.begun
 
     def stop(self) -> None:
@@ -115,7 +115,7 @@ class RepertoireMotion(MotionWrapper):
         self._stop_profile.stop()
 
     def velocity_rad_s(self) -> Floats:
-        """(J,) how fast they move now."""
+        """(J,) present speeds of the goals."""
         return self._stop_profile.rate * self._switch.velocity_rad_s()
 
     def pace(self) -> Pace:

@@ -202,7 +202,7 @@ class SearchCost:
 
     @property
     def physics_search_s(self) -> float:
-        """Extrapolated: all candidates at the price of those that were run."""
+        """Time to simulate all candidates, extrapolated from the simulated ones."""
         return self.candidates * self.physics_candidate_s
 
     def to_dict(self) -> dict[str, object]:

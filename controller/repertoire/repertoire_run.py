@@ -136,7 +136,7 @@ class RouteMotion(MotionWrapper):
 
 
 def start_heading_rad(run: RunConfig) -> float:
-    """As given, or towards the first waypoint."""
+    """Start heading of the run, or else the direction of the first waypoint."""
     if run.start_heading_rad is not None:
         return run.start_heading_rad
     x, y = np.subtract(run.waypoints_m[0], run.start_m)

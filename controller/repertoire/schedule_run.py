@@ -101,7 +101,7 @@ class ScheduleRun(PathlessRun):
         return self.robot.length_m / self.repertoire.length_m
 
     def controller(self) -> SecondaryController:
-        """Return a fresh one, for this body's size."""
+        """Return a new motion for this body's size."""
         return SecondaryController(
             self.repertoire,
             scale=self.scale,
@@ -172,7 +172,7 @@ class ScheduleRun(PathlessRun):
 
 @dataclass(frozen=True, slots=True)
 class PlayedAction:
-    """One action, as it was chosen and as the body made it."""
+    """One chosen action, and its measured motion."""
 
     begin_s: float
     action: int
@@ -214,7 +214,7 @@ class ScheduleMotion(MotionWrapper):
         return self._prepared.repertoire.segments[action].name
 
     def _choose(self, view: BodyView) -> int:
-        assert self._begun is not None, "an action is under way"
+        assert self._begun is not None, "an action is being played"
         begin_s, before, requested, pose = self._begun
         now = _pose(view)
         segment = self._prepared.repertoire.segments[before]

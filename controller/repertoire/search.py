@@ -112,18 +112,18 @@ def search(
             first = int(np.argmin(np.where(done, level.time_s, np.inf)))
             if best is None or level.time_s[first] < best[0].time_s[best[1]]:
                 best = level, first
-        going = ~done
+        is_open = ~done
         if best is not None:
-            going &= cost[order] < best[0].time_s[best[1]]
-        if not going.any():
+            is_open &= cost[order] < best[0].time_s[best[1]]
+        if not is_open.any():
             break
-        level = level.only(np.flatnonzero(going))
+        level = level.only(np.flatnonzero(is_open))
     return _backtracked_route(*(best or (level, 0)), candidates)
 
 
 @dataclass(frozen=True, slots=True)
 class _SequenceLevel:
-    """Sequences of one length, and the level that they go on from."""
+    """Sequences of one length, and the level that they continue."""
 
     pose: Floats
     """(n, 3) poses at the ends of the sequences."""
@@ -135,7 +135,7 @@ class _SequenceLevel:
     parent: Ints
     """(n,) in ``before``."""
     action: Ints
-    """(n,) that led here."""
+    """(n,) actions that lead to this state."""
 
     def only(self, which: Ints) -> "_SequenceLevel":
         return _SequenceLevel(

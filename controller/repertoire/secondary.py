@@ -41,7 +41,7 @@ class SecondaryController:
 
         """
         if patience is not None and patience < 1:
-            raise ValueError("a patience of at least one cycle")
+            raise ValueError("patience must be at least one cycle")
         segments = repertoire.segments
         self._names = [segment.name for segment in segments]
         self._kinds = np.array([segment.kind for segment in segments])
@@ -62,7 +62,7 @@ class SecondaryController:
         back_m_s = -steady_m_s[self._direction[self._steady] < 0]
         self._slowest_back_m_s = float(back_m_s.min(initial=np.inf))
         self._duration_s = np.array([segment.duration_s for segment in segments])
-        self._owed: Ints = np.zeros(len(segments), dtype=np.int64)
+        self._owed_cycles: Ints = np.zeros(len(segments), dtype=np.int64)
         self._patience = patience
         self._random = np.random.default_rng(seed)
         self._last: int | None = None
@@ -70,7 +70,7 @@ class SecondaryController:
 
     def nearest(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
         """Return the nearest segment in the direction of the speed: by turn, then by speed."""
-        options = self._going(self._requested_direction(speed_m_s))
+        options = self._segments_of_direction(self._requested_direction(speed_m_s))
         off = np.abs(self._turn_rad_s[options] - turn_rad_s)
         near = options[off <= off.min() + _ALIKE * np.abs(self._turn_rad_s).max()]
         return int(near[np.argmin(np.abs(self._speed_m_s[near] - speed_m_s))])
@@ -133,20 +133,20 @@ class SecondaryController:
     def _next_of_mixture(self, speed_m_s: float, turn_rad_s: float) -> int:
         """Return the segment that the mixture owes most cycles; ten in a row contain them all."""
         direction = self._requested_direction(speed_m_s)
-        options = self._going(direction)
+        options = self._segments_of_direction(direction)
         asked = np.array([speed_m_s, turn_rad_s])
         cycles, _ = self._mixtures[direction].best(asked)
-        self._owed[options] += cycles
+        self._owed_cycles[options] += cycles
         part = options[cycles > 0]
-        chosen = int(part[np.argmax(self._owed[part])])
-        self._owed[chosen] -= CYCLES
+        chosen = int(part[np.argmax(self._owed_cycles[part])])
+        self._owed_cycles[chosen] -= CYCLES
         return chosen
 
     @cached_property
     def _mixtures(self) -> dict[int, Mixtures]:
         """Mixtures of the segments of each direction."""
         rates = np.column_stack([self._speed_m_s, self._turn_rad_s])
-        options = {direction: self._going(direction) for direction in (1, 0, -1)}
+        options = {direction: self._segments_of_direction(direction) for direction in (1, 0, -1)}
         return {
             direction: Mixtures(rates[k], self._duration_s[k], self._slowest_m_s)
             for direction, k in options.items()
@@ -161,7 +161,7 @@ class SecondaryController:
             return 1
         return -1 if speed_m_s <= -0.5 * back_m_s else 0
 
-    def _going(self, direction: int) -> Indices:
+    def _segments_of_direction(self, direction: int) -> Indices:
         """Return the segments of a direction; else those that rest, else the slowest."""
         for sign in (direction, 0):
             options = self._steady[self._direction[self._steady] == sign]

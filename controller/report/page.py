@@ -35,7 +35,7 @@ class Section:
     image: str
     """Data URI."""
     is_folded: bool = False
-    """Whether it is shown at a click only: the curves have it as well."""
+    """Whether a click shows the figure: the curves contain the same data."""
 
 
 class Drawings(NamedTuple):
@@ -177,7 +177,7 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     torque = "" if n.peak_torque_n_m is None else f"{_fmt(n.peak_torque_n_m, 2)} N m"
     vetoes = _count(n.vetoes, "veto", "vetoes")
     missed = f"{n.missed_deadlines} of {n.cycles}"
-    took = f"in {_fmt(n.duration_s, 1)} s"
+    duration_text = f"in {_fmt(n.duration_s, 1)} s"
     tiles = [
         (
             "Waypoints",
@@ -230,7 +230,7 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
             )
         )
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
-        return [("Travelled", f"{_fmt(n.travelled_m, 2)} m", took), *tiles[5:]]
+        return [("Travelled", f"{_fmt(n.travelled_m, 2)} m", duration_text), *tiles[5:]]
     return tiles
 
 

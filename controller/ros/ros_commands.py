@@ -129,7 +129,7 @@ class CommandTopics:
             self._command(Refused(why), message.header.stamp, "joint goals")
             return
         if message.name and not message.position:
-            why = "joint goals: no positions; velocities and efforts alone are not taken"
+            why = "joint goals: no positions; velocities and efforts alone are not accepted"
             self._command(Refused(why), None, "joint goals")
             return
         goals = JointGoals(list(message.name), list(message.position))
@@ -150,7 +150,7 @@ class CommandTopics:
             self._command(Refused(why), stamp, "trajectory")
             return
         if len(points) > POINTS_MAX:
-            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are taken"
+            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are accepted"
             self._command(Refused(why), stamp, "trajectory")
             return
         times = [point.time_from_start for point in points]

@@ -206,7 +206,7 @@ class RobotNode:
     def end(self) -> None:
         """Say how the run ended."""
         if self._button is not None and self._button.end is None:
-            self._said[_RUN] = ERROR, "the run is gone without a word: is torque off?"
+            self._said[_RUN] = ERROR, "the run ended without a message; check that torque is off"
         elif not self._verdict and self._said.get(_RUN, (OK, ""))[0] == OK:
             self._said[_RUN] = OK, "it has come to its end"
         self._told_s = -_DIAGNOSTICS_S
@@ -324,7 +324,7 @@ class RobotNode:
         self._told_s = -_DIAGNOSTICS_S
 
     def _send(self) -> None:
-        """Hand over what was commanded since the last cycle, and ask for the next."""
+        """Send the commands since the last cycle, and ask for the next rows."""
         for command in self.commands.take():
             self._end.command(encode_command(command))
         self._end.ask()

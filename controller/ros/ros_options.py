@@ -20,9 +20,9 @@ class RosOptions:
     """Domain of ROS; None: that of ``ROS_DOMAIN_ID``, or 0."""
     namespace: str = ""
     network: bool = False
-    """Whether other machines see it; else only this one, unless the environment says where."""
+    """Whether other machines see the node; else only this one, or as the environment states."""
     commands: bool = False
-    """Whether it accepts commands; the stop service is there in any case."""
+    """Whether the node accepts commands; the stop service always exists."""
     goals: bool = False
     """Whether it accepts goal poses, of a run along waypoints."""
     timeout_s: float = TIMEOUT_S

@@ -37,13 +37,13 @@ FILE_PORTS: Final = "robot"
 
 @dataclass(frozen=True, slots=True)
 class Backend:
-    """A chain of servos, its clock, and what else can be known about it."""
+    """A chain of servos, its clock, and its other sources of information."""
 
     name: str
     chain: ServoChain
     clock: Clock
     pose: Callable[[], BodyPose] | None
-    """Measures the head link; None where nothing does."""
+    """Source of the head link's pose; None without one."""
     qpos: Callable[[], Floats] | None
     """Coordinates of the simulator, for the film."""
     wire_busy_s: Callable[[], float]

@@ -87,7 +87,7 @@ class Gamepad:
             raise InputError(f"{path}: {error.strerror or error}: no gamepad to read") from None
         if stat.S_ISREG(os.fstat(self._file).st_mode):
             os.close(self._file)
-            raise InputError(f"{path}: is a file; a gamepad is such as /dev/input/js0")
+            raise InputError(f"{path}: is a file, not a gamepad; name one such as /dev/input/js0")
         self._path = path
         self._pad = Pad()
         self._gone = self._is_written = False
@@ -273,16 +273,16 @@ class Hands:
 
         def on_change(kind: str, text: str) -> None:
             on_event(kind, text)
-            tell_page()
+            report_gait()
 
-        def tell_page() -> None:
+        def report_gait() -> None:
             if self._page is not None:
                 self._page.on_gait(
                     motion.gait.name, motion.gait.params.model_dump(), motion.limit or ""
                 )
 
         self._motion = motion
-        tell_page()
+        report_gait()
         return Operator(motion, robot, self._take_keys, on_change, self._is_enabled_by_hand)
 
     def _take_keys(self) -> list[str | Refused]:

@@ -35,13 +35,13 @@ class ObserverProcess:
             fault: beginning of the sentence that says what could not be started.
 
         """
-        ours, far = socket.socketpair()
-        self._process = start(serve, far, *options, daemon=True)
-        far.close()
-        ours.settimeout(_START_S)
+        near_end, far_end = socket.socketpair()
+        self._process = start(serve, far_end, *options, daemon=True)
+        far_end.close()
+        near_end.settimeout(_START_S)
         try:
             # unbuffered: the bytes after the line are for the run
-            said = json.loads(ours.makefile("rb", buffering=0).readline() or "{}")
+            said = json.loads(near_end.makefile("rb", buffering=0).readline() or "{}")
         except OSError:
             said = {}
         if not said or "fault" in said:
@@ -49,7 +49,7 @@ class ObserverProcess:
             raise InputError(f"{fault}: {said.get('fault', 'it did not start')}")
         self.said: dict[str, Any] = said
         """Description that the observer gave of itself."""
-        self._end = RunEnd(ours)
+        self._end = RunEnd(near_end)
         self._what = what
 
     def __enter__(self) -> Self:

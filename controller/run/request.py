@@ -29,7 +29,7 @@ MAY_BE_ON: Final = "torque may be on: switch the supply off"
 
 
 class RunEnding:
-    """The state of a run that ends, whatever ends it and in which phase."""
+    """State of an ending run in any phase."""
 
     def __init__(self) -> None:
         self.log: Path | None = None
@@ -56,7 +56,7 @@ class RunEnding:
             return []
         for log in (self.log, part_path(self.log)):
             if log.exists():
-                what = "the run is whole" if self.is_over else "log"
+                what = "the run is complete" if self.is_over else "log"
                 return [f"{what}: {log}; its page: snakewalk log report {log}"]
         return []
 
@@ -106,7 +106,7 @@ class RunRequest:
     shadow: bool = False
     """Whether a simulated chain follows the same goals; log and ``on_event`` report differences."""
     observers: Observers | None = None
-    """A page that shows the run, a ROS node that publishes it, plug-ins."""
+    """Observers of the run: page, ROS node, plug-ins."""
     confirm: Callable[[str], bool] | None = None
     """Asks an operator whether an interrupted chain may go on (``safety.recovery``)."""
     stop_requested: Callable[[], str | None] = lambda: None

@@ -125,7 +125,7 @@ class OpenedRun:
 
 
 def run_robot(request: RunRequest) -> RunResult:
-    """Run on the request's port, or on the simulator; nothing else differs.
+    """Run on the request's port, or on the simulator, in the same steps.
 
     Raises:
         InputError: the plan breaks a limit. The port is not there. The servos are not the robot's.

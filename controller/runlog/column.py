@@ -98,7 +98,7 @@ class Column:
     """A field of a topic. Its unit is the end of its name."""
 
     description: str
-    """Goes into the topic's JSON schema."""
+    """Description of the field in the topic's JSON schema."""
     kind: Kind = "rounded"
     shape: tuple[str | int, ...] = ()
     """Shape of one row: numbers, ``JOINT``, ``LINK`` or ``ANY``."""

@@ -91,7 +91,7 @@ def _record(
     if not configs:
         if _whole_records(file)[1] and _crcs_agree(file) and not lost:
             raise LogError(f"{path}: {_foreign(file)}")
-        raise LogError(f"{path}: breaks off before it says what ran: nothing can be recovered")
+        raise LogError(f"{path}: ends before its header; nothing can be recovered")
     if configs[0].get("format") != FORMAT:
         raise LogError(
             f"{path}: has format {configs[0].get('format')}, this version reads {FORMAT}"
@@ -179,7 +179,7 @@ def _from_start(file: BinaryIO, *, validate_crcs: bool = False) -> Iterator[Mcap
 
 
 def _crcs_agree(file: BinaryIO) -> bool:
-    """Whether a whole file has the checksums that it states, those in its chunks apart."""
+    """Whether a complete file has its stated checksums, except those of its chunks."""
     try:
         for _ in _from_start(file, validate_crcs=True):
             pass
@@ -232,7 +232,7 @@ def _records(file: BinaryIO, lost: list[str]) -> Iterator[McapRecord]:
 
 
 def _unpacked_chunk(chunk: Chunk) -> Chunk:
-    """Unpack a chunk to as many bytes as it says, and its frame says, too, if it says any."""
+    """Unpack a chunk to its stated number of bytes, which its frame must not contradict."""
     if not chunk.compression:
         return chunk
     if frame_content_size(chunk.data) not in (-1, chunk.uncompressed_size):
@@ -241,7 +241,7 @@ def _unpacked_chunk(chunk: Chunk) -> Chunk:
     return replace(chunk, compression="", data=data)
 
 
-def _said_bytes(chunk: bytes) -> int:
+def _stated_bytes(chunk: bytes) -> int:
     said, name_length = _CHUNK_HEAD.unpack_from(chunk)
     frame = _CHUNK_HEAD.size + name_length + _CHUNK_LENGTH
     try:
@@ -263,7 +263,7 @@ def _whole_records(file: BinaryIO) -> tuple[bool, int, int]:
         if position + _HEAD.size + length > size:
             return False, unpacked, size
         chunk = opcode == _CHUNK and length >= _CHUNK_HEAD.size
-        unpacked += _said_bytes(file.read(min(length, _NAME_BYTES))) if chunk else length
+        unpacked += _stated_bytes(file.read(min(length, _NAME_BYTES))) if chunk else length
         position += _HEAD.size + length
     file.seek(position)
     return opcode == _FOOTER and file.read(len(_MAGIC) + 1) == _MAGIC, unpacked, size

@@ -96,7 +96,7 @@ class Header:
     pose_evidence: PoseEvidence
     """Evidence of the poses of the log."""
     ground: HeightField | None = None
-    """Thinned; None on a flat floor."""
+    """Thinned height field; None on a flat floor."""
     torque_constant_n_m_a: float = float("nan")
     winding: Winding | None = None
     """Winding of the robot's servos; None if the log does not state it."""
@@ -200,7 +200,7 @@ def _field(ground: dict[str, Any]) -> HeightField:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened."""
+    """An event of the run."""
 
     time_s: float
     level: str
@@ -210,7 +210,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """Everything that a log holds."""
+    """All contents of a log."""
 
     header: Header
     cycle: CycleTable

@@ -212,9 +212,12 @@ def _with_waypoints(header: Header, waypoints: Sequence[tuple[float, Floats]]) -
     """Return a header whose plan has the last waypoints, each with the time it came into force."""
     set_s = [0.0] * len(waypoints[0][1])
     for (_, before_m), (time_s, after_m) in pairwise(waypoints):
-        same = 0
-        while same < min(len(before_m), len(after_m)) and (before_m[same] == after_m[same]).all():
-            same += 1
-        set_s = set_s[:same] + [time_s] * (len(after_m) - same)
+        common_count = 0
+        while (
+            common_count < min(len(before_m), len(after_m))
+            and (before_m[common_count] == after_m[common_count]).all()
+        ):
+            common_count += 1
+        set_s = set_s[:common_count] + [time_s] * (len(after_m) - common_count)
     plan = replace(header.plan, waypoints_m=waypoints[-1][1], set_s=np.array(set_s))
     return replace(header, plan=plan)

@@ -276,7 +276,7 @@ class Drive:
                 )
                 self._find_friction(view)
                 if self._run.waypoints_m:  # gaits may roll as they please
-                    self._tell_roll(view)
+                    self._report_roll(view)
                 if clock.now_s() < walk_s:
                     goal = ramp.at(clock.now_s() - start_s)
                 else:
@@ -384,7 +384,7 @@ class Drive:
             self._log.event(now_s, "friction", text)
             self._on_event("friction", text)
 
-    def _tell_roll(self, view: BodyView) -> None:
+    def _report_roll(self, view: BodyView) -> None:
         text = self._roll_monitor.update(view, self._clock.now_s())
         if text is not None:
             self._log.event(self._clock.now_s(), "roll", text, "warning")

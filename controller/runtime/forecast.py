@@ -36,11 +36,11 @@ class Slide:
     """Ground that was steeper than the body could hold."""
 
     slope_rad: float
-    """Mean slope under the body, where it was held least."""
+    """Mean slope under the body at the place with the least support."""
     holding_rad: float
-    """Torque that it could have held there, in that shape."""
+    """Torque that the friction could have held there, in the body's shape."""
     lasted_s: float
-    """Time in which nothing held the body."""
+    """Time without support of the body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +257,7 @@ def _worse_slide(
     normal: Floats,
     step_s: float,
 ) -> Slide:
-    """Add a step that nothing holds; keep where the body falls short most."""
+    """Add a step without support; store the place of the largest deficit."""
     factor = holding_factor(points_m, headings_rad, friction, tangential, normal)
     steepness = float(np.hypot(*(tangential / normal[:, None]).mean(axis=0)))
     slope_rad, holding_rad = float(np.arctan(steepness)), float(np.arctan(factor * steepness))

@@ -75,9 +75,9 @@ class FrictionEstimator(ABC):
         self._reported = used
         file = self._file
         if not self._is_estimated:
-            return "the friction is not estimated any more; the world's file applies"
+            return "the estimate of the friction is discarded; the world's file applies"
         if used == file:
-            return "the friction found is that of the world's file again"
+            return "the estimated friction agrees with the world's file again"
         return (
             f"found {used.along:.2f} along and {used.across:.2f} across the body; the world's file "
             f"has {file.along:g} and {file.across:g}"

@@ -48,7 +48,7 @@ class Span:
         return self.slid_to(end.centre_m[:2], end.heading_rad)
 
     def slid_to(self, centre_m: Floats, heading_rad: float) -> Floats:
-        """(3,) the same of a body that came to another centre (2,) and mean heading."""
+        """(3,) motion of a body that came to another centre (2,) and mean heading."""
         begin = self.views[1]
         mean = begin.heading_rad
         (x, y), c, s = centre_m - begin.centre_m[:2], np.cos(mean), np.sin(mean)

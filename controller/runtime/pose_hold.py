@@ -32,7 +32,7 @@ class PoseHold:
     on_event: Callable[[Literal["info", "warning"], str], None]
     """Accepts level and text of an event."""
     failure: str | None = None
-    """Why the run must end; None while it may go on."""
+    """Reason for the run's end; None while it may continue."""
     _rate: float = field(default=1.0, init=False)
     _began_s: float | None = field(default=None, init=False)
 

@@ -10,7 +10,7 @@ OVER_RAD = np.deg2rad(75.0)
 UPRIGHT_RAD = np.deg2rad(50.0)
 """Mean roll below which the body lies well again (ours)."""
 _LASTS_S = 1.5
-"""Time that it must lie so before this is reported (ours): a body that rolls uphill passes by."""
+"""Time for which the body must lie on its side before a report (ours): a roll uphill is shorter."""
 
 
 class RollMonitor:

@@ -79,17 +79,16 @@ def build_library(
     parts = [np.empty((0, points))]
     frame: Ints = np.empty(0, dtype=np.int64)
     for band_count, band in _counts(random_count, waves):
-        got = 0
+        drawn_count = 0
         for _ in range(_ROUNDS):
-            if got >= band_count:
+            if drawn_count >= band_count:
                 break
-            drawn = random_states(states, max(band_count - got, 20), rng)
+            drawn = random_states(states, max(band_count - drawn_count, 20), rng)
             if waves is not None and band is not None:
                 drawn = limit_to_waves(drawn, *band, waves.energy_share)
-            parts.append(
-                _passing(to_angles(drawn, points), filters, rejected)[0][: band_count - got]
-            )
-            got += len(parts[-1])
+            passed = _passing(to_angles(drawn, points), filters, rejected)[0]
+            parts.append(passed[: band_count - drawn_count])
+            drawn_count += len(parts[-1])
         if band is None:
             recorded, frame = _passing(to_angles(states, points), filters, rejected)
     fresh = np.concatenate(parts)

@@ -175,10 +175,10 @@ class _WalkState:
 
         The cost is the number of short returns, then of steps; ties go by Warnsdorff's rule.
         """
-        soon = SHORT_RETURN * len(self.near)
+        short_return_steps = SHORT_RETURN * len(self.near)
         current = self.path[-1]
         now = self.step
-        came_from = {current: current}
+        predecessor = {current: current}
         cost = {current: (0, 0)}
         queue = [(0, 0, 0, 0, current)]
         while True:  # the graph is connected, so a path exists
@@ -188,14 +188,14 @@ class _WalkState:
             if (returns, steps) > cost[q]:
                 continue  # a better path to q was expanded
             for n in self.near[q]:
-                early = self.selected[n] > 0 and now + steps + 1 - self.last[n] < soon
+                early = self.selected[n] > 0 and now + steps + 1 - self.last[n] < short_return_steps
                 after = (returns + early, steps + 1)
                 if n not in cost or after < cost[n]:
-                    cost[n], came_from[n] = after, q
+                    cost[n], predecessor[n] = after, q
                     heappush(queue, (*after, self.unvisited_near[n], self.degree[n], n))
-        states = [came_from[q]]
-        while came_from[states[-1]] != current:
-            states.append(came_from[states[-1]])
+        states = [predecessor[q]]
+        while predecessor[states[-1]] != current:
+            states.append(predecessor[states[-1]])
         return states
 
     def stack_top(self, near: list[int]) -> int:

@@ -104,9 +104,12 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
         leaves[repeat] = np.mean(drawn.degree == 1)
         cover[repeat] = done.steps / drawn.states if done.covered else np.nan
         gaps = return_gaps(done)
-        sooner = np.count_nonzero(gaps < SHORT_RETURN * drawn.states)
-        short[repeat], short_steps[repeat] = sooner / max(1, len(gaps)), sooner / done.steps
-        per_state[repeat] = sooner / drawn.states
+        short_count = np.count_nonzero(gaps < SHORT_RETURN * drawn.states)
+        short[repeat], short_steps[repeat] = (
+            short_count / max(1, len(gaps)),
+            short_count / done.steps,
+        )
+        per_state[repeat] = short_count / drawn.states
         visited_shares = np.cumsum(_first_visits(done))
         visited += np.interp(
             _GRID * drawn.states, np.arange(len(visited_shares)), visited_shares / drawn.states
@@ -131,8 +134,8 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
 def return_gaps(done: Walk) -> NDArray[np.int64]:
     """Steps between consecutive visits of the same state, (returns,)."""
     order = np.argsort(done.path, kind="stable")
-    same = done.path[order][1:] == done.path[order][:-1]
-    return np.asarray(np.diff(order)[same])
+    is_reversal = done.path[order][1:] == done.path[order][:-1]
+    return np.asarray(np.diff(order)[is_reversal])
 
 
 def _first_visits(done: Walk) -> NDArray[np.bool_]:

@@ -139,8 +139,8 @@ def varied(prepared: P, rng: np.random.Generator) -> P:
     """Return a run with another friction (up to 15 % off) and supply (5 %)."""
     world = prepared.world
     robot = prepared.robot
-    slick, volts = rng.uniform(-1.0, 1.0, 2)
-    factor = 1.0 + FRICTION_SPREAD * slick
+    friction_draw, volts = rng.uniform(-1.0, 1.0, 2)
+    factor = 1.0 + FRICTION_SPREAD * friction_draw
     friction = world.friction.model_copy(
         update={
             "along": world.friction.along * factor,

@@ -220,7 +220,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
 
 def _measured_trial(trial: Trial, prepared: PreparedRun) -> Trial:
     result = run_robot(RunRequest(prepared, stoppable=False))
-    stood = ground_contact(result.record, prepared.ground)
+    contact = ground_contact(result.record, prepared.ground)
     numbers = result.summary
     outcome = result.outcome
     off = result.pose.error
@@ -240,8 +240,8 @@ def _measured_trial(trial: Trial, prepared: PreparedRun) -> Trial:
         cost_of_transport=_number(numbers.electrical_cost_of_transport),
         lead_max_rad=_number(numbers.tracking_max_rad),
         current_max_a=_number(numbers.peak_current_a),
-        roll_max_deg=float(np.degrees(stood.roll_max_rad)),
-        in_air=stood.in_air,
+        roll_max_deg=float(np.degrees(contact.roll_max_rad)),
+        in_air=contact.in_air,
         truly_reached=math.nan if off is None else float(off.waypoints_reached),
         head_error_m=math.nan if off is None else off.head_rms_m,
         pose_evidence=numbers.pose_evidence,

@@ -111,8 +111,8 @@ class Tuned:
         return after / before - 1.0 if self.aim == "speed" else 1.0 - after / before
 
     @property
-    def wins(self) -> int:
-        """Seeds on which it is better."""
+    def better_seeds(self) -> int:
+        """Number of seeds with a better result than the defaults."""
         better = np.array(self.best) > np.array(self.default)
         return int((better if self.aim == "speed" else ~better).sum())
 

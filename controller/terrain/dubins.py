@@ -184,7 +184,7 @@ class PathTurns:
         self._curves: DubinsCurves | None = None
         self._length_m = self._rest = self._bound = np.empty(0)
         self.least = np.empty(0)
-        """(h,) less than the cheapest turn in each direction costs; empty before they are laid."""
+        """(h,) lower bound of the cost of a turn in each direction; empty before the first turn."""
 
     def lay_in_steps(self) -> Steps[DubinsCurves]:
         """Compute all Dubins curves, once."""

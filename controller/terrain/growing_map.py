@@ -39,7 +39,7 @@ class GrowingMap:
         self.spacing_m, self.x0_m, self.y0_m = spacing_m, x0_m, y0_m
         columns, rows = (int(np.ceil(side / spacing_m - 1e-9)) + 1 for side in size_m)
         self.z_m = np.empty((rows, columns))
-        """(rows, columns), row 0 with the smallest y; NaN where nothing was seen."""
+        """(rows, columns) heights, row 0 with the smallest y; NaN if unseen."""
         self.error_m = np.empty((rows, columns))
         """(rows, columns) expected."""
         self.first_s = np.empty((rows, columns))

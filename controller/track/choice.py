@@ -85,7 +85,7 @@ class Choice(AnimalChoice):
         if len(present) > 1:
             raise InputError(
                 f"{file}: {len(present)} animals in it ({', '.join(present)}): "
-                "say --individual NAME"
+                "give --individual NAME"
             )
         if not present:
             raise InputError(f"{file}: 0 animals in it: no point of {listed or 'any'} was seen")

@@ -76,11 +76,11 @@ def _exchanged_bodies(points: Floats, number: Ints) -> Bools:
     bodies = np.stack(
         [_resampled_body(*body_and_step) for body_and_step in zip(points, step, strict=True)]
     )
-    same = _distance(bodies[1:], bodies[:-1])
+    same_order = _distance(bodies[1:], bodies[:-1])
     reverse = _distance(bodies[1:, ::-1], bodies[:-1])
-    moved = np.minimum(same, reverse)
+    moved = np.minimum(same_order, reverse)
     near = reverse <= max(_USUAL_MOTIONS * float(np.median(moved)), _STILL_SHARE * length)
-    changes = np.concatenate([[False], near & (reverse < _CLEARLY * same)])
+    changes = np.concatenate([[False], near & (reverse < _CLEARLY * same_order)])
     against = np.cumsum(changes) % 2 == 1
     gaps = np.flatnonzero(np.diff(number) > _GAP) + 1
     for first, end in pairwise((0, *gaps.tolist(), len(points))):

@@ -33,7 +33,7 @@ class Slowing:
     """Factors >= 1 by which recorded time must be stretched."""
 
     by_speed: float
-    """Throughout, so that the fastest moment keeps to the joints' speed limit."""
+    """Factor for the complete recording that keeps the joints' speed limit."""
     by_acceleration: float
     """Throughout, for the acceleration limit; acceleration falls with the square of the factor."""
     where_needed: float

@@ -78,10 +78,10 @@ class Track:
     def flips(self) -> int:
         """Number of frames that fit their predecessor better with head and tail exchanged."""
         before, after = self.angles_rad[:-1], self.angles_rad[1:]
-        same = 1.0 - np.cos(after - before).mean(axis=1)
+        same_order = 1.0 - np.cos(after - before).mean(axis=1)
         flipped = 1.0 - np.cos(after[:, ::-1] + np.pi - before).mean(axis=1)
         joined = np.diff(self.time_s) < 1.5 / self.rate_hz
-        return int(np.count_nonzero((flipped < same) & joined))
+        return int(np.count_nonzero((flipped < same_order) & joined))
 
 
 UNSURE_HEAD = 0.3
@@ -257,11 +257,11 @@ def frame_numbers(name: str, values: Floats) -> Ints:
         InputError: some are not whole, or too large.
 
     """
-    odd = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
-    if odd.any():
+    is_part = ~((np.rint(values) == values) & (np.abs(values) < 2.0**53))
+    if is_part.any():
         raise InputError(
-            f"{name}: {int(odd.sum())} of {len(values)} frame numbers are not whole numbers, "
-            f"such as {values[odd][0]:g}"
+            f"{name}: {int(is_part.sum())} of {len(values)} frame numbers are not whole numbers, "
+            f"such as {values[is_part][0]:g}"
         )
     return values.astype(np.int64)
 

@@ -135,10 +135,10 @@ class _Results:
 
     def _simulated_value(self, row: MeasuredRow) -> float:
         conditions = self._measurement.conditions(row, self._name)
-        same = conditions.model_dump_json()
-        if same not in self._played:
-            self._played[same] = simulate(conditions)
-        results = self._played[same]
+        conditions_json = conditions.model_dump_json()
+        if conditions_json not in self._played:
+            self._played[conditions_json] = simulate(conditions)
+        results = self._played[conditions_json]
         if row.quantity not in results:
             raise InputError(
                 f"{self._name}: {row.name}: quantity = {row.quantity}: this motion gives "

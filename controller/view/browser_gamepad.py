@@ -155,7 +155,7 @@ class BrowserGamepad:
 
     @property
     def is_stale(self) -> bool:
-        """Whether the one that steers says nothing any more."""
+        """Whether the steering gamepad has stopped responding."""
         return self._now_s() - self._told_s > STALE_S
 
     @property

@@ -21,7 +21,7 @@ def fresh_commands(
 ) -> list[str | Refused]:
     """Return the commands of lines without those of a gamepad's state, and reasons for dropped."""
     commands = [in_time(line, now_s) for line in lines]
-    fresh = dead_man.sort_out([command for command in commands if isinstance(command, str)])
+    fresh = dead_man.process([command for command in commands if isinstance(command, str)])
     return [*fresh, *(command for command in commands if isinstance(command, Refused))]
 
 

@@ -248,8 +248,10 @@ def _current_difference_a(record: RunRecord, rows: np.ndarray) -> Floats:
     time_s = record.cycle.time_s[rows]
     shadow = record.shadow
     shadow_index = np.minimum(np.searchsorted(shadow.time_s, time_s), len(shadow.time_s) - 1)
-    same = (shadow.time_s[shadow_index] == time_s)[:, np.newaxis]
-    return np.where(same, record.cycle.current_a[rows] - shadow.current_a[shadow_index], np.nan)
+    is_current = (shadow.time_s[shadow_index] == time_s)[:, np.newaxis]
+    return np.where(
+        is_current, record.cycle.current_a[rows] - shadow.current_a[shadow_index], np.nan
+    )
 
 
 def _spread(first: int, last: int) -> np.ndarray:

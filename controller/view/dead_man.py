@@ -12,7 +12,7 @@ _MOST_AHEAD_S: Final = 0.1
 HOLD: Final = "pad="
 """Begins a state of a gamepad."""
 WITHOUT: Final = "pad=none"
-"""Says that nobody has to hold a gamepad any more."""
+"""Command that ends the need to hold a gamepad."""
 
 
 def hold_command(is_held: bool, at_s: float) -> str:
@@ -35,7 +35,7 @@ class DeadMan:
         """Whether the body may move."""
         return self._now_s() < self._until_s
 
-    def sort_out(self, commands: list[str]) -> list[str]:
+    def process(self, commands: list[str]) -> list[str]:
         """Process the commands of a gamepad; returns the others, and those that are damaged."""
         return [
             command

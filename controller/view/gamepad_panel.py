@@ -32,7 +32,7 @@ class GamepadPanel:
         with tabs.add_tab("gamepad"):
             self._text = server.gui.add_html("")
             self._without = server.gui.add_button(
-                "go on without the gamepad", hint="nobody has to hold a button", visible=False
+                "go on without the gamepad", hint="no button has to be held", visible=False
             )
         self._without.on_click(lambda event: self._pressed.put(WITHOUT))
         self.show(steers=False)
@@ -45,20 +45,22 @@ class GamepadPanel:
             text = (
                 _NO_GAMEPAD
                 if not self._needed
-                else "The gamepad is gone: the body stands in its shape."
+                else "The gamepad is gone: the body holds its shape."
             )
         elif not state.standard:
-            text = f"{state.name}: this browser does not know which button is which; not taken."
+            text = (
+                f"{state.name}: this browser does not know which button is which, so it is ignored."
+            )
         elif not steers:
             text = f"{state.name}: {_STOP}."
         else:
             self._needed = True
             now = (
-                "It says nothing any more: the body stands in its shape."
+                "The gamepad does not respond: the body holds its shape."
                 if stale
                 else "Held: the body moves."
                 if state.is_enabled
-                else "Let go: the body stands in its shape."
+                else "Button released: the body holds its shape."
             )
             text = f"{state.name}: the body moves while LB or RB is held; {_STOP}. {now}"
         if text != self._shown:

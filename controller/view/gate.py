@@ -39,7 +39,7 @@ Serve = Callable[..., Any]
 
 
 class Insert(Protocol):
-    """Something of our own in the page: a script, and the socket that it opens."""
+    """A script of snakewalk in the page, and the socket that it opens."""
 
     path: str
     """Path of the socket."""
@@ -58,7 +58,7 @@ class Gate:
         self._freshness = Freshness() if freshness is None else freshness
         self._host = host
         self.token = secrets.token_urlsafe(16)
-        """Asked for once in each browser."""
+        """Token that each browser needs once."""
 
     def answer(self, request: Request, port: int) -> Response | None:
         """Return the refusal, or None if the request may pass."""

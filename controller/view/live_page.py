@@ -284,8 +284,8 @@ class _LivePage:
     def _record(self, rows: dict[str, list[dict[str, Any]]]) -> RunRecord:
         return record_of(rows, complete=False, note="", header=self._header)
 
-    def _press(self, who: str) -> str:
+    def _press(self, sender: str) -> str:
         if self._button is None:
             return "no run has begun yet"
-        self._button.press(who)
+        self._button.press(sender)
         return "stop requested"

@@ -71,8 +71,10 @@ class LogPage:
             self._play = gui.add_button("play  (Space)", icon=viser.Icon.PLAYER_PLAY)
             self._apart: viser.GuiCheckboxHandle | None = None
             if len(records) > 1:
-                self._same = len({log_record.header.world for log_record in records.values()}) == 1
-                self._apart = gui.add_checkbox("side by side", not self._same)
+                self._is_same_world = (
+                    len({log_record.header.world for log_record in records.values()}) == 1
+                )
+                self._apart = gui.add_checkbox("side by side", not self._is_same_world)
         float_above(panel)
         self._play.on_click(lambda event: self.toggle())
         gui.add_command("play or pause", hotkey="space").on_trigger(lambda event: self.toggle())
@@ -130,7 +132,7 @@ class LogPage:
         right_m, left_m = (_sides_m(shown_log.record)[k] for k, shown_log in enumerate(self._shown))
         other.aside_m = np.array([0.0, right_m - left_m - _GAP_M if distance_m else 0.0, 0.0])
         flat = all(shown_log.record.header.ground is None for shown_log in self._shown)
-        other.hide_ground(flat or (self._same and not distance_m))
+        other.hide_ground(flat or (self._is_same_world and not distance_m))
         return True
 
 

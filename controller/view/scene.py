@@ -296,7 +296,7 @@ class BodyScene:
         )
 
     def _show_waypoints(self, waypoints_m: Floats, reached: int) -> None:
-        """Draw those in force, (w, 2), and which of them are reached."""
+        """Draw the current waypoints (w, 2), and mark the reached ones."""
         if waypoints_m is not self._waypoints_m:
             self._waypoints_m = waypoints_m
             self._reached = -1

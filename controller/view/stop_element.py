@@ -48,7 +48,7 @@ class StopElement:
     def __init__(self, freshness: Freshness) -> None:
         self._freshness = freshness
         freshness.on_late = self._note_late
-        self.press: Callable[[str], str] = lambda who: "no run has begun yet"
+        self.press: Callable[[str], str] = lambda sender: "no run has begun yet"
         """Presses the run's button for a person or device; returns the line to show."""
         self.operators = Operators(freshness.now_s)
         self.newest_s: float | None = None

@@ -29,7 +29,7 @@ class Vertex(NamedTuple):
     bends: Floats
     """(2,) bends of the minimum."""
     enclosed: bool
-    """Whether it lies within the bends that were judged."""
+    """Whether the best bend lies within the range of the judged ones."""
 
 
 def hexagon(bends: Floats) -> Floats:

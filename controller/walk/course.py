@@ -26,7 +26,7 @@ _REPLAN_AFTER_BODIES = 2.0
 _STALL_BODIES = 0.25
 _STALL_AFTER_BODIES = 5.0
 _KEPT_PATH_M = 0.3
-"""Length of the path before the head that a renewal keeps: the body is on it by then."""
+"""Length of the path ahead of the head that a new plan keeps, because the body will be on it."""
 _BEND_RAD = 0.8
 """Largest bend of a renewed path where it continues (ours)."""
 _BEYOND_PATH_WEIGHT = 1.5

@@ -74,7 +74,7 @@ class LiveCourse(MotionWrapper, OnCourse):
         self._refusals = Refusals(lambda why: on_event("refused", why))
         self._time_s = 0.0
         self._changed: str | None = None
-        self._ends = self._told_complete = False
+        self._ends = self._reported_complete = False
 
     @property
     def waypoints_m(self) -> Floats:
@@ -114,14 +114,12 @@ class LiveCourse(MotionWrapper, OnCourse):
         for command in commands[:_COMMANDS_MAX]:
             self._carry_out(command, view)
         if len(commands) > _COMMANDS_MAX:
-            why = (
-                f"{len(commands)} commands at once; only the first {_COMMANDS_MAX} are carried out"
-            )
+            why = f"{len(commands)} commands at once; only the first {_COMMANDS_MAX} count"
             self._refusals.add(why, self._time_s)
         self._refusals.step(self._time_s)
-        if self.course.complete and not self._told_complete and not self._ends:
+        if self.course.complete and not self._reported_complete and not self._ends:
             self._on_event("operator", "no waypoint is left: it holds, and waits for another")
-        self._told_complete = self.course.complete
+        self._reported_complete = self.course.complete
         return goal_rad
 
     def _carry_out(self, command: str | Refused, view: BodyView) -> None:

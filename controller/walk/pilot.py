@@ -86,7 +86,7 @@ class Aimed:
         self.track = chooser.track
 
     def think(self, look: Callable[[], PathPose]) -> bool:
-        """Return False: it decides at once."""
+        """Return False: the chooser decides at once."""
         return False
 
     def decide(self, pose: PathPose) -> Decision:
@@ -216,9 +216,9 @@ class Pilot(OnCourse):
         self._chooser.track.append(piece_rad)
         self._decides = False
 
-    def go_on(self, think_anew: Callable[[], None]) -> None:
-        """Resume deciding; ``think_anew`` resets the chooser."""
-        think_anew()
+    def go_on(self, restart_decision: Callable[[], None]) -> None:
+        """Resume deciding; ``restart_decision`` resets the chooser."""
+        restart_decision()
         self._decides = True
 
     def watch(self, view: BodyView) -> None:

@@ -101,7 +101,7 @@ class PredictiveWalker:
         self.track = AngleTrack(shapes_rad[0])
         self.steering = make_steering(self.track)
         points = self.track.points
-        self._keep = max(1, round(points / PIECES))
+        self._piece_points = max(1, round(points / PIECES))
         self._span = max(2, round(points / (joints + 1)))
         self._walked = max(1, round(walk.decision_fraction * points))
         self._at = self._until = 0
@@ -119,7 +119,7 @@ class PredictiveWalker:
         self.answers: Callable[[], Mapping[int, Rolled | None]] = dict
         """Returns the results that have arrived, by the number of the piece."""
         self._asked: list[_TriedPiece] = []
-        self._in_trouble = False
+        self._is_in_trouble = False
         self.outlook = 1.0
         """Predicted progress of the last decision, relative to the wanted pulse without slip.
 
@@ -132,9 +132,9 @@ class PredictiveWalker:
         self.steering.forget()
         self._option = None
         self._bends = np.zeros(2)
-        self.think_anew()
+        self.restart_decision()
 
-    def think_anew(self) -> None:
+    def restart_decision(self) -> None:
         """Discard the current thoughts and state."""
         self._thinking = None
         self._until = self._at
@@ -147,7 +147,7 @@ class PredictiveWalker:
         """Set whether to continue as a steered serpenoid, the last resort."""
         if lost != self._lost:
             self._lost = lost
-            self.think_anew()
+            self.restart_decision()
 
     def think(self, look: Callable[[], PathPose]) -> bool:
         """Prepare the next decision for a cycle; only the first call calls ``look``.
@@ -174,7 +174,7 @@ class PredictiveWalker:
         best = self._best_answer(self._best_on_twin(pose, self._best_piece()))
         self.outlook = best.progress
         option = best.option
-        keep = self._keep
+        piece_points = self._piece_points
         if self._state_is_new:
             if option.state != SERPENOID:
                 self._star.take(option.state)
@@ -183,10 +183,10 @@ class PredictiveWalker:
             wide = option.carrier if option.carrier in CLIMBING else None
             self._carrier_rad = 0.0 if wide is None else wide.amplitude_rad
             self._until = self._walked
-        self.track.append(best.piece_rad[:keep])
+        self.track.append(best.piece_rad[:piece_points])
         bend = best.bends[0] * self._walk.bend_limit_rad
-        self._base_rad = option.base_rad + bend * keep / self.track.points
-        self._at += keep
+        self._base_rad = option.base_rad + bend * piece_points / self.track.points
+        self._at += piece_points
         self._bends = best.bends
         error = float(wrap(self._base_rad + pose.offset_rad - pose.aim_rad))
         near = option.near
@@ -203,8 +203,8 @@ class PredictiveWalker:
         return next(filter(self._may_be_made, ranked), ranked[0])
 
     def _may_be_made(self, tried: _TriedPiece) -> bool:
-        old = self.track.body_rad(self.track.end)[: self.track.points - self._keep]
-        return self._accept(np.concatenate([tried.piece_rad[: self._keep][::-1], old]))
+        old = self.track.body_rad(self.track.end)[: self.track.points - self._piece_points]
+        return self._accept(np.concatenate([tried.piece_rad[: self._piece_points][::-1], old]))
 
     def _best_on_twin(self, pose: PathPose, best: _TriedPiece) -> _TriedPiece:
         """On steep ground try the best piece on a simulated body; if it fails, try others."""
@@ -233,20 +233,20 @@ class PredictiveWalker:
         Without an answer about the best piece on paper, another one must be good.
         """
         best_answered: _TriedPiece | None = None
-        is_best_known = False
+        has_best_answer = False
         for number, rolled in self.answers().items():
             if rolled is not None and number < len(self._asked):
                 cost_m2, progress = self.steering.cost(rolled)
                 tried = self._asked[number]
                 tried = tried._replace(cost_m2=float(cost_m2[0]), progress=float(progress[0]))
-                is_best_known = is_best_known or tried.piece_rad is best.piece_rad
+                has_best_answer = has_best_answer or tried.piece_rad is best.piece_rad
                 if best_answered is None or tried.cost_m2 < best_answered.cost_m2:
                     best_answered = tried
         self._asked = []
         if best_answered is None:
             return best
-        self._in_trouble = best_answered.cost_m2 > _TROUBLE_M2
-        if self._in_trouble and not is_best_known:
+        self._is_in_trouble = best_answered.cost_m2 > _TROUBLE_M2
+        if self._is_in_trouble and not has_best_answer:
             return best
         if best_answered.option is not best.option:
             self._until = self._at  # another state begins
@@ -258,10 +258,10 @@ class PredictiveWalker:
             return
         if not self.steering.is_steep(pose):
             return
-        if self._in_trouble:
+        if self._is_in_trouble:
             yield from self._screen(pose, [best.option], FAR)
-        chosen = [best, *self._unlike_pieces(best)]
-        self._asked = [*chosen[1:2], best, *chosen[2:]] if self._in_trouble else chosen
+        chosen = [best, *self._differing_pieces(best)]
+        self._asked = [*chosen[1:2], best, *chosen[2:]] if self._is_in_trouble else chosen
         self.ask(pose, [trial.piece_rad for trial in self._asked])
 
     def _dissimilar_pieces(self, pose: PathPose, best: _TriedPiece) -> list[_TriedPiece]:
@@ -273,18 +273,18 @@ class PredictiveWalker:
                 options += self._new_options(pose, carrier)[:3]
             for option in options:
                 self._roll(pose, [(option, bends) for bends in UNLIKE])
-        return self._unlike_pieces(best)
+        return self._differing_pieces(best)
 
-    def _unlike_pieces(self, best: _TriedPiece) -> list[_TriedPiece]:
+    def _differing_pieces(self, best: _TriedPiece) -> list[_TriedPiece]:
         """Judged pieces that differ from the best and each other, cheapest first."""
         chosen = [best]
         for trial in sorted(self._tried, key=lambda option_trial: option_trial.cost_m2):
             if len(chosen) == self._walk.tries:
                 break
-            same = [other.bends for other in chosen if other.option is trial.option]
+            bends_of_option = [other.bends for other in chosen if other.option is trial.option]
             if (
-                len(same) < 3
-                and all(np.abs(trial.bends - bends).max() >= 0.7 for bends in same)
+                len(bends_of_option) < 3
+                and all(np.abs(trial.bends - bends).max() >= 0.7 for bends in bends_of_option)
                 and self._may_be_made(trial)
             ):
                 chosen.append(trial)
@@ -355,8 +355,8 @@ class PredictiveWalker:
         """Possible next pieces: the rest of the current state, or new states."""
         if self._option is not None and not self._state_is_new:
             state = self._option.state
-            going_on = self._option.wave_rad[self._at :]
-            return [_Option(state, self._option.near, self._base_rad, going_on)]
+            wave_continuation = self._option.wave_rad[self._at :]
+            return [_Option(state, self._option.near, self._base_rad, wave_continuation)]
         return self._new_options(pose, carrier)
 
     def _new_options(

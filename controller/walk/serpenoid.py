@@ -44,14 +44,14 @@ class Serpenoid:
     def decide(self, offset_rad: float, aim_rad: float) -> Decision:
         """Append the next piece; same contract as ``Walker.decide``."""
         p = self._p
-        keep = max(1, round(self._points / p.pieces))
+        piece_points = max(1, round(self._points / p.pieces))
         error = float(wrap(self._base_rad + offset_rad - aim_rad))
-        limit = p.turn_limit_rad * keep / self._points
+        limit = p.turn_limit_rad * piece_points / self._points
         bend = float(np.clip(-error, -limit, limit))
-        line = self._base_rad + bend * np.arange(1, keep + 1) / keep
-        self.track.append(line + p.wave_rad(self._at + np.arange(keep), self._points))
+        line = self._base_rad + bend * np.arange(1, piece_points + 1) / piece_points
+        self.track.append(line + p.wave_rad(self._at + np.arange(piece_points), self._points))
         self._base_rad += bend
-        self._at += keep
+        self._at += piece_points
         return Decision(0, error, bend, 1, 1)
 
 

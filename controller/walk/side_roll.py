@@ -237,10 +237,10 @@ class SideRolls(MotionWrapper, OnCourse):
     def _roll(self, view: BodyView, plan: RollPlan) -> None:
         headings = view.headings_rad
         bent = plan.side * float(headings[0] - headings[-1]) > 0.5 * abs(plan.bend_rad)
-        lies = bent or plan.at_once
-        if not self.course.astray or not lies or abs(body_roll_rad(view)) > _UPRIGHT_RAD:
+        is_lying = bent or plan.at_once
+        if not self.course.astray or not is_lying or abs(body_roll_rad(view)) > _UPRIGHT_RAD:
             self._plan = None
-            self._pilot.go_on(self._walker.think_anew)
+            self._pilot.go_on(self._walker.restart_decision)
             return
         self._plan = plan
         cycle = _cycle(plan, self._robot)
@@ -343,6 +343,6 @@ class _Rolling:
         return False
 
     def text(self, view: BodyView) -> str:
-        gone_m = float(np.hypot(*(view.centre_m - self._start_m)[:2]))
+        travelled_m = float(np.hypot(*(view.centre_m - self._start_m)[:2]))
         turns = self._turned_rad / (2.0 * np.pi)
-        return f"rolled {turns:.1f} turns in {self._time_s:.1f} s, {gone_m:.2f} m; walks on"
+        return f"rolled {turns:.1f} turns in {self._time_s:.1f} s, {travelled_m:.2f} m; walks on"

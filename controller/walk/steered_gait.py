@@ -150,9 +150,9 @@ def check_turns(gait: Gait, robot: RobotConfig) -> None:
 
     """
     if gait.steered_by is None:
-        able = ", ".join(name for name, kind in GAITS.items() if kind.steered_by is not None)
+        steerable = ", ".join(name for name, kind in GAITS.items() if kind.steered_by is not None)
         raise InputError(
-            f"gait {gait.name}: not steered along waypoints; those that are: {able}; "
+            f"gait {gait.name}: not steered along waypoints; those that are: {steerable}; "
             f"without waypoints: snakewalk gait run {gait.name}"
         )
     if getattr(gait.params, gait.steered_by) != 0.0:

@@ -15,7 +15,7 @@ class Twin(Protocol):
     def begin(
         self, before: BodyPose, now: BodyPose, before_rad: Floats, now_rad: Floats, dt_s: float
     ) -> None:
-        """Place it at the robot's pose, with the motion of the last ``dt_s``."""
+        """Place the twin at the robot's pose, with the motion of the last ``dt_s``."""
         ...
 
     def use_friction(self, friction: FrictionConfig) -> None:

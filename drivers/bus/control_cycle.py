@@ -128,7 +128,7 @@ class ControlCycle:
             self._default_order,
             port.clock.now_s(),
         )
-        """Request whose reply is awaited, its order, and what receives it, else until when."""
+        """Request whose reply is awaited, its order, and its receiver or deadline."""
         self.fast = fast
         """Whether the next read is a fast one."""
         self.counters = CycleCounters()
@@ -326,7 +326,7 @@ class ControlCycle:
         expected = request.reply_bytes
         if len(raw) < expected:
             raw += port.read_until(expected - len(raw), deadline_s)
-        if len(raw) == expected and self._came_twice(request, deadline_s):
+        if len(raw) == expected and self._has_second_reply(request, deadline_s):
             raw = port.read_until(expected, deadline_s)
             self._line.note_copies(answered=len(raw) > 0)
             self.counters.copies += 1
@@ -336,10 +336,12 @@ class ControlCycle:
         while len(raw) >= request.reply_bytes and not reply.complete:
             more = request.missing_bytes(raw)  # stuffed bytes or an older reply are additional
             surplus = len(raw) + more - expected
-            got = self._port.read_until(more, deadline_s + surplus * self._byte_s) if more else b""
-            if not got:
+            received = (
+                self._port.read_until(more, deadline_s + surplus * self._byte_s) if more else b""
+            )
+            if not received:
                 break
-            raw += got
+            raw += received
             reply = request.parse(raw)
         return raw, reply
 
@@ -354,12 +356,12 @@ class ControlCycle:
             return raw[:expected]  # noise, as when an adapter switches direction
         return raw + port.read_until(2 * expected - len(raw), deadline_s)
 
-    def _came_twice(self, request: GroupReadRequest, deadline_s: float) -> bool:
+    def _has_second_reply(self, request: GroupReadRequest, deadline_s: float) -> bool:
         """Whether a reply that is complete now is an older one."""
         byte_s = self._byte_s
         reply_s = request.reply_bytes * byte_s
         free_s = deadline_s - reply_s - self._latency_s
-        return self._line.came_twice(free_s, len(request.packet) * byte_s, reply_s)
+        return self._line.has_second_reply(free_s, len(request.packet) * byte_s, reply_s)
 
     @property
     def _byte_s(self) -> float:

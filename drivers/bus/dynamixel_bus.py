@@ -49,9 +49,9 @@ class PingReply:
     servo_id: int
     model_number: int
     firmware: int | None
-    """Version of the firmware; None where the SDK does not return it."""
+    """Version of the firmware; None if the SDK does not return it."""
     alert: bool
-    """Whether it reports a hardware error (register 70)."""
+    """Whether the servo reports a hardware error (register 70)."""
 
 
 class DynamixelBus:
@@ -117,14 +117,14 @@ class DynamixelBus:
 
         """
 
-        def once() -> PingReply:
+        def transaction() -> PingReply:
             number, result, error = self._sdk.ping(self.port, servo_id)
             if result != sdk.COMM_SUCCESS:
                 self._pending.add([servo_id], _PING_BYTES, fast=False)
             self._check_result(result, servo_id, "ping")
             return PingReply(servo_id, number, None, bool(error & ALERT))
 
-        return self._retry(once)
+        return self._retry(transaction)
 
     def find(self, servo_ids: Iterable[int]) -> dict[int, PingReply]:
         """Ping each servo; return those that replied."""
@@ -268,19 +268,19 @@ class DynamixelBus:
         if self.read(servo_id, name) == value:
             return
         (self.write_kept if kept else self.write)(servo_id, name, value)
-        got = self.read(servo_id, name)
-        if got != value:
-            raise BusError(f"servo {servo_id}: {name}: wrote {value}, reads back {got}")
+        stored_value = self.read(servo_id, name)
+        if stored_value != value:
+            raise BusError(f"servo {servo_id}: {name}: wrote {value}, reads back {stored_value}")
 
     def reboot(self, servo_id: int) -> None:
         """Restart a servo: it loses hardware errors, torque and turn count."""
 
-        def once() -> None:
+        def transaction() -> None:
             result, error = self._sdk.reboot(self.port, servo_id)
             self._check_result(result, servo_id, "reboot")
             check_accepted(servo_id, "reboot", error)
 
-        self._retry(once)
+        self._retry(transaction)
 
     def cycle(self, servo_ids: Sequence[int], *, fast: bool = True) -> ControlCycle:
         """Control cycle of these servos: writes Goal Position, reads the state block.
@@ -358,11 +358,11 @@ class DynamixelBus:
             )
         return next(iter(registers.values())) if registers else self.table.register(name)
 
-    def _retry(self, once: Callable[[], T], tries: int | None = None) -> T:
+    def _retry(self, transaction: Callable[[], T], tries: int | None = None) -> T:
         """Run a transaction, and again after silence or damage; a refusal is final."""
         for remaining in range((tries or self._tries) - 1, -1, -1):
             try:
-                return self._call_with_recovery(once)
+                return self._call_with_recovery(transaction)
             except NoAnswerError:
                 self.port.drain_until_quiet(self.latency_s)  # the reply may be late
                 if not remaining:

@@ -36,7 +36,7 @@ class GroupReadReply(NamedTuple):
     valid: Bools
     """(N,) replied in this cycle, with the right CRC and length and without a result error."""
     error: Bytes
-    """(N,) error byte of the reply; 0 where there was none."""
+    """(N,) error byte of the reply; 0 without a reply."""
     answered: Bools
     """(N,) whether a status packet arrived at all."""
     clean: bool

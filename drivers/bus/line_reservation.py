@@ -21,7 +21,7 @@ class LineReservation:
     def __init__(self, clock: Clock, *, paced: bool = False) -> None:
         self._clock = clock
         self._paced = paced
-        self._in_vain = 0
+        self._unanswered_count = 0
         self.free_s = np.array([clock.now_s()])
         """(1,) when all that was sent will have left, on the clock, s; compiled code writes it."""
         # the same memory: numpy needs three times as long for a scalar
@@ -43,7 +43,7 @@ class LineReservation:
         self._free_s[0] = free_s
         return free_s
 
-    def came_twice(self, free_s: float, request_s: float, reply_s: float) -> bool:
+    def has_second_reply(self, free_s: float, request_s: float, reply_s: float) -> bool:
         """Whether a reply that is complete now came too early for the last request.
 
         The request will have left at ``free_s``.
@@ -53,5 +53,5 @@ class LineReservation:
 
     def note_copies(self, *, answered: bool) -> None:
         """Note repeated replies, and whether the right one came after them."""
-        self._in_vain = 0 if answered else self._in_vain + 1
-        self._paced = self._paced and self._in_vain < _IN_VAIN
+        self._unanswered_count = 0 if answered else self._unanswered_count + 1
+        self._paced = self._paced and self._unanswered_count < _IN_VAIN

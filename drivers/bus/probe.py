@@ -26,7 +26,7 @@ _REPLY_REMAINDER_S = 0.05
 _LATEST_S = 0.05
 """Time for which the first missing reply of a servo is awaited (ours)."""
 _OVERHEARD_BYTES = 1 << 16
-"""Number of overheard bytes that are enough to know who talks."""
+"""Number of overheard bytes that suffice to identify their sender."""
 _TURN_S = 3e-3
 """Servos reply to a broadcast ping one behind the other, by their IDs; the SDK waits this long for
 each."""

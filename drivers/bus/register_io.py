@@ -111,7 +111,7 @@ def _exchange(
                 and reply.servo_id == packet.servo_id
                 and not _is_foreign_reply(reply, data_bytes, pending)
             ):
-                if line.came_twice(free_s, len(raw) * byte_s, expected * byte_s):
+                if line.has_second_reply(free_s, len(raw) * byte_s, expected * byte_s):
                     copies = True
                     continue
                 if copies:

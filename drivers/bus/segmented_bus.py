@@ -34,7 +34,7 @@ class SegmentedBus:
             raise ValueError("the ports of one chain share one clock: ages are counted in it")
         self._bus_of = {servo_id: bus for bus, ids in parts for servo_id in ids}
         if len(self._bus_of) != sum(len(ids) for _, ids in parts):
-            raise ValueError("an ID is on one port")
+            raise ValueError("an ID must be on one port only")
         self._parts = tuple(bus for bus, _ in parts)
         self._lost: dict[DynamixelBus, None] = {}  # in order of loss
 

@@ -226,9 +226,9 @@ def _receive(
     error = work[ids_end:error_end]
     reply = room[:-1]
     latency_estimate = plan[LATENCY_ESTIMATE : LATENCY_ESTIMATE + 2]
-    got = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
-    if got != len(reply):
-        code = -1 - int(got)
+    received = receive(fd, room, begun_ns, least_ns, wait_ns, plan[SPIN_NS], latency_estimate)
+    if received != len(reply):
+        code = -1 - int(received)
     elif plan[FAST]:
         head = work[request_end:heads_end]
         ids = work[heads_end:ids_end]

@@ -23,7 +23,7 @@ class AlarmReader:
         self._counts: dict[int, int] = {}
         """Reads in a row in which a joint had an alert, but no alarm."""
         self._alerts: dict[int, int] = {}
-        """Times that such an alert of a joint has begun."""
+        """Number of alerts without an alarm, by joint."""
 
     def clear(self) -> None:
         """Forget the alerts so far."""

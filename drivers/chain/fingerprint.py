@@ -69,7 +69,7 @@ def register_change(name: str, before: int, now: int, rad_per_position: float) -
         moved_rad = (now - before) * abs(rad_per_position)
         return f"{text}: its zero has moved by {moved_rad:+.2f} rad"
     if name == "Drive Mode" and (now ^ before) & REVERSE:
-        return f"{text}: it turns the other way round"
+        return f"{text}: its direction is reversed"
     return text
 
 

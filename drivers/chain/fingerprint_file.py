@@ -101,7 +101,7 @@ class FingerprintFile:
             if faults:
                 hint = f"snakewalk doctor --accept --robot {self._robot_file} accepts it"
                 raise ChainError(
-                    [f"{self.path}: {line}; if it is meant, {hint}" for line in faults]
+                    [f"{self.path}: {line}; if it is intended, {hint}" for line in faults]
                 )
         new = {
             **(stored_fingerprints or {}),

@@ -26,7 +26,7 @@ MOST_LATE = 8
 """Number of goals that a servo or an adapter holds back at most (ours). A goal that was replaced
 earlier does not come back by itself."""
 _REMEMBERED_GOALS = 256
-"""Goals that are known to be of this run (ours)."""
+"""Number of last goals of this run that are compared (ours)."""
 
 
 @dataclass(slots=True)

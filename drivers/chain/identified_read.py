@@ -122,7 +122,7 @@ def check_stillness(
         )
     else:
         text = (
-            f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from where it was "
-            "found just before: two servos with one ID, or moved by hand"
+            f"{name}: read {position_rad[joint] - found_rad[joint]:+.2f} rad from its "
+            "position just before: two servos with one ID, or moved by hand"
         )
     raise ChainError([text])

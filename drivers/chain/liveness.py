@@ -104,8 +104,8 @@ class LivenessCheck:
             PortError: the port is gone.
 
         """
-        its_turn = cycle % SLOW_EVERY == _GOALS_AT
-        if not its_turn and not (
+        is_slow_cycle = cycle % SLOW_EVERY == _GOALS_AT
+        if not is_slow_cycle and not (
             has_time and self._goals.is_due and cycle % SLOW_EVERY not in self._turns
         ):
             return None
@@ -217,15 +217,15 @@ class RegisterCheck:
         if reply.flawless and reply.data.tobytes() == self.raw:  # the usual case
             return {}, True
         values = self.rows.decode(reply.data)
-        everybody = reply.valid_count == len(reply.valid)
+        all_replied = reply.valid_count == len(reply.valid)
         values_by_joint = {}
         for place, (joint, expected) in enumerate(self.expected.items()):
             if reply.valid[place]:
-                got = int(values[place])
+                goal = int(values[place])
             elif ask_again is not None:
-                got = ask_again.read(self.ids[place], self.name)
+                goal = ask_again.read(self.ids[place], self.name)
             else:
                 continue
-            if got != expected:
-                values_by_joint[joint] = got
-        return values_by_joint, ask_again is not None or everybody
+            if goal != expected:
+                values_by_joint[joint] = goal
+        return values_by_joint, ask_again is not None or all_replied

@@ -72,13 +72,13 @@ class MotionSensors:
     def _line(self, sensor: int, joint: int, motion: Floats) -> str:
         value = motion[sensor, joint]
         if sensor == _CURRENT:
-            what = f"current reads {value:.2f} A all the time, though the joint moves"
+            what = f"current reads {value:.2f} A constantly, though the joint moves"
             effect = "nothing watches its load"
         elif sensor == _VELOCITY:
-            what = f"velocity reads {value:.2f} rad/s all the time, though its position differs"
+            what = f"velocity reads {value:.2f} rad/s constantly, though its position differs"
             effect = "a dead output stage may stay undetected"
         else:
-            what = f"position reads {value:.2f} rad all the time, though its velocity is not 0"
+            what = f"position reads {value:.2f} rad constantly, though its velocity is not 0"
             effect = "nothing watches whether it follows"
         name = self._names[joint]
         return f"{name}: {what}: its sensor may be dead, and {effect}; stop the run and check it"

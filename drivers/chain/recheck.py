@@ -23,7 +23,7 @@ KEPT_RAD = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Recheck:
-    """The chain as found, and every fault that forbids a continuation."""
+    """State of the chain after an interruption, and every fault that forbids a continuation."""
 
     faults: tuple[ChainFault, ...]
     reset: tuple[int, ...]
@@ -107,10 +107,12 @@ def recheck(
             text = f"{name}: moved by {moved[joint]:+.2f} rad since it was last seen"
             faults.append(ChainFault(FaultCause.MOVED, text))
         unit_rad = float(units.rad_per_position[joint])
-        before_it = fingerprints.get(joint, {})
+        previous_fingerprint = fingerprints.get(joint, {})
         faults += [
             ChainFault(FaultCause.OTHER_SETTINGS, line)
-            for line in fingerprint_faults(robot, joint, before_it, servo.registers, unit_rad)
+            for line in fingerprint_faults(
+                robot, joint, previous_fingerprint, servo.registers, unit_rad
+            )
         ]
         values = configured.get(joint, {})
         registers = {register: servo.registers[register] for register in values}

@@ -50,14 +50,14 @@ def _cause(
     rows = facts.registers
     reset = [name for name in changed if name != TORQUE and values[name] == rows[name].initial]
     # a run sets these to other values than a restart, if they are in RAM
-    witnesses = [
+    other_joints = [
         name
         for name in (IDENTITY, WATCHDOG)
         if name in expected and rows[name].address > rows[TORQUE].address
     ]
-    if set(witnesses) <= set(reset) if witnesses else reset and TORQUE in changed:
+    if set(other_joints) <= set(reset) if other_joints else reset and TORQUE in changed:
         return "it has rebooted: check its supply and plugs"
     if len(changed) > 1 or TORQUE not in changed:
         return "another program writes to it"
     other = "another program has switched it off"
-    return other if witnesses else f"it has rebooted, or {other}"
+    return other if other_joints else f"it has rebooted, or {other}"

@@ -406,8 +406,8 @@ class ServoChain:
 
     def _read_slow(self, measured_at_s: float) -> bool:
         """Read voltages and temperatures if due; return whether they were."""
-        its_turn = (self._reads - 1) % SLOW_EVERY == 0
-        if not its_turn and measured_at_s - self._readings.slow_at_s <= _SLOW_AGE_S:
+        is_slow_cycle = (self._reads - 1) % SLOW_EVERY == 0
+        if not is_slow_cycle and measured_at_s - self._readings.slow_at_s <= _SLOW_AGE_S:
             return False
         reply = self._slow.read()
         self._sent_at_s = self._clock.now_s() - self._slow.since_sent_s
@@ -530,9 +530,9 @@ class ServoChain:
         """
         check = RegisterCheck.of(self._bus, self.robot, name, expected, fast=False)
         differing, _ = check.compare(ask_again=self._bus)
-        for joint, got in differing.items():
+        for joint, goal in differing.items():
             raise BusError(
-                f"{self.robot.joint_label(joint)}: {name} is {got} after {expected[joint]} was "
+                f"{self.robot.joint_label(joint)}: {name} is {goal} after {expected[joint]} was "
                 "written to all"
             )
 

@@ -116,7 +116,7 @@ class ServoReport:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """The chain as found, and every fault that forbids a start."""
+    """State of the chain before a start, and every fault that forbids the start."""
 
     servos: tuple[ServoReport, ...]
     faults: tuple[ChainFault, ...]
@@ -145,17 +145,17 @@ def inspect(
     replies_by_id = bus.find(asked) if replies is None else replies
     faults: list[ChainFault] = []
     for part in bus.parts:
-        on_it = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
-        missing = [str(i) for i in on_it if i in asked and i not in replies_by_id]
+        members = [i for i in robot.servo_ids if bus.port_of(i) is part.port]
+        missing = [str(i) for i in members if i in asked and i not in replies_by_id]
         if missing:
             port = part.port.name
             baud = part.port.getBaudRate()
-            ids_text = _ids_in_words(on_it)
+            ids_text = _ids_in_words(members)
             text = (
                 f"{port}: no answer from servo {', '.join(missing)} of {ids_text} at {baud} baud: "
             )
             text += "power, cable, id or baud rate"
-            if len(missing) == len(on_it) > 1:
+            if len(missing) == len(members) > 1:
                 text = (
                     f"{port}: no answer from any of the servos {ids_text} at {baud} baud: power, "
                     f"cable, baud rate or another make; snakewalk bus scan --port {port} lists the "
@@ -323,7 +323,7 @@ def _configure_joint(
     if pwm_limit < full:
         on_event(f"{name}: PWM Limit is {pwm_limit} of {full}: weak and slow")
     if values.get("Drive Mode", 0) & REVERSE:
-        on_event(f"{name}: Drive Mode is reverse: it turns the other way round")
+        on_event(f"{name}: Drive Mode is reverse: its direction is reversed")
     before = read_values.get(IDENTITY, 0)
     if identity_fault(robot, joint, before) is not None:
         on_event(
@@ -354,7 +354,7 @@ def identity_fault(robot: RobotConfig, joint: int, value: int) -> str | None:
     if value == identity(joint) or not 1 <= value <= robot.joint_count:
         return None
     return (
-        f"its servo was {robot.joint_label(value - 1)}: exchanged IDs; put them right: snakewalk "
+        f"its servo was {robot.joint_label(value - 1)}: exchanged IDs; correct them: snakewalk "
         "bus set"
     )
 
@@ -395,19 +395,19 @@ def _apply(
             continue
         bus.write(servo_id, setting.register, value)
         # a new mode resets the gains
-        renewed = setting.register == "Operating Mode"
-        now = _read_settings(bus, servo_id) if renewed else {**now, setting.register: value}
+        is_mode = setting.register == "Operating Mode"
+        now = _read_settings(bus, servo_id) if is_mode else {**now, setting.register: value}
     if now is read_values:
         return read_values
     now = _read_settings(bus, servo_id)
     for setting in present_settings:
         register = setting.register
-        got = now[setting.register]
+        accepted = now[setting.register]
         value = setting.value_in(now)
-        if got != value:
-            raise BusError(f"{name}: {register}: wrote {value}, reads back {got}")
-        if got != read_values[register] and not setting.usual:
-            on_event(f"{name}: {register} was {read_values[register]}, is {got} now")
+        if accepted != value:
+            raise BusError(f"{name}: {register}: wrote {value}, reads back {accepted}")
+        if accepted != read_values[register] and not setting.usual:
+            on_event(f"{name}: {register} was {read_values[register]}, is {accepted} now")
     return now
 
 

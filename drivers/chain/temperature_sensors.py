@@ -23,7 +23,7 @@ EXPECTED_ALONE_K = 12.0
 """Expected rise where no joint's reading has changed (ours): a chain that is warm at the start may
 stay as it is for a while."""
 CHANGED_K = 3.0
-"""Change that shows a sensor that works (ours)."""
+"""Change of temperature that shows that a sensor works (ours)."""
 JUMP_K = 8.0
 JUMP_K_S = 1.0
 """A reading that changes by more than this, and by this for each second, is not a temperature

@@ -85,9 +85,9 @@ class LinePort(ABC):
         quiet_at_s = self._clock.now_s() + quiet_s
         limit_s = quiet_at_s + DRAIN_LIMIT_S
         while self._clock.now_s() < quiet_at_s:
-            got = self.read_until(1, quiet_at_s)
-            if got:
-                drained += len(got) + len(self.read_until(_PIECE_BYTES, self._clock.now_s()))
+            received = self.read_until(1, quiet_at_s)
+            if received:
+                drained += len(received) + len(self.read_until(_PIECE_BYTES, self._clock.now_s()))
                 quiet_at_s = min(self._clock.now_s() + quiet_s, limit_s)
         return drained
 

@@ -23,7 +23,7 @@ NETWORK_LATENCY_S: Final = 0.1
 _POLL_S: Final = 0.001
 """Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
 _SCHEMES_WITHOUT_BAUD: Final = ("socket",)
-"""Schemes that carry no baud rate: that of the far end stays what it is."""
+"""Schemes that carry no baud rate: the far end keeps its own."""
 _TO_A_HOST: Final = ("socket", "rfc2217")
 
 
@@ -75,14 +75,14 @@ class NetworkPort(LinePort):
 
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
-        got = b""
+        received = b""
         line = self._line
         try:
-            while len(got) < count and (line.in_waiting or self._clock.now_s() < deadline_s):
-                got += line.read(count - len(got))
+            while len(received) < count and (line.in_waiting or self._clock.now_s() < deadline_s):
+                received += line.read(count - len(received))
         except self.line_errors as error:
             raise self._lost(error) from error
-        return got
+        return received
 
     @property
     def _scheme(self) -> str:

@@ -29,7 +29,7 @@ class PortHolder:
     user: str
     """Name of the user of the program."""
     files: tuple[str, ...]
-    """Paths of its open files; none if they are hidden, as those of other users are."""
+    """Paths of the program's open files; none if they are hidden, as other users' files are."""
 
     def __str__(self) -> str:
         """Return program, process and, if it is another one, the user."""
@@ -38,7 +38,7 @@ class PortHolder:
 
     @property
     def is_ours(self) -> bool:
-        """Whether it is a snakewalk command."""
+        """Whether the program is a snakewalk command."""
         return self.program.startswith(f"{_PROGRAM_NAME} ")
 
     @property

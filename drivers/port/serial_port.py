@@ -100,22 +100,22 @@ class SerialPort(LinePort):
     def read_until(self, count: int, deadline_s: float) -> bytes:
         """Wait for ``count`` bytes, at most until ``deadline_s``."""
         fd = self._fileno
-        got = b""
+        received = b""
         try:
-            while len(got) < count:
+            while len(received) < count:
                 remaining_s = max(0.0, deadline_s - self._clock.now_s())
                 if not self._readable.poll(remaining_s * 1e3):
                     break
                 try:
-                    more = os.read(fd, count - len(got))
+                    more = os.read(fd, count - len(received))
                 except BlockingIOError:
                     continue  # another program reads this port too
                 if not more:
                     raise OSError(errno.EIO, "ready to be read, but empty")
-                got += more
+                received += more
         except OSError as error:
             raise self._lost(error) from error
-        return got
+        return received
 
     # calls of the SDK
 

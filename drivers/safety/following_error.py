@@ -71,7 +71,7 @@ class FollowingError:
         self.joint = -1
         """Joint of the newest reason to stop."""
         self.is_idle = False
-        """Whether that reason is a motor that does not push."""
+        """Whether the reason is a motor that does not push."""
         self.reset()
 
     def reset(self) -> None:

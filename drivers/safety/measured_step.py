@@ -24,7 +24,7 @@ class MeasuredSteps:
         self.joint = -1
         """Joint of the newest doubt."""
         self._doubted_rad: Floats | None = None
-        """(J,) what was read and not believed; NaN where the last reading was."""
+        """(J,) readings that are doubted; NaN where the last reading was accepted."""
 
     def reset(self) -> None:
         """Forget the doubted values: the joints were read again."""

@@ -175,7 +175,7 @@ class Recovery(Generic[C]):
             self._give_up(f"given up: {why}", why)
             return None
         state = self._chain.resume(checked)
-        self._on_event("going on from where it stands")
+        self._on_event("the run continues from the present position")
         return state
 
     def _wait_for_chain(

@@ -76,7 +76,7 @@ class SafeLink:
         stop_output: StopOutput | None = None,
     ) -> None:
         self.tripped: str | None = None
-        """Why it has latched; None while it lets commands pass."""
+        """Reason why the link has latched; None while commands pass."""
         self.last_verdict: Verdict | None = None
         """Verdict on the last command."""
         self.recoveries = 0

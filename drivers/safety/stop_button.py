@@ -169,7 +169,7 @@ class PressedButton:
         self._file = os.open(path, os.O_RDWR | _OPEN_FLAGS)
         try:
             info = os.fstat(self._file)
-            if not (_is_mine(info) or os.getuid() == 0) or info.st_size != _BYTES:
+            if not (_is_own_file(info) or os.getuid() == 0) or info.st_size != _BYTES:
                 raise PermissionError(
                     f"{path}: is not a stop button of this user; name a run of this user"
                 )
@@ -189,13 +189,13 @@ class PressedButton:
         self.close()
 
     def close(self) -> None:
-        """Release it; a pressed button stays pressed."""
+        """Release the button; a pressed button stays pressed."""
         self._map.close()
         os.close(self._file)
 
     @property
     def is_held(self) -> bool:
-        """Whether its program still holds it."""
+        """Whether its program still holds the button."""
         if not _HAS_LOCKS:
             return not self._map[_ENDED_BYTE]
         try:
@@ -220,9 +220,9 @@ class PressedButton:
         """How the run ended; None before."""
         return _read_text(self._map, _END) if self._map[_ENDED_BYTE] else None
 
-    def press(self, who: str) -> None:
+    def press(self, sender: str) -> None:
         """Make the run's safe link switch torque off and latch, at its next read or write."""
-        _write_text(self._map, _REQUESTER, who)
+        _write_text(self._map, _REQUESTER, sender)
         self._map[_PRESSED_BYTE] = 1
 
 
@@ -295,7 +295,7 @@ def _is_private(folder: Path) -> bool:
     except OSError:
         return False
     others_write = _HAS_LOCKS and info.st_mode & 0o022
-    return stat.S_ISDIR(info.st_mode) and _is_mine(info) and not others_write
+    return stat.S_ISDIR(info.st_mode) and _is_own_file(info) and not others_write
 
 
 def _new_file(folder: Path, suffix: str) -> tuple[int, Path]:
@@ -338,7 +338,7 @@ def _cannot_be_made(place: Path, error: OSError) -> str:
     )
 
 
-def _is_mine(info: os.stat_result) -> bool:
+def _is_own_file(info: os.stat_result) -> bool:
     """Whether a file is this user's; on Windows its folder decides."""
     return not _HAS_LOCKS or info.st_uid == os.getuid()
 

@@ -43,7 +43,7 @@ class StopOutput(Protocol):
         ...
 
     def __exit__(self, *raised: object) -> None:
-        """Release it."""
+        """Release the output."""
         ...
 
 

@@ -62,7 +62,7 @@ class Verdict(NamedTuple):
     goal_rad: Floats
     """(J,) goals that may be sent; on a veto the last ones again."""
     veto: str | None
-    """Why nothing may pass any more, one line; None: the command passes."""
+    """Reason of a latched stop, one line; None: the command passes."""
     clamped: Bools
     """(J,) goals that were changed."""
     memory: SafetyMemory
@@ -271,8 +271,11 @@ def _age_max_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> f
 
     The quick check costs a tenth of ``state_fault`` and is stricter.
     """
-    never = _unlimited(len(last.over_current_since_s))
-    if last.over_current_since_s is not never or last.under_voltage_since_s is not never:
+    unlimited_s = _unlimited(len(last.over_current_since_s))
+    if (
+        last.over_current_since_s is not unlimited_s
+        or last.under_voltage_since_s is not unlimited_s
+    ):
         return math.nan
     try:
         return _quick_check(

@@ -96,7 +96,7 @@ class FaultTarget(Protocol):
 
     @property
     def servos(self) -> FaultyServos:
-        """Those on the line."""
+        """IDs of a fault that are on the line."""
         ...
 
     def ids(self) -> list[int]:

@@ -31,7 +31,7 @@ class FeetechRegisters:
         }
         self._backup: dict[int, dict[str, int]] = {}
         for row in range(servos):
-            self.reset(row, keep=())
+            self.reset(row, kept_names=())
 
     def __getitem__(self, name: str) -> NDArray[np.int64]:
         """(S,) live view of a register."""
@@ -76,7 +76,7 @@ class FeetechRegisters:
         if name == "ID" and "Secondary ID" in self.values:
             self.put(row, "Secondary ID", value)
 
-    def keep(self, row: int, name: str) -> None:
+    def store(self, row: int, name: str) -> None:
         """Make the present value of a register persistent."""
         self._kept[name][row] = self.values[name][row]
 
@@ -89,11 +89,11 @@ class FeetechRegisters:
             if name in self.values:
                 self.values[name][row] = self.values[source][row]
 
-    def reset(self, row: int, keep: Iterable[str] = ("ID",)) -> None:
-        """Restore all parameters except ``keep``: backed-up ones, else the factory's."""
+    def reset(self, row: int, kept_names: Iterable[str] = ("ID",)) -> None:
+        """Restore all parameters except ``kept_names``: backed-up ones, else the factory's."""
         backup = self._backup.get(row, {})
         for name, kept in self._kept.items():
-            if name not in keep:
+            if name not in kept_names:
                 kept[row] = backup.get(name, self.initial(name))
         self.restart(row)
 

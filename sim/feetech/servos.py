@@ -174,7 +174,7 @@ class FeetechServos(SimulatedServos):
         turn = round(self.facts.units.positions_per_turn)
         offset = round(float(self._ticks()[row])) - position
         self["Homing Offset"][row] = (offset + turn // 2) % turn - turn // 2
-        self.registers.keep(row, "Homing Offset")
+        self.registers.store(row, "Homing Offset")
         self.reset_turns(row)
 
     def reset_turns(self, row: int) -> None:
@@ -318,8 +318,10 @@ class FeetechServos(SimulatedServos):
         drive.torque_on[:] = on | damping
         drive.p_gain_per_rad[:] = np.where(damping, 0.0, np.where(closed, gain, _PUSH_GAIN))
         error = self._trajectory.position - shaft
-        wished = np.where(positions, self._output(seconds, gain, error), gain * error)
-        aim = np.where(closed, shaft + wished / np.maximum(gain, _PUSH_GAIN), push / _PUSH_GAIN)
+        wanted_output = np.where(positions, self._output(seconds, gain, error), gain * error)
+        aim = np.where(
+            closed, shaft + wanted_output / np.maximum(gain, _PUSH_GAIN), push / _PUSH_GAIN
+        )
         mounting = self._mounting
         shift = np.where(closed, mounting.zero_rad, 0.0)
         sensor = self._sensor_sign()

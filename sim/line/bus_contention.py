@@ -20,10 +20,10 @@ def bus_contention(replies: Sequence[Reply], byte_s: float) -> tuple[Reply, bool
     first = min(replies)
     if all(reply == first for reply in replies):
         return first, False
-    mixed = bytearray()
+    garbled = bytearray()
     for delay_s, data in replies:
         offset = round((delay_s - first.delay_s) / byte_s)
-        mixed += b"\xff" * (offset + len(data) - len(mixed))
+        garbled += b"\xff" * (offset + len(data) - len(garbled))
         for k, byte in enumerate(data, offset):
-            mixed[k] &= byte
-    return Reply(first.delay_s, bytes(mixed)), True
+            garbled[k] &= byte
+    return Reply(first.delay_s, bytes(garbled)), True

@@ -148,7 +148,7 @@ class GroupFastPath:
 
     def read_of(self, raw: bytes) -> GroupRead | None:
         """The plain group read in ``raw``, or None."""
-        self._forget_what_changed()
+        self._forget_changed_values()
         read = self._reads.get(raw)
         if read is None:
             read = self._plan(raw)
@@ -156,7 +156,7 @@ class GroupFastPath:
                 self._reads[raw] = read
         return read
 
-    def _forget_what_changed(self) -> None:
+    def _forget_changed_values(self) -> None:
         if self._version != self._handler.version:
             self._version = self._handler.version
             self._reads.clear()
@@ -171,7 +171,7 @@ class GroupFastPath:
             self._firmware.refresh(read.address, read.length)
 
     def _write_goals(self, raw: bytes, now_s: float) -> list[Reply] | None:
-        self._forget_what_changed()
+        self._forget_changed_values()
         head = raw[:12]
         ids = raw[12:-2:5]
         goals = self._goals

@@ -86,10 +86,10 @@ class Instructions:
         return ResultError.NONE if not params else ResultError.DATA_LENGTH
 
     def _factory_reset(self, row: int, params: bytes) -> int:
-        keep = RESET_KEEPS.get(params[0]) if len(params) == 1 else None
-        if keep is None:
+        kept_names = RESET_KEEPS.get(params[0]) if len(params) == 1 else None
+        if kept_names is None:
             return ResultError.DATA_RANGE
-        self.firmware.reboot(row, factory_keeping=keep)
+        self.firmware.reboot(row, factory_keeping=kept_names)
         return ResultError.NONE
 
     def _clear(self, row: int, params: bytes) -> int:
@@ -207,8 +207,8 @@ class InstructionHandler:
     def _imu_at(self, servo_id: int) -> Imu | None:
         """The IMU, if it has this ID and the line's baud rate."""
         imu = self._imu
-        heard = imu is not None and imu.config.id == servo_id and imu.baud == self.baud
-        return imu if heard else None
+        imu_replies = imu is not None and imu.config.id == servo_id and imu.baud == self.baud
+        return imu if imu_replies else None
 
     def _group(self, code: int, params: bytes) -> list[Reply]:
         if code in (Instruction.SYNC_READ, Instruction.FAST_SYNC_READ):
@@ -232,8 +232,8 @@ class InstructionHandler:
     def _ping(self, servo_id: int) -> list[Reply]:
         sent = []
         others = () if self._imu is None else (self._imu.config.id,)
-        everyone = sorted({*self.directory.ids(), *others})
-        for replying_id in everyone if servo_id == BROADCAST_ID else (servo_id,):
+        all_ids = sorted({*self.directory.ids(), *others})
+        for replying_id in all_ids if servo_id == BROADCAST_ID else (servo_id,):
             replies = []
             imu = self._imu_at(replying_id)
             if imu is not None:

@@ -53,7 +53,7 @@ class Mechanics:
     contact_role: NDArray[np.int32]
     """(geoms,) role of a geom in contacts: ``GROUND``, ``FOOT``, or 0 for others."""
     load_n: Floats
-    """(L,) what the ground bore of each link in the last step, N."""
+    """(L,) force of the ground on each link in the last step, N."""
     before_m: Floats
     """(L, 3) centres of the links at the start of the last step."""
     water: Floats

@@ -202,6 +202,6 @@ def fit_coil(links_m: Floats) -> Coil:
     centre = middle + start[2:4] @ side
     around = np.linalg.svd(line[None])[2][1:]
     x, y = around @ (links_m - centre).T
-    wound = np.unwrap(np.arctan2(y, x))
-    winds = abs(float(wound[-1] - wound[0])) if np.hypot(x, y).min() > 1e-6 else 0.0
+    unwrapped_rad = np.unwrap(np.arctan2(y, x))
+    winds = abs(float(unwrapped_rad[-1] - unwrapped_rad[0])) if np.hypot(x, y).min() > 1e-6 else 0.0
     return Coil(line, centre, distances(start), winds)

@@ -68,10 +68,12 @@ class SplitPlant:
         """Step the body under ``drive`` (S,), with its other shafts following."""
         joined = self._drive
         rows = self._simulated
-        for mine, given in zip(joined.columns()[:_INPUTS], drive.columns(), strict=False):
-            mine[rows] = given
+        for joined_column, given in zip(joined.columns()[:_INPUTS], drive.columns(), strict=False):
+            joined_column[rows] = given
         ahead_s = np.clip(until_s - self._measured_at_s, 0.0, AHEAD_S)
         joined.goal_rad[self._real] = self._position_rad + self._velocity_rad_s * ahead_s
         self._plant.advance(until_s, joined)
-        for mine, given in zip(joined.columns()[_INPUTS:], drive.columns()[_INPUTS:], strict=True):
-            given[:] = mine[rows]
+        for joined_column, given in zip(
+            joined.columns()[_INPUTS:], drive.columns()[_INPUTS:], strict=True
+        ):
+            given[:] = joined_column[rows]

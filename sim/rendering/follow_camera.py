@@ -23,13 +23,13 @@ UPRIGHT_LENGTHS: Final = 1.4
 ELEVATIONS_DEG: Final = (19.0, 26.0, 33.0, 40.0, 47.0, 54.0, 61.0, 68.0, 75.0, 82.0)
 """Heights of the camera above the horizon; the first one that sees the body is used."""
 LEVEL: Final = 33.0
-"""The first of them for a body that lies on the ground: it is best seen from above."""
+"""First elevation for a body that lies on the ground: it is best seen from above."""
 BEHIND_DEG: Final = (28.0, -28.0, 62.0, -62.0, 118.0, -118.0, 152.0, -152.0)
 """Directions of view from the heading, by preference: behind the body, to its side, before it."""
 BESIDE_DEG: Final = (118.0, -118.0, 62.0, -62.0, 152.0, -152.0, 28.0, -28.0)
 """The same for a body that stands on legs: from behind, the hind legs hide the front legs."""
 _RELUCTANCE_DEG: Final = 4.0
-"""Mean elevation that a direction must save over the one before it."""
+"""Decrease of mean elevation that justifies another direction."""
 _STRIDE: Final = 5
 """Frames between two tests of the line of sight."""
 _SAMPLES: Final = 40
@@ -61,7 +61,7 @@ class BodyTrack:
 
     @property
     def is_upright(self) -> bool:
-        """Whether it stands on legs that are longer than they reach to the sides."""
+        """Whether the body has legs that are longer than their reach to the sides."""
         if self.parts_m.shape[1] - self.spine < 2:  # a tongue is one bone
             return False
         legs = self.parts_m[:, self.spine :]

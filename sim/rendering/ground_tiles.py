@@ -140,10 +140,13 @@ def _mesh(ground: HeightField, j: Ints, i: Ints, error_m: float, skirt_m: float)
     # around the border, counter-clockwise from above
     border = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
     low = top[border] - [0.0, 0.0, skirt_m]
-    hung = len(top) + np.arange(len(border))
+    lower_index = len(top) + np.arange(len(border))
     after = np.roll(border, -1)
-    hung_after = np.roll(hung, -1)
-    faces += [np.stack([border, hung, hung_after], 1), np.stack([border, hung_after, after], 1)]
+    hung_after = np.roll(lower_index, -1)
+    faces += [
+        np.stack([border, lower_index, hung_after], 1),
+        np.stack([border, hung_after, after], 1),
+    ]
     corners = np.concatenate([top, low])
     wide, high = ground.size_m
     uv = np.column_stack(

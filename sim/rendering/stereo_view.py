@@ -111,9 +111,11 @@ class StereoView:
         if qpos is not None:
             self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
-        everything = mujoco.mjtCatBit.mjCAT_ALL
+        all_categories = mujoco.mjtCatBit.mjCAT_ALL
         view = mujoco.MjvCamera()
-        mujoco.mjv_updateScene(self._model, self._data, option, None, view, everything, self._scene)
+        mujoco.mjv_updateScene(
+            self._model, self._data, option, None, view, all_categories, self._scene
+        )
         taken = []
         for shift_m in (0.0, self._baseline_m):
             drawn = np.zeros((*self._size[::-1], 3))

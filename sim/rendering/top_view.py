@@ -101,8 +101,8 @@ class TopView:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_camlight(model, data)
-        everything = mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(model, data, option, None, self._view, everything, self._scene)
+        all_categories = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(model, data, option, None, self._view, all_categories, self._scene)
 
     def _window(self, links_m: Floats) -> tuple[int, int, int, int]:
         """First and end columns and rows that contain the robot and its shade."""

@@ -47,8 +47,8 @@ class TrailLine:
 
     def add(self, scene: mujoco.MjvScene, now_s: float) -> None:
         """Append the end of the line up to a time."""
-        been = int(np.searchsorted(self.time_s, now_s, side="right"))
-        for k in range(max(1, been - MOST), been):
+        past_count = int(np.searchsorted(self.time_s, now_s, side="right"))
+        for k in range(max(1, past_count - MOST), past_count):
             kind = mujoco.mjtGeom.mjGEOM_LINE
             piece = _next_geom(scene)
             mujoco.mjv_initGeom(piece, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), self.rgba)

@@ -102,5 +102,5 @@ def feetech_line(servos: FeetechServos, baud: int, clock: SimClock | None = None
     code = baud_code(servos.facts, baud)
     for row in range(len(servos)):
         servos["Baud Rate"][row] = code
-        servos.registers.keep(row, "Baud Rate")
+        servos.registers.store(row, "Baud Rate")
     return FeetechLine(servos, clock, baud)

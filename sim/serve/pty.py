@@ -212,7 +212,7 @@ class PtyServer:
             where = os.readlink(link) if link.is_symlink() else "a file"
             text = f"leads to {where} now"
         except OSError as error:
-            text = f"was deleted and cannot be made again: {error.strerror}"
+            text = f"was deleted and cannot be created again: {error.strerror}"
         self._link = None
         _LOGGER.warning("%s: %s; the servos are at %s", link, text, self.path)
 

@@ -60,7 +60,7 @@ class RecordedLine(Wire):
                 exchanges[-1].replies.append(Reply(max(begin_s - quiet_s, 0.0), data))
             quiet_s = time_s
         if not exchanges:
-            raise InputError(f"{path}: no host sends anything in it")
+            raise InputError(f"{path}: contains no packet of a host")
         return RecordedLine(exchanges, baud)
 
     @property

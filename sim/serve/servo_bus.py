@@ -49,10 +49,10 @@ class ServoBus:
         plan = load(Path(faults), FaultPlan) if isinstance(faults, str | Path) else faults
         self._faults = None if plan is None else FaultPlayer(self.line, plan)
         self._packets: list[DecodedPacket] = []
-        self._heard: deque[tuple[float, bytes]] = deque()  # decoded when a test asks
+        self._raw_packets: deque[tuple[float, bytes]] = deque()  # decoded when a test asks
         records = dict(zip(chain.ids, chain.records(), strict=True))
         self._decoder = decoder_for(records[chain.ids[0]], records)
-        self.line.taps.append(lambda at_s, _, data: self._heard.append((at_s, bytes(data))))
+        self.line.taps.append(lambda at_s, _, data: self._raw_packets.append((at_s, bytes(data))))
         self._baud = baud
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
@@ -128,8 +128,8 @@ class ServoBus:
     @property
     def packets(self) -> list[DecodedPacket]:
         """Requests and replies so far, decoded."""
-        while self._heard:
-            self._packets += self._decoder.feed(*self._heard.popleft())
+        while self._raw_packets:
+            self._packets += self._decoder.feed(*self._raw_packets.popleft())
         return self._packets
 
     @property

@@ -163,7 +163,7 @@ class ServoBank:
         )
         self._registered: dict[int, tuple[int, bytes]] = {}
         self._backup: dict[int, bytes] = {}
-        self.reset(np.arange(len(self.ids)), keep=())
+        self.reset(np.arange(len(self.ids)), kept_names=())
         self["ID"][:] = self.ids
         self._codes = [
             {rate: code for code, rate in enumerate(registers.facts.bauds)}
@@ -284,13 +284,15 @@ class ServoBank:
         self["Registered Instruction"][row] = 0
         return self._registered.pop(row, None)
 
-    def reset(self, rows: Indices, keep: Sequence[str], ram_only: bool = False) -> None:
+    def reset(self, rows: Indices, kept_names: Sequence[str], ram_only: bool = False) -> None:
         """Set initial values, in the RAM only (reboot) or in both areas (factory reset)."""
         for kind, rows_of_kind in self._kinds:
             some = np.intersect1d(rows, rows_of_kind)
             for name, rule in kind.rules.items():
                 register = kind.registers[name]
-                if name not in keep and not (ram_only and register.address < kind.facts.ram_from):
+                if name not in kept_names and not (
+                    ram_only and register.address < kind.facts.ram_from
+                ):
                     self._column(register)[some] = rule.initial
             for goal in GOALS[:3]:
                 if goal in kind.registers:

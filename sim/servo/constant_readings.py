@@ -17,7 +17,7 @@ class ConstantReadings:
 
     @property
     def any(self) -> bool:
-        """Whether there are any."""
+        """Whether there are constant readings."""
         return bool(self._values)
 
     def set(self, rows: NDArray[np.intp], name: str, value: int | None) -> None:

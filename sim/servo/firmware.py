@@ -64,7 +64,7 @@ class Watchdog:
         self.due_s = self.fed_s + self.timeout_s
 
     def trip(self, time_s: float) -> Bools:
-        """Put those expired by ``time_s`` into the error state; return them (S,)."""
+        """Put servos whose watchdog expired by ``time_s`` into the error state; return (S,)."""
         dog = self._bank["Bus Watchdog"]
         late = self._watched & (self.fed_s + WATCHDOG_UNIT_S * dog <= time_s + ROUNDING_S)
         dog[late] = WATCHDOG_TRIPPED
@@ -259,9 +259,9 @@ class Firmware:
         """Restart one servo; with ``factory_keeping``, first reset all other registers."""
         rows = np.array([row])
         if factory_keeping is None:
-            self.bank.reset(rows, keep=(), ram_only=True)
+            self.bank.reset(rows, kept_names=(), ram_only=True)
         else:
-            self.bank.reset(rows, keep=factory_keeping)
+            self.bank.reset(rows, kept_names=factory_keeping)
         self.power_up(rows)
 
     def power_up(self, rows: NDArray[np.intp]) -> None:
@@ -346,7 +346,7 @@ class Firmware:
     def restore_power(self, rows: NDArray[np.intp]) -> None:
         """Restore the supply: the servos restart without their turn counts."""
         self.powered[rows] = True
-        self.bank.reset(rows, keep=(), ram_only=True)
+        self.bank.reset(rows, kept_names=(), ram_only=True)
         self.power_up(rows)
 
     # from shafts to registers

@@ -41,7 +41,7 @@ class MotorModel:
     winding_k_per_w: float
     """Heating of the housing sensor in the long run, kelvin per watt of I^2 R (ours)."""
     thermal_time_s: float
-    """Time constant of that heating (ours)."""
+    """Time constant of the winding's heating (ours)."""
     positions_per_rad: float
     full_pwm: float
     """Goal PWM of full output."""

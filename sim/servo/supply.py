@@ -63,8 +63,8 @@ class Cabling:
         """Cables and leads of a robot from ``power``."""
         ids = robot.servo_ids
         cables_ohm = power.cables_ohm or (power.cable_ohm,) * (len(ids) - 1)
-        fed = power.inject_ids or ids[:1]
-        lead_ohm = [power.lead_ohm if servo_id in fed else math.inf for servo_id in ids]
+        is_fed = power.inject_ids or ids[:1]
+        lead_ohm = [power.lead_ohm if servo_id in is_fed else math.inf for servo_id in ids]
         return Cabling(np.array(cables_ohm, dtype=np.float64), np.array(lead_ohm))
 
     def servo_v(

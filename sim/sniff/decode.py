@@ -57,9 +57,9 @@ class DecodedPacket:
     def text(self) -> str:
         """Line for people."""
         arrow = {"question": "->", "answer": "<-", "noise": "??"}[self.kind]
-        who = {BROADCAST_ID: "all", -1: "?"}.get(self.servo_id, str(self.servo_id))
+        target = {BROADCAST_ID: "all", -1: "?"}.get(self.servo_id, str(self.servo_id))
         said = ", ".join(self._by_register())
-        return f"{self.time_s:12.6f}  {arrow} {who:>3}  {self.name:<16} {said or self.raw}"
+        return f"{self.time_s:12.6f}  {arrow} {target:>3}  {self.name:<16} {said or self.raw}"
 
     def _by_register(self) -> Iterator[str]:
         """Values as text; a register of several servos once, with its values in order."""

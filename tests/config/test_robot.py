@@ -82,7 +82,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
         ({"joints": 3}, "joints: must be a list"),
         (
             {"joint_axes": "yyy", "joints": [{"id": 3}, {}, {}]},
-            "ID 3 is of more than one joint",
+            "ID 3 is the ID of several joints",
         ),
         (
             {"joint_axes": "y", "joints": [{"current_limit_a": 1.0}]},

@@ -21,7 +21,7 @@ _VIEWS_FROM_ABOVE = ("top", "below")
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A photograph, as it was asked for."""
+    """A photograph that an option names."""
 
     view: str
     """Name of the view of a photograph, one of ``VIEWS``."""
@@ -36,7 +36,7 @@ class SkinPicture:
 
     picture: Image | None = None
     is_around: bool = False
-    """Whether it shows the whole skin, instead of its upper half."""
+    """Whether the photograph shows the complete skin, instead of its upper half."""
     shown: tuple[tuple[Image, Floats, Floats], ...] = ()
     """Image, skeleton (P, 2) and radii (P,) of each photograph."""
     facts: dict[str, object] = field(default_factory=dict)
@@ -140,13 +140,13 @@ def _photographed_body(
     if x.min() < -1.0 or y.min() < -1.0 or x.max() > columns or y.max() > rows:
         raise InputError(
             f"{shot.file}: the skeleton does not lie in this picture of {columns} x {rows} pixels; "
-            "say which --frame of the track it shows"
+            "give the --frame of the track that it shows"
         )
     return image, points, track.radius[shot.frame]
 
 
 def _read_picture(image: Path) -> Image:
-    """Grey or colour, whatever the file holds."""
+    """Grey or coloured image of a file."""
     try:
         with Pillow.open(image) as picture:
             return np.asarray(picture.convert("RGB"))
@@ -163,4 +163,4 @@ def check_frame(name: str, points: Floats, frame: int) -> None:
     if not 0 <= frame < len(points):
         raise InputError(f"{name}: frame {frame} is not in 0..{len(points) - 1}")
     if not np.isfinite(points[frame]).all():
-        raise InputError(f"{name}: frame {frame} holds no whole skeleton")
+        raise InputError(f"{name}: frame {frame} contains no complete skeleton")

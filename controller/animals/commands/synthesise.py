@@ -78,7 +78,7 @@ TongueFile = Annotated[
     typer.Option(
         "--tongue",
         help="CSV table of a tracked tongue, to learn its chain from: time_s, and length_m or "
-        "height (0 to 1); default: made-up strokes",
+        "height (0 to 1); default: random strokes",
     ),
 ]
 Frames = Annotated[

@@ -11,7 +11,7 @@ from snakewalk.controller.animals.fish.postures import Postures
 
 @dataclass(frozen=True, slots=True)
 class Accuracy:
-    """Errors over the frames that both have."""
+    """Errors over the frames that have a known and an estimated posture."""
 
     angles_rad: Floats
     """(n, J) absolute error of each spine angle."""

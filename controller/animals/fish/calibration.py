@@ -70,7 +70,7 @@ def calibrate(model: FishModel, sample: list[SilhouetteFrame], name: str = "film
 
 
 def _with_fins(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> FishModel:
-    """Fins of the largest V: those that stand out from the body widen what is read off there."""
+    """Fins of the largest V: fins that stand out from the body widen the measured outline."""
     variants = [model.with_fins(length) for length in FINS]
     return max(
         variants, key=lambda variant: float(np.median([_value(variant, *pair) for pair in good]))
@@ -78,7 +78,7 @@ def _with_fins(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> F
 
 
 def _value(model: FishModel, frame: SilhouetteFrame, match: Match) -> float:
-    """V of a posture that was found, with another model."""
+    """V of a fitted posture, with another model."""
     scale = min(1.0, 200.0 / model.length_px)
     window = window_of(frame, model, match.parameters[:2], scale)
     return (

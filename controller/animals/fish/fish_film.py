@@ -220,7 +220,7 @@ def _truth(motion: str | None, build: str, frames: int | None) -> tuple[Postures
 
 
 def _write(file: Path, image: Image) -> None:
-    """Write a picture whole.
+    """Write a picture completely, or not at all.
 
     Raises:
         OSError: OpenCV cannot write it.

@@ -78,7 +78,7 @@ class SynthesisFacts:
 
 @dataclass(frozen=True, slots=True)
 class SynthesisedMotion:
-    """A motion and where it is from."""
+    """A motion and its source."""
 
     source: Postures
     segments: list[MotionSegment]
@@ -90,7 +90,7 @@ class SynthesisedMotion:
     facts: SynthesisFacts
 
     def save(self, file: Path) -> None:
-        """Write it as a recording that a run accepts."""
+        """Write the motion as a recording that a run accepts."""
         save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
 
 

@@ -168,7 +168,7 @@ def track_film(
             aligned = [start for start in starts if np.cos(start[2] - last[2]) > 0.0]
             previous = search(frame, model, [ahead, last, *aligned], near=ahead[:2], from_level=1)
         if previous is None or previous.value < LEAST_VALUE:
-            previous = _search_anew(frame, model, starts, travel if last is None else None)
+            previous = _search_from_starts(frame, model, starts, travel if last is None else None)
         if previous is None or previous.value < LEAST_VALUE:
             last = None
             yield TrackedFrame(None, "no posture fits")
@@ -183,7 +183,7 @@ def track_film(
         yield TrackedFrame(Match(parameters, previous.value))
 
 
-def _search_anew(
+def _search_from_starts(
     frame: SilhouetteFrame, model: FishModel, starts: list[Floats], travel: Floats | None
 ) -> Match | None:
     """Search with the head at either end; V decides, and the direction of travel only in a tie."""

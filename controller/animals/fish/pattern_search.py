@@ -61,9 +61,9 @@ def pattern_search(
             if trial_cost <= best:
                 break
             while trial_cost > best and used < evaluations:
-                leap = there + (there - point)
+                jump_point = there + (there - point)
                 point = there
                 best = trial_cost
-                there, trial_cost = explore(leap, score(leap), size)
+                there, trial_cost = explore(jump_point, score(jump_point), size)
         size *= 0.5
     return point, best

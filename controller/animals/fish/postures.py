@@ -37,7 +37,7 @@ class Postures:
     value: Floats | None = None
     """(T,) V of Eq. 3; at most 1 + W."""
     model: FishModel | None = None
-    """The fish that was matched; None of tracked midlines."""
+    """The matched fish; None for tracked midlines."""
     name: str = "fish"
     source: str = "not stated"
     licence: str = "not stated"
@@ -211,7 +211,7 @@ def holds_postures(path: Path) -> bool:
 
 
 def holds_fish(path: Path) -> bool:
-    """Whether it holds the fish that was matched as well."""
+    """Whether the file also contains the matched fish."""
     return holds_postures(path) and _names(path) >= {*_SECTIONS}
 
 
@@ -224,7 +224,7 @@ def _names(path: Path) -> set[str]:
 
 
 def _model(path: Path, arrays: dict[str, Any], joints_at: tuple[float, ...]) -> FishModel | None:
-    """The fish that was matched, where the file holds it."""
+    """The matched fish, if the file contains it."""
     if not arrays.keys() >= {*_SECTIONS, "build", "length_px"}:
         return None
     wide, high = (np.asarray(arrays[key], float) for key in _SECTIONS)

@@ -24,7 +24,7 @@ class Surroundings:
 
     @property
     def any(self) -> bool:
-        """Whether there is something to avoid."""
+        """Whether there are walls or other fish to avoid."""
         return self.tank is not None or bool(self.others)
 
     def clearance(self, path: Floats, start: int) -> float:

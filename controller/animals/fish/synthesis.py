@@ -36,7 +36,7 @@ class PieceSequence:
 
     order: tuple[int, ...]
     forced: int
-    """Joins that no rule permits, made because nothing else was left."""
+    """Joins without a permitting rule, used if no other piece was left."""
     reached_s: tuple[float, ...] = ()
     """Times at which the control points were reached."""
     reached_at: tuple[int, ...] = ()
@@ -339,7 +339,7 @@ def _append_piece(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, ai
 
 
 def _cost(node: _Node, aim: _Aim) -> tuple[int, int, float]:
-    """Fewest crowded pieces, more points, then nearer to the next one; after the last, sooner."""
+    """Sort key: crowded pieces, points reached, distance to the next one; after the last, time."""
     points = aim.points
     if len(node.reached_at) == len(points):
         return node.crowded, -len(points), float(node.reached_at[-1])

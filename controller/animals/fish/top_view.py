@@ -81,7 +81,7 @@ class TopViewFit:
         return self._target.soft(self.outline(parameters))
 
     def value(self, parameters: Floats) -> float:
-        """V of Eq. 3; a folded spine is worth nothing."""
+        """V of Eq. 3; a folded spine has the value 0."""
         if np.abs(parameters[3:]).max() > _FOLDED_BEND_RAD:
             return float("-inf")
         return self._target.value(self.outline(parameters), self._weight)

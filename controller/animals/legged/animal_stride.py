@@ -24,7 +24,7 @@ A line behind # shows a key with its default."""
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Which keypoints are what."""
+    """Keypoints of the spine, the girdles and the feet."""
 
     spine: tuple[str, ...]
     """Names of the keypoints of the spine, head first."""
@@ -58,7 +58,7 @@ class Names:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredAnimal:
-    """A stride, and the animal that moves so."""
+    """A stride, and the animal that moves by it."""
 
     stride: Stride
     animal: AnimalConfig

@@ -63,8 +63,8 @@ class SynthesisedAnimal:
         """Largest distance that a foot moved while it was on the ground."""
         foot = self.motion.foot_m
         on = self.motion.on_ground
-        stays = on[1:] & on[:-1]
-        return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays].max(initial=0.0))
+        stays_down = on[1:] & on[:-1]
+        return float(np.linalg.norm(np.diff(foot, axis=0), axis=-1)[stays_down].max(initial=0.0))
 
     @property
     def stance_slip_m(self) -> float:

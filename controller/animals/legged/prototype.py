@@ -177,7 +177,7 @@ def _spine_rad(animal: AnimalConfig, cycles: Floats, along: Floats) -> Floats:
 
 
 def _ride(animal: AnimalConfig, pair: LegPairConfig, ahead_m: Floats, phase: Floats) -> Floats:
-    """(T,) height of the body over a pair: that of the feet that bear it, by vault.
+    """(T,) height of the body over a pair of legs: mean of the feet on the ground, and vault.
 
     A foot that comes down or leaves supports little. When one foot replaces the other, both are
     equally far from the hip, so the height has no step.

@@ -137,7 +137,7 @@ def _median_radius(body: Silhouettes) -> Floats:
     """(101,) radii over the body's length."""
     is_complete = np.isfinite(body.points).all(axis=(1, 2)) & np.isfinite(body.radius).all(axis=1)
     if not is_complete.any():
-        raise InputError("body: no frame holds a whole skeleton with its widths")
+        raise InputError("body: no frame contains a complete skeleton with its widths")
     chord = np.hypot(*np.diff(body.points[is_complete], axis=1).transpose(2, 0, 1))
     length = chord.sum(axis=1)
     arc = np.concatenate([np.zeros((len(chord), 1)), np.cumsum(chord, axis=1)], axis=1)

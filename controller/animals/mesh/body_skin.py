@@ -36,7 +36,7 @@ from snakewalk.controller.track.readers.generated import EMBEDDED, embedded
 SKINS = shipped("skins")
 """Names of the shipped skins."""
 _DEFAULT_ANIMAL = "snake"
-"""Whose colours a body without a picture wears."""
+"""Animal whose colours a body without a picture has."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,7 +41,7 @@ class CrossSections:
     length_m: float
     """Length of the body; 1 without a scale."""
     axis_m: float
-    """Height of the line that bends."""
+    """Height of the bending line."""
 
 
 def skin_model(config: SkinConfig) -> tuple[BodyModel, Floats]:

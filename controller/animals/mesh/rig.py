@@ -20,7 +20,7 @@ class Rig:
     rest_m: Floats
     """(K, 3) fronts of the bones at rest."""
     parent: Ints
-    """(K,) the bone that carries each one, before it in order; -1 none."""
+    """(K,) parent of each bone, earlier in the order; -1: none."""
     names: tuple[str, ...]
     """K names of the bones, such as ``thigh_left``."""
 

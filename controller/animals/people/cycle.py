@@ -193,12 +193,12 @@ def animate(
     size = skeleton.stature_m
     given = FootParameters(size * gait.height, size * gait.length, gait.duty)
     phase = np.arange(cycles * frames + 1) / frames
-    ways = feet(law, given, phase)
-    speed_m_s = 2.0 * given.length_m / ways.duty / gait.cycle_s
+    foot_paths = feet(law, given, phase)
+    speed_m_s = 2.0 * given.length_m / foot_paths.duty / gait.cycle_s
     time_s = phase * gait.cycle_s
     travel_m = np.zeros_like(time_s) if in_place else speed_m_s * time_s
-    pitch, toes = _foot_pitch(gait, ways)
-    ankle_m = _ankles(skeleton, gait, ways, pitch)
+    pitch, toes = _foot_pitch(gait, foot_paths)
+    ankle_m = _ankles(skeleton, gait, foot_paths, pitch)
     pelvis, chest = _trunk_turns(gait, phase)
     hips = _hips(skeleton, pelvis)
     pelvis_m = _pelvis(skeleton, gait, phase, ankle_m, hips)
@@ -208,7 +208,7 @@ def animate(
     turn = _turns(skeleton, gait, phase, (pelvis, chest), (pitch, toes))
     front = _joints(skeleton, pelvis_m, turn, ankle_m)
     bones = BoneMotion(time_s, front, turn, skeleton.length_m)
-    return PersonMotion(bones, ways, ankle_m, speed_m_s, gait.cycle_s)
+    return PersonMotion(bones, foot_paths, ankle_m, speed_m_s, gait.cycle_s)
 
 
 def scaled(
@@ -223,34 +223,34 @@ def scaled(
     )
 
 
-def _foot_pitch(gait: PersonGait, ways: Feet) -> tuple[Floats, Floats]:
+def _foot_pitch(gait: PersonGait, foot_paths: Feet) -> tuple[Floats, Floats]:
     """(T, 2) pitch of feet and of toes, radians, toes up above 0."""
     place, angle = np.array(gait.pitch).T
     # the keys belong to the gait's duty; they stretch to that of the law
     place = np.where(
         place <= gait.duty,
-        place / gait.duty * ways.duty,
-        1.0 - (1.0 - place) / (1.0 - gait.duty) * (1.0 - ways.duty),
+        place / gait.duty * foot_paths.duty,
+        1.0 - (1.0 - place) / (1.0 - gait.duty) * (1.0 - foot_paths.duty),
     )
     around = PchipInterpolator(
         np.concatenate([place - 1.0, place, place + 1.0]), np.radians(np.tile(angle, 3))
     )
-    pitch = np.asarray(around(ways.at))
-    air = np.clip((ways.at - ways.duty) / (1.0 - ways.duty), 0.0, 1.0)
+    pitch = np.asarray(around(foot_paths.at))
+    air = np.clip((foot_paths.at - foot_paths.duty) / (1.0 - foot_paths.duty), 0.0, 1.0)
     straight = np.clip(air / 0.45, 0.0, 1.0)
     straight = straight**2 * (3.0 - 2.0 * straight)
     return pitch, np.maximum(pitch, 0.0) + straight * np.minimum(pitch, 0.0)
 
 
-def _ankles(skeleton: PersonSkeleton, gait: PersonGait, ways: Feet, pitch: Floats) -> Floats:
+def _ankles(skeleton: PersonSkeleton, gait: PersonGait, foot_paths: Feet, pitch: Floats) -> Floats:
     """(T, 2, 3) ankles: the foot rolls over heel and ball."""
     size = skeleton.stature_m
     high = float(skeleton.joint_m[INDEX["left foot"], 2])
     pivot = size * np.where(pitch > 0.0, HEEL, BALL)
     back = -pivot
     up = np.full_like(pivot, high)
-    x = ways.ahead_m + size * gait.middle + pivot + back * np.cos(pitch) - up * np.sin(pitch)
-    z = ways.height_m + back * np.sin(pitch) + up * np.cos(pitch)
+    x = foot_paths.ahead_m + size * gait.middle + pivot + back * np.cos(pitch) - up * np.sin(pitch)
+    z = foot_paths.height_m + back * np.sin(pitch) + up * np.cos(pitch)
     y = np.broadcast_to(size * gait.side * np.array([1.0, -1.0]), x.shape)
     return np.stack([x, y, z], axis=-1)
 

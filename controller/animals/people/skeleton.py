@@ -67,7 +67,7 @@ class PersonSkeleton:
     length_m: Floats
     """(K,) lengths of the bones."""
     parent: Ints
-    """(K,) bone that carries each one; -1: none."""
+    """(K,) parent of each bone; -1: none."""
 
     @classmethod
     def of(cls, stature_m: float) -> "PersonSkeleton":

@@ -56,17 +56,17 @@ def film_successors(film: FilmStates, points: int) -> list[list[int]]:
     parts = np.concatenate([film.states.real, film.states.imag], axis=1)
     squares = (parts**2).sum(axis=1)
     distance = np.sqrt(np.maximum(squares[:, None] + squares - 2.0 * parts @ parts.T, 0.0))
-    goes_on = np.append(np.diff(film.frame) == 1, [False])
-    limit = float(np.median(np.diagonal(distance, 1)[goes_on[:-1]]))
-    similar = (distance <= limit) & (frame_gap > 1) & goes_on
-    far = goes_on & (frame_gap >= 0.5 * points / film.typical_pulse_points)
+    is_followed = np.append(np.diff(film.frame) == 1, [False])
+    limit = float(np.median(np.diagonal(distance, 1)[is_followed[:-1]]))
+    similar = (distance <= limit) & (frame_gap > 1) & is_followed
+    far = is_followed & (frame_gap >= 0.5 * points / film.typical_pulse_points)
     successors = []
     for state in range(len(film.frame)):
         after = {int(other) + 1 for other in np.flatnonzero(similar[state])} - {state}
-        if goes_on[state]:
+        if is_followed[state]:
             after.add(state + 1)
         if not after:
-            others = np.flatnonzero(far[state] if far[state].any() else goes_on)
+            others = np.flatnonzero(far[state] if far[state].any() else is_followed)
             after.add(int(others[np.argmin(distance[state, others])]) + 1)
         successors.append(sorted(after))
     return successors

@@ -192,7 +192,7 @@ def synthesise(
 
 
 def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, int]:
-    """Angles with the ends held, and n_0: the first point that follows the track unheld.
+    """Angles with fixed ends, and n_0: the first point that follows the track freely.
 
     [PT] 2.6.3 lets n_0 change over time. Behind a held head the neck leads.
     """

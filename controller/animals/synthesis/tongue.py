@@ -41,7 +41,7 @@ class TongueRecord:
     @classmethod
     def made_up(cls) -> "TongueRecord":
         """Use ``flicks``."""
-        return cls(flicks(), 25.0, "assumed", "made-up bursts of strokes")
+        return cls(flicks(), 25.0, "assumed", "random bursts of strokes")
 
     @classmethod
     def read(cls, file: Path) -> "TongueRecord":

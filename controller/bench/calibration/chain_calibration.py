@@ -162,7 +162,7 @@ def unknown_chain(like: RobotConfig, servos: Mapping[int, str], current_a: float
         shown = ", ".join(map(str, servos)) or "none"
         raise InputError(
             f"robot {like.name} has {like.joint_count} joints, the bus {len(servos)} servos (ID "
-            f"{shown}): connect all of the robot's, and no others, or say another robot"
+            f"{shown}): connect all of the robot's, and no others, or name another robot"
         )
     joints = tuple(
         JointConfig(
@@ -271,7 +271,7 @@ class _Steps:
         if not 0 <= bend.joint < self.like.joint_count or bend.joint in parent_by_joint:
             raise InputError(
                 f"ID {servo_id}: the joint that moved, number {bend.joint + 1} from the head, is "
-                f"known already or not of {self.like.name}"
+                f"assigned already, or {self.like.name} has no such joint"
             )
         self.journal.note(bends={**self.known.bends, servo_id: bend})
 
@@ -295,8 +295,8 @@ class _Steps:
                         servo_and_side = servo_id, side
                         if servo_and_side not in stops:
                             self.on_progress(f"range of {self.label(servo_id)}")
-                            keep = partial(stops.__setitem__, servo_and_side)
-                            push(row, side * bend.direction, reach_rad, keep)
+                            record_stop = partial(stops.__setitem__, servo_and_side)
+                            push(row, side * bend.direction, reach_rad, record_stop)
                     low, high = stops[servo_id, -1], stops[servo_id, 1]
                     ends = JointRange(low_rad=None if low is None else -low, high_rad=high)
                     self.journal.note(ranges={**self.known.ranges, servo_id: ends})

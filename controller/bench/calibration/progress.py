@@ -36,7 +36,7 @@ class JointRange(Strict):
 
 
 class CalibrationProgress(Strict):
-    """Everything that is known of a chain so far; all tables are by servo ID."""
+    """Facts about a chain so far; all tables are by servo ID."""
 
     joint_axes: str = Field(
         description="axis of each joint from head to tail: y for yaw, p for pitch"

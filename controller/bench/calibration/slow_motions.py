@@ -37,24 +37,24 @@ from snakewalk.drivers.types import JointCommand, JointState
 WIGGLE_RAD = 0.25
 """Amplitude with which a joint is wiggled (ours)."""
 WIGGLE_S = 0.8
-"""Duration of the way there, and of the way back (ours)."""
+"""Duration of a motion out, and of its return (ours)."""
 MOVED_SHARE = 0.5
-"""A joint that makes less of its wiggle is held or has no power (ours)."""
+"""Least share of a wiggle: a joint that moves less is held or has no power (ours)."""
 SWEEP_RAD_S = 1.0
 """Speed of the sweep (ours)."""
 _WEAK_SHARE = 0.3
 """Speed of the sweep of a servo with limited output, as a share of its speed without load
 (ours)."""
 STOP_LAG_RAD = 0.1
-"""A joint that is so far behind its goal, and pushes ... (ours)."""
+"""Distance behind its goal of a pushing joint that has met its stop (ours)."""
 STOP_EFFORT = 0.8
 """... with this share of its goal current, for ... (ours)."""
 STOP_S = 0.2
-"""... for this time, s, has met its stop (ours)."""
+"""Time for which a joint pushes until it has met its stop, s (ours)."""
 REST_S = 0.3
 """Longest time for a joint to come to rest before the next moves, s (ours)."""
 RANGE_RAD = 3.1
-"""A servo knows one turn only."""
+"""Range of a servo: one turn."""
 BUS_TRIES = 6
 """Tries of a transaction: more than in a run, since no deadline waits for it (ours)."""
 _STALE_S = 0.4
@@ -193,7 +193,7 @@ class CalibrationBench:
         row: int,
         side: int,
         reach_rad: float,
-        keep: Callable[[float | None], None],
+        record_stop: Callable[[float | None], None],
     ) -> None:
         """Bend one joint one way and back.
 
@@ -205,7 +205,7 @@ class CalibrationBench:
             row: of the servo.
             side: 1 or -1.
             reach_rad: how far to look for a stop.
-            keep: gets the distance to the stop, rad, or None, before the joint goes back.
+            record_stop: gets the distance to the stop, rad, or None, before the joint goes back.
 
         """
         zero_rad = float(held_rad[row])
@@ -227,7 +227,7 @@ class CalibrationBench:
                 ahead = side * (goal - zero_rad) + self._speed_rad_s[row] * _CYCLE_S
                 goal = zero_rad + side * min(ahead, reach_rad)
             self._write(link, held_rad, row, goal)
-        keep(stop)
+        record_stop(stop)
         self._go(link, held_rad, row, goal, zero_rad)
 
     def _go(self, link: SafeLink, held_rad: Floats, row: int, start: float, end: float) -> None:

@@ -53,7 +53,9 @@ def bus_identify(
             )
         ]
     if not entries:
-        raise InputError(f"{lines.port}: nobody answers: power? cable? adapter's switch?")
+        raise InputError(
+            f"{lines.port}: no servo replies; check power, cable and the adapter's switch"
+        )
     for note in lines.misplaced((name, entry.found.servo_id) for name, entry in entries):
         LOGGER.warning("%s", note)
     if out is not None:
@@ -74,12 +76,12 @@ def bus_identify(
     for name, entry in entries:
         servo = entry.found
         state = entry.report
-        state_told = ("-",) * 3
+        state_cells = ("-",) * 3
         if state is not None:
             torque = "on" if state.torque_on else "off"
-            state_told = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
+            state_cells = f"{state.voltage_v:.1f}", f"{state.temperature_c:.0f}", torque
         about = (servo.servo_id, servo.model, servo.firmware, servo.baud)
-        rows.append((*about, *state_told, entry.fault, *([name] if lines.several else [])))
+        rows.append((*about, *state_cells, entry.fault, *([name] if lines.several else [])))
     print_table((*heads, *(["port"] if lines.several else [])), rows)
     if out is not None:
         console.print(

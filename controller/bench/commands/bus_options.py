@@ -25,6 +25,6 @@ def confirmed(action: str, question: str, *, as_json: bool) -> bool:
 
     """
     if as_json or not sys.stdin.isatty():
-        reason = "--json is for programs" if as_json else "a terminal is missing"
+        reason = "--json: is for programs; leave it out" if as_json else "a terminal is missing"
         raise InputError(f"{action} asks first, but {reason}; nothing is changed; add --yes")
     return typer.confirm(question, default=False, err=True)

@@ -138,9 +138,11 @@ def serve(
     if sum(given_source is not None for given_source in (servos, robot or run, play)) > 1:
         raise InputError("give one of --servos, --robot, --run and --play")
     if play is not None and (imu is not None or faults is not None):
-        raise InputError("--play: has what was recorded; leave --imu and --faults out")
+        raise InputError("--play: repeats a recorded exchange; leave --imu and --faults out")
     if imu is not None and body.is_given:
-        raise InputError("--imu: with --robot, its file says it: table [imu]")
+        raise InputError(
+            "--imu: the robot's file describes its IMU in the table [imu]; leave --imu out"
+        )
     _check_serving(latency, for_s, record, link)
     refuse_to_overwrite([record, truth], force)
     refuse_to_overwrite([link], force=True)
@@ -176,7 +178,7 @@ def serve(
     if as_json:
         _print_counts(traffic, server)
     else:
-        _tell_what_was_lost(late_share, server.output_flushes)
+        _report_losses(late_share, server.output_flushes)
 
 
 def _publisher(
@@ -213,7 +215,7 @@ def _check_serving(
 
     """
     if not 0.0 <= latency < math.inf:
-        raise InputError(f"--latency {latency:g}: must not be negative, nor without end")
+        raise InputError(f"--latency {latency:g}: must be finite and at least 0 ms")
     if latency > 1e4:  # no client waits for it (ours)
         raise InputError(f"--latency {latency:g}: must be at most 10000 ms")
     if for_s is not None and not for_s > 0.0:
@@ -222,7 +224,7 @@ def _check_serving(
         raise InputError("--record and --link have the same name")
 
 
-def _tell_what_was_lost(late_share: float, output_flushes: int) -> None:
+def _report_losses(late_share: float, output_flushes: int) -> None:
     """Say at the end what the machine or the client did that no real bus does."""
     if late_share > LATE_SHARE:
         LOGGER.warning(
@@ -323,7 +325,7 @@ def _run(
 
 def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console:
     if as_json:
-        raise InputError("--console: is a person's; leave --json out")
+        raise InputError("--console: reads the commands of a person; leave --json out")
     if not isinstance(line, SimLine):
         raise InputError("--console: servos of Protocol 2.0 have one")
     return Console(line, player or FaultPlayer(line, FaultPlan()))
@@ -331,14 +333,14 @@ def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console
 
 def _converse(server: "PtyServer", console: Console, stopped: Callable[[], bool]) -> None:
     console.set_pace = server.set_pace
-    heard = sys.stdin.fileno()
+    terminal = sys.stdin.fileno()
     unread = ""
     listening = True
     while not stopped():
         server.step(STEP_S)
-        if not listening or not select.select([heard], [], [], 0.0)[0]:
+        if not listening or not select.select([terminal], [], [], 0.0)[0]:
             continue
-        more = os.read(heard, 4096).decode(errors="replace")
+        more = os.read(terminal, 4096).decode(errors="replace")
         listening = bool(more)
         *lines, unread = (unread + more).split("\n")
         for text in filter(str.strip, lines):

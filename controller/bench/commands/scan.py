@@ -72,6 +72,6 @@ def _print_servos(results: list[tuple[str, scanning.ScanResult]], several: bool)
 def _silence(bauds: list[int] | None) -> str:
     """Return what a silent bus means, and what to do."""
     if not bauds:
-        return "nobody answers at any baud rate: power? cable? adapter's switch?"
+        return "no servo replies at any baud rate; check power, cable and the adapter's switch"
     rates = " or ".join(str(rate) for rate in bauds)
-    return f"nobody answers at {rates} baud; leave --baud out to search all rates"
+    return f"no servo replies at {rates} baud; leave --baud out to search all rates"

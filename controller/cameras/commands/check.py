@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.controller.cameras.camera_findings import camera_findings
-from snakewalk.controller.cameras.camera_watch import CameraWatch, nobody
+from snakewalk.controller.cameras.camera_watch import CameraWatch, show_nothing
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.findings_table import show_findings
 from snakewalk.controller.console.options import (
@@ -57,7 +57,7 @@ def check(
         job = prepared.run.model_copy(update={"pose": "camera"})
         pose_faults(job, prepared.robot, prepared.world, metal=False)
     with ExitStack() as stack:
-        on_frame = nobody
+        on_frame = show_nothing
         if view:
             from snakewalk.controller.cameras.camera_page import open_camera_page  # noqa: PLC0415  --view: an extra
 

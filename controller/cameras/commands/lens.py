@@ -136,7 +136,7 @@ def _from_device(
             while picture is None or clock.now_s() < until_s:
                 is_read, frame = device.read()
                 if not is_read:
-                    raise InputError(f"camera {name}: hands over no more frames")
+                    raise InputError(f"camera {name}: delivers no more frames")
                 picture = np.asarray(frame, dtype=np.uint8)
             board_views.append(board.find(picture))
             corners = (

@@ -66,7 +66,7 @@ class Bump:
     left_out: tuple[int, ...] = ()
     """Markers that did not move with the others: they were moved on the floor."""
     undone: bool = True
-    """Whether the pose accounts for it; else no more poses are returned."""
+    """Whether the pose accounts for the bump; else no more poses are returned."""
 
     @property
     def away_px(self) -> float:
@@ -103,7 +103,7 @@ class Bump:
 class PictureMove:
     """Map from earlier to present pixels of the same place."""
 
-    now_from_then: Floats
+    present_from_earlier: Floats
     """(3, 3) homography of pixels without distortion."""
     bump: Bump
 

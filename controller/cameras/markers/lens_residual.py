@@ -102,7 +102,7 @@ def marker_distortion(
         spin = np.stack([np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)], axis=1)
         squares = side_m * (1.0 + _SIDE * values[9]) * (_SQUARE @ spin)
         expected_m = (floor + _PLACE_M * away)[:, None] + squares
-        projected_m = projected(homography, _undone(px, float(values[8])))
+        projected_m = projected(homography, _undistorted(px, float(values[8])))
         return np.concatenate(
             [
                 ((projected_m - expected_m) * metre_px / _CORNER_PX).ravel(),
@@ -125,12 +125,12 @@ def marker_distortion(
     low, high = px.min(axis=(0, 1)), px.max(axis=(0, 1))
     sides = (np.linspace(a, b, _GRID) for a, b in zip(low, high, strict=True))
     grid = np.stack(np.meshgrid(*sides), axis=-1)
-    ignored = projected(start, grid) - projected(homography, _undone(grid, float(fit.x[8])))
+    ignored = projected(start, grid) - projected(homography, _undistorted(grid, float(fit.x[8])))
     error_m = float(np.hypot(ignored[..., 0], ignored[..., 1]).max())
     return Distortion(float(fit.x[8]), sigma, error_m)
 
 
-def _undone(points: Floats, coefficient: float) -> Floats:
+def _undistorted(points: Floats, coefficient: float) -> Floats:
     """(..., 2) points about the picture's middle without radial distortion."""
     radius2 = np.square(points).sum(axis=-1, keepdims=True)
     return np.asarray(points * (1.0 + coefficient * radius2))

@@ -197,7 +197,7 @@ class DeviceTags:
         while not self._ended.is_set():
             is_whole, frame = self._device.read()
             if not is_whole:
-                self._fault = "it hands over no more pictures; check its cable"
+                self._fault = "it delivers no more pictures; check its cable"
                 return
             time_s = self._clock.now_s() - self._camera.latency_s
             picture = in_colour(frame)

@@ -64,9 +64,9 @@ class _Sighting:
     pixels: Floats
     """(4 k, 2) without distortion."""
 
-    def only(self, keep: Bools) -> "_Sighting":
-        tags = tuple(tag for tag, is_kept in zip(self.tags, keep, strict=True) if is_kept)
-        corners = np.repeat(keep, 4)
+    def only(self, is_kept_tag: Bools) -> "_Sighting":
+        tags = tuple(tag for tag, is_kept in zip(self.tags, is_kept_tag, strict=True) if is_kept)
+        corners = np.repeat(is_kept_tag, 4)
         return _Sighting(tags, self.points_m[corners], self.pixels[corners])
 
 

@@ -84,7 +84,7 @@ def _pictures(recordings: list[str], picture: Path | None, force: bool) -> list[
 def _show(facts: dict[str, Any]) -> None:
     """One recording as a table of two columns, units in words."""
     missing = f"{facts['frames_missing']} missing in the file, " if facts["frames_missing"] else ""
-    assumed = " (assumed; say --rate)" if facts["rate_assumed"] else ""
+    assumed = " (assumed; give --rate)" if facts["rate_assumed"] else ""
     if facts["times_uneven"]:
         assumed = " (frames came at uneven times; bodies put between them)"
     bridged = f"{facts['frames_bridged']} with a keypoint set, " if facts["frames_bridged"] else ""

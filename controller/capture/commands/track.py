@@ -107,7 +107,7 @@ def _show(facts: "RecordingFacts") -> None:
     length = "no scale" if facts.length_mm is None else f"{facts.length_mm:g} mm long"
     bridged = f"{facts.frames_bridged} with a keypoint set, " if facts.frames_bridged else ""
     missing = f"{facts.frames_missing} missing in the file, " if facts.frames_missing else ""
-    assumed = " (assumed; say --rate)" if facts.rate_assumed else ""
+    assumed = " (assumed; give --rate)" if facts.rate_assumed else ""
     if facts.times_uneven:
         assumed = " (frames came at uneven times; bodies put between them)"
     refused = ", ".join(f"{n} for {why}" for why, n in facts.states_refused.items() if n)

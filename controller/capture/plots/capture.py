@@ -180,9 +180,9 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     high, wide = image.shape[:2]
     factor = _STEP_PX / max(high, wide)
     tile_px = max(round(wide * factor), 120), round(high * factor) + 18
-    nothing = np.empty((0, 2))
-    bare = drawn(image, nothing, FrameStatus.NOTHING, *tile_px)
-    shape = drawn(mask, nothing, FrameStatus.NOTHING, *tile_px)
+    no_points = np.empty((0, 2))
+    bare = drawn(image, no_points, FrameStatus.NOTHING, *tile_px)
+    shape = drawn(mask, no_points, FrameStatus.NOTHING, *tile_px)
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
     axis = shape.copy()
     chords = shape.copy()

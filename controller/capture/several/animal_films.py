@@ -16,7 +16,7 @@ from snakewalk.controller.capture.several.blobs import (
     blobs_of,
     count_of,
     detector_of_several,
-    others_mask,
+    mask_of_other_animals,
     own_window,
     usual_area,
 )
@@ -255,7 +255,7 @@ def _detected_animal(
         blobs, number, max(_LEAST_WINDOW_PX, round(_WINDOW_LENGTHS * float(length)))
     )
     part = frame[window].copy()
-    covered = others_mask(blobs, number, window, round(0.5 * float(width)) + 3)
+    covered = mask_of_other_animals(blobs, number, window, round(0.5 * float(width)) + 3)
     part[covered] = ground[window][covered]
     inside = None if detector.inside is None else detector.inside[window]
     local = replace(detector, inside=inside)

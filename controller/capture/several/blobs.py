@@ -212,7 +212,9 @@ def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]
     )
 
 
-def others_mask(blobs: Blobs, number: int, window: tuple[slice, slice], reach_px: int) -> Bools:
+def mask_of_other_animals(
+    blobs: Blobs, number: int, window: tuple[slice, slice], reach_px: int
+) -> Bools:
     """(h, w) pixels of a window that show other animals, with their blurred edges."""
     label = blobs.label[window]
     is_blob = label == number + 1

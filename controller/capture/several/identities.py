@@ -110,13 +110,17 @@ def _links(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> list[_Link]
     """Assign ends to starts; shapes are those of all tracklets that certain links join."""
     cost = _costs(tracklets, links)
     out = []
-    for olds, news in _groups(cost):
-        some = np.array([[cost[old].get(new, np.inf) for new in news] for old in olds])
+    for old_indices, new_indices in _groups(cost):
+        some = np.array(
+            [[cost[old].get(new, np.inf) for new in new_indices] for old in old_indices]
+        )
         least = min(_LARGEST_COST, _CROSSING)
-        alone = np.array([_CROSSING if tracklets[k].ends_in is not None else least for k in olds])
+        alone = np.array(
+            [_CROSSING if tracklets[k].ends_in is not None else least for k in old_indices]
+        )
         for row, column in _assigned_pairs(some, alone):
             margin = _margin(some, row, column, _assigned_pairs(some, alone), alone)
-            out.append(_Link(int(olds[row]), int(news[column]), margin))
+            out.append(_Link(int(old_indices[row]), int(new_indices[column]), margin))
     return out
 
 

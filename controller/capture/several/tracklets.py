@@ -107,8 +107,8 @@ class TrackletBuilder:
         nodes: list[_Node | None] = [None] * count
         if self._previous_frame is not None and len(self._nodes):
             links = self._links(self._previous_frame, blobs)
-            for olds, news in _components(links):
-                self._link(olds, news, blobs, nodes)
+            for old_indices, new_indices in _components(links):
+                self._link(old_indices, new_indices, blobs, nodes)
         for number in range(count):
             if nodes[number] is None:
                 nodes[number] = self._new_blob(blobs, number)
@@ -164,19 +164,23 @@ class TrackletBuilder:
             reach = _REACH * np.exp(before.shape[:, :1])
             free: Bools = np.asarray(lost[:, None] & fresh[None, :] & (distance_px < reach))
             away: Floats = np.where(free, distance_px, np.inf)
-            for lone in np.flatnonzero(free.any(axis=1)).tolist():
-                nearest = int(np.argmin(away[lone]))
-                if int(np.argmin(away[:, nearest])) == lone:
-                    links[lone, nearest] = True
+            for lost_row in np.flatnonzero(free.any(axis=1)).tolist():
+                nearest = int(np.argmin(away[lost_row]))
+                if int(np.argmin(away[:, nearest])) == lost_row:
+                    links[lost_row, nearest] = True
         return links
 
-    def _link(self, olds: Ints, news: Ints, blobs: Blobs, nodes: list[_Node | None]) -> None:
-        """Continue what ``olds`` are in the blobs ``news``, which show the same animals."""
-        before = [old_node for old in olds if not self._is_part(old_node := self._nodes[old])]
-        before = before or [self._nodes[old] for old in olds]
-        if len(before) == len(news) == 1:
+    def _link(
+        self, old_indices: Ints, new_indices: Ints, blobs: Blobs, nodes: list[_Node | None]
+    ) -> None:
+        """Continue old nodes in the new blobs, which show the same animals."""
+        before = [
+            old_node for old in old_indices if not self._is_part(old_node := self._nodes[old])
+        ]
+        before = before or [self._nodes[old] for old in old_indices]
+        if len(before) == len(new_indices) == 1:
             node = before[0]
-            new = int(news[0])
+            new = int(new_indices[0])
             area = float(blobs.area_px[new])
             if isinstance(node, Tracklet):
                 if (
@@ -195,7 +199,9 @@ class TrackletBuilder:
         for old_node in before:
             if isinstance(old_node, Tracklet):
                 old_node.ends_in = crossing
-        for new, share in zip(news, self._shares(blobs.area_px[news], count), strict=True):
+        for new, share in zip(
+            new_indices, self._shares(blobs.area_px[new_indices], count), strict=True
+        ):
             is_whole = blobs.area_px[new] >= _PART * self.usual_px
             if share == 1 and is_whole:
                 nodes[int(new)] = self._new_tracklet(crossing)
@@ -247,12 +253,16 @@ class TrackletBuilder:
 
 
 def _shared_pixels(
-    before: NDArray[np.int32], label: NDArray[np.int32], olds: int, news: int
+    before: NDArray[np.int32], label: NDArray[np.int32], old_indices: int, new_indices: int
 ) -> Floats:
     """(n, m) pixels that two blobs of two frames share."""
     both = (before > 0) & (label > 0)
-    pair = (before[both] - 1) * news + (label[both] - 1)
-    return np.bincount(pair, minlength=olds * news).reshape(olds, news).astype(float)
+    pair = (before[both] - 1) * new_indices + (label[both] - 1)
+    return (
+        np.bincount(pair, minlength=old_indices * new_indices)
+        .reshape(old_indices, new_indices)
+        .astype(float)
+    )
 
 
 def _components(links: Bools) -> list[tuple[Ints, Ints]]:
@@ -260,15 +270,20 @@ def _components(links: Bools) -> list[tuple[Ints, Ints]]:
     out = []
     free = set(np.flatnonzero(links.any(axis=1)).tolist())
     while free:
-        olds: set[int] = {free.pop()}
-        news: set[int] = set()
+        old_indices: set[int] = {free.pop()}
+        new_indices: set[int] = set()
         while True:
-            more = set(np.flatnonzero(links[sorted(olds)].any(axis=0)).tolist()) - news
-            news |= more
-            back = set(np.flatnonzero(links[:, sorted(news)].any(axis=1)).tolist()) - olds
-            olds |= back
+            more = (
+                set(np.flatnonzero(links[sorted(old_indices)].any(axis=0)).tolist()) - new_indices
+            )
+            new_indices |= more
+            back = (
+                set(np.flatnonzero(links[:, sorted(new_indices)].any(axis=1)).tolist())
+                - old_indices
+            )
+            old_indices |= back
             if not more and not back:
                 break
-        free -= olds
-        out.append((np.array(sorted(olds)), np.array(sorted(news))))
+        free -= old_indices
+        out.append((np.array(sorted(old_indices)), np.array(sorted(new_indices))))
     return out

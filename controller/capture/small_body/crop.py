@@ -107,7 +107,7 @@ class Workspace:
 
     @classmethod
     def of(cls, crops: Sequence[Crop], length_px: float) -> "Workspace":
-        """Choose it from some frames."""
+        """Choose the background from some frames."""
         scale = min(1.0, _WORKING_PX / length_px)
         if crops[0].image.ndim == 2:
             # the strongest pixels decide the sign that makes the body positive
@@ -205,7 +205,7 @@ def bends_of(line: Floats) -> Floats:
 
 
 def reversed_body(frame: Floats) -> Floats:
-    """The same place with the other end first."""
+    """The crop's place with the other end of the body first."""
     other = frame.copy()
     other[2 : 2 + BENDS] = frame[2 : 2 + BENDS][::-1] + np.pi
     return other

@@ -235,10 +235,10 @@ def misfit(fits: Sequence[Fit], body: FilmBody) -> float:
     for fit in fits:
         cover = ribbon.cover(fit.frame, body.values, fit.residual.shape)
         near = cover > _LEAST_COVER
-        is_beside = (cover < _LEAST_COVER / 3.0) & (fit.residual != 0.0)
-        if near.any() and is_beside.any():
+        is_off_body = (cover < _LEAST_COVER / 3.0) & (fit.residual != 0.0)
+        if near.any() and is_off_body.any():
             squares = fit.residual**2
-            more = float(squares[near].mean() - squares[is_beside].mean())
+            more = float(squares[near].mean() - squares[is_off_body].mean())
             misfits.append(np.sqrt(max(more, 0.0)) / body.contrast)
     return float(np.median(misfits)) if misfits else 0.0
 

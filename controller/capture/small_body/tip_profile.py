@@ -80,8 +80,8 @@ def beyond_tips_px(points_px: Floats, ends_px: Floats) -> Floats:
     tips = points_px[[0, -1]]
     ahead = tips - points_px[[_INNER_POINT, -1 - _INNER_POINT]]
     ahead = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
-    ways = (ends_px, ends_px[::-1])
-    near = min(ways, key=lambda path: float(np.hypot(*(path[:, :2] - tips).T).sum()))
+    end_pairs = (ends_px, ends_px[::-1])
+    near = min(end_pairs, key=lambda path: float(np.hypot(*(path[:, :2] - tips).T).sum()))
     return np.column_stack([((near[:, :2] - tips) * ahead).sum(axis=1), near[:, 2]])
 
 

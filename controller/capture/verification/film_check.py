@@ -122,7 +122,7 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
     return out
 
 
-def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
+def has_faint_continuation(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
     """Whether something faint goes on beyond the same tip in most frames of a film.
 
     The check of a single frame finds only strong parts. Noise and stains are alike beyond both
@@ -144,9 +144,9 @@ def goes_on_faintly(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
     if len(differences) < _FEWEST_FAINT:
         return False
     middle = float(np.median(differences))
-    same = float(np.mean(np.sign(differences) == np.sign(middle)))
+    same_sign_share = float(np.mean(np.sign(differences) == np.sign(middle)))
     least = max(_LEAST_LEVELS, _FAINT_BEYOND * float(usual.contrast.mean()))
-    return same >= _SAME_TIP and abs(middle) > least
+    return same_sign_share >= _SAME_TIP and abs(middle) > least
 
 
 def _along_a_ray(rings: Floats) -> Floats:

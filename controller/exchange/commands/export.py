@@ -101,7 +101,7 @@ def _check_names(
     bags = [path for path in (ros2, foxglove) if path is not None]
     if not bags and csv is None and parquet is None:
         raise InputError(
-            "say what to write: --csv FOLDER, --parquet FOLDER, --ros2 FILE.mcap or "
+            "choose what to write: --csv FOLDER, --parquet FOLDER, --ros2 FILE.mcap or "
             "--foxglove FILE.mcap"
         )
     faults = [

@@ -56,7 +56,7 @@ def export_robot(
 ) -> None:
     """Write a robot as URDF or MuJoCo model with the same masses and kinematics."""
     if urdf is None and mjcf is None:
-        raise InputError("say what to write: --urdf FILE, --mjcf FILE, or both")
+        raise InputError("choose what to write: --urdf FILE, --mjcf FILE, or both")
     if ros2_control is not None and urdf is None:
         raise InputError(f"--ros2-control {ros2_control}: is a part of a URDF: give --urdf FILE")
     if actuators is not None and mjcf is None:

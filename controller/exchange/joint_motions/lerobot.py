@@ -31,7 +31,7 @@ class LeRobotEpisode:
     """An episode of a LeRobot dataset."""
 
     def accepts(self, path: Path, head: bytes) -> bool:
-        """Whether it is the folder of a dataset."""
+        """Whether a path is the folder of a dataset."""
         return (path / "meta" / "info.json").is_file()
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
@@ -71,7 +71,7 @@ class LeRobotEpisode:
 
 def _episode(path: Path, request: JointRequest, episodes: int) -> int:
     if request.episode is None and episodes != 1:
-        raise InputError(f"{path}: has {episodes} episodes; say --episode 0 to {episodes - 1}")
+        raise InputError(f"{path}: has {episodes} episodes; give --episode 0 to {episodes - 1}")
     episode = request.episode or 0
     if not 0 <= episode < episodes:
         raise InputError(f"--episode {episode}: {path} has episodes 0 to {episodes - 1}")

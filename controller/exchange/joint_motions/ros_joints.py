@@ -69,7 +69,7 @@ def _topic(path: Path, bag: Any, request: JointRequest) -> tuple[str, str]:
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in (fit or kinds).items()) or "none"
         raise InputError(
             f"{path}: {len(fit)} topics of JointState or JointTrajectory"
-            + (f"; say --topic NAME: {listed}" if fit else f"; its topics: {listed}")
+            + (f"; give --topic NAME: {listed}" if fit else f"; its topics: {listed}")
         )
     return next(iter(fit.items()))
 

@@ -242,7 +242,7 @@ def _bodies_off_path(body: MovingBody, path: list[MovingBody]) -> list[MovingBod
 
 
 def _is_pair(children: list[MovingBody]) -> bool:
-    """Whether these are not bodies, or are two chains with the same number of hinges."""
+    """Whether bodies are no pair of legs: not two, or with different numbers of hinges."""
     if not children:
         return True
     if len(children) != 2:

@@ -133,11 +133,11 @@ def _up_direction(
     if max(upright) > math.sqrt(0.5) or len(axes) == 2:
         up = axes[int(np.argmax(upright))]
         if max(upright) <= math.sqrt(0.5):
-            notes.append(f"no axis is vertical in the model: that of {name} is taken as yaw")
+            notes.append(f"no axis is vertical in the model: that of {name} is assumed to be yaw")
             up = axes[0]
         return up * math.copysign(1.0, float(up[2]) or 1.0)
     if abs(float(forward[2])) > math.sqrt(0.5):
-        notes.append("the body stands upright in the model: its joints are taken as yaw")
+        notes.append("the body stands upright in the model: its joints are assumed to be yaw")
         return first
     up = np.cross(forward, first)
     return up * math.copysign(1.0, float(up[2]))

@@ -202,13 +202,13 @@ def _pair(
 ) -> LegPair:
     left, right = legs
     name = tree.names[link]
-    same = left.axes == right.axes and all(
+    is_mirrored = left.axes == right.axes and all(
         abs(a - b) <= _LEG_TOLERANCE * sum(left.segments_m)
         for a, b in zip(
             [left.hip_m, *left.segments_m], [right.hip_m, *right.segments_m], strict=True
         )
     )
-    if not same:
+    if not is_mirrored:
         raise InputError(
             f"{name}: the legs {both[0].name} and {both[1].name} are not mirror images; correct "
             "the model"

@@ -165,11 +165,14 @@ class ChainFigures:
         reach_m = self._reach_m(k, sign, joint_m)
         if reach_m is not None and reach_m > _SHORTEST_LINK_M:
             for other in sorted(known_links, key=lambda link: abs(link - k)):
-                its_joint_m = self.joints_m[other] if k == 0 else self.joints_m[other - 1]
-                its_reach_m = self._reach_m(other, sign, its_joint_m)
-                if its_reach_m is None or abs(its_reach_m - reach_m) > _SHAPE_TOLERANCE * reach_m:
+                other_joint_m = self.joints_m[other] if k == 0 else self.joints_m[other - 1]
+                other_reach_m = self._reach_m(other, sign, other_joint_m)
+                if (
+                    other_reach_m is None
+                    or abs(other_reach_m - reach_m) > _SHAPE_TOLERANCE * reach_m
+                ):
                     continue
-                beyond_m = lengths_m[other] - its_reach_m
+                beyond_m = lengths_m[other] - other_reach_m
                 if abs(beyond_m) < 1e-9:
                     break
                 return (

@@ -174,7 +174,7 @@ def children(parent: ET.Element, *tags: str) -> list[LineElement]:
 
 
 def numbers(text: str | None, count: int) -> list[float] | None:
-    """``count`` numbers of an attribute; None if it is not that."""
+    """``count`` numbers of an attribute; None if it has another form."""
     try:
         values = [float(word) for word in (text or "").split()]
     except ValueError:

@@ -375,14 +375,16 @@ def _kinematics_error_m(
         body = body_in_world(robot, pose, np.concatenate([joint_rad, legs]))
         points = chain_points_m(robot, body)[1:-1]
         fixed = 0 if not reverse else len(points) - 1
-        ours_at, ours_turn = points[fixed], body.rotation[0 if not reverse else -1]
-        ours = (points - ours_at) @ ours_turn  # seen from the link that the model holds
+        model_origin, model_turn = points[fixed], body.rotation[0 if not reverse else -1]
+        model_points = (
+            points - model_origin
+        ) @ model_turn  # seen from the link that the model holds
         anchors = np.array([data.xanchor[hinge.joint] for hinge in hinges])
         axes = np.array([data.xaxis[hinge.joint] for hinge in hinges])
         origin = _on_line_m(hinges, directions, fixed)
-        theirs = scale * (anchors - origin) @ turn
+        file_points = scale * (anchors - origin) @ turn
         axes = axes @ turn
-        away = ours - theirs
+        away = model_points - file_points
         # along its axis it may lie anywhere
         away -= (away * axes).sum(axis=1, keepdims=True) * axes
         worst = max(worst, float(np.linalg.norm(away, axis=1).max()))

@@ -72,7 +72,7 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
     _drop_unread(source)
     first = _first_link(source, path)
     _choose_shapes(source, path, meshes=meshes)
-    _mend_inertias(source)
+    _repair_inertias(source)
     source.stated_mass_kg, source.part_names = _stated_masses_kg(root)
     _float(root, first)
     return source
@@ -329,7 +329,7 @@ def _mesh_file(name: str, path: Path) -> Path | None:
     return None
 
 
-def _mend_inertias(source: ModelSource) -> None:
+def _repair_inertias(source: ModelSource) -> None:
     """Replace inertias that no body can have by those of a small ball: only the mass is used."""
     wrong = []
     for link in children(source.root, "link"):

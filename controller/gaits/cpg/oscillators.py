@@ -100,7 +100,7 @@ class Cpg:
         self.pattern = pattern
 
     def state(self) -> CpgState:
-        """Everything that changes, for ``restore``."""
+        """All state that changes, for ``restore``."""
         return self._slow, self._clock, self._t_s, self._phase_rad, self.pattern
 
     def restore(self, state: CpgState) -> None:

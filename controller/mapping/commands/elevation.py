@@ -191,9 +191,11 @@ def check_world_files(
     check_picture(picture)
     results = [out, map_beside(out), picture]
     refuse_to_overwrite(results, force)
-    same = {path.resolve() for path in sources} & {path.resolve() for path in results if path}
-    if same:
-        raise InputError([f"{path}: is read, and would be overwritten" for path in same])
+    overwritten = {path.resolve() for path in sources} & {
+        path.resolve() for path in results if path
+    }
+    if overwritten:
+        raise InputError([f"{path}: is read, and would be overwritten" for path in overwritten])
 
 
 def not_positive(options: Mapping[str, float | None]) -> list[str]:

@@ -170,7 +170,9 @@ def _stand_words(terrain: "StereoGround") -> list[str]:
 
 
 def _method_text(terrain: "StereoGround") -> str:
-    return "fitted to the points, which are taken for level ground" if terrain.fitted else "given"
+    return (
+        "fitted to the points, which are assumed to be level ground" if terrain.fitted else "given"
+    )
 
 
 def _facts(terrain: "StereoGround") -> dict[str, object]:

@@ -139,17 +139,17 @@ def film(
     """
     views = list(views_along(walk, per_step))
     camera = picture_camera(walk, size_px)
-    took = []
+    render_times_s = []
     holes = []
     with MovieFile(file, fps, size_px) as movie:
         for k, view in enumerate(views):
             begin = perf_counter()
             canvas = render(walk, view, camera, size_px, alone=alone)
-            took.append(perf_counter() - begin)
+            render_times_s.append(perf_counter() - begin)
             holes.append(1.0 - float(canvas.drawn.mean()))
             movie.add(canvas.under_sky())
             on_frame(k + 1, len(views))
-    return FilmFacts(len(views), float(np.median(took)), float(np.mean(holes)))
+    return FilmFacts(len(views), float(np.median(render_times_s)), float(np.mean(holes)))
 
 
 def picture_camera(walk: StereoWalk, size_px: tuple[int, int]) -> Floats:

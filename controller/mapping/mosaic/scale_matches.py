@@ -26,7 +26,7 @@ _UNIQUE: Final = 0.03
 _WIDE_SEARCH: Final = 0.35
 """Half the width of the search region, in widths of the picture, without a guess (ours)."""
 _NARROW_SEARCH: Final = 0.12
-"""The same around the place that a guess of the distance predicts (ours)."""
+"""Search radius around the place that a guess of the distance predicts (ours)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,11 +64,11 @@ def _raster(axes: Axes, record: RunRecord) -> None:
 def _marks(record: RunRecord, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Times and joints of a kind of verdict; a verdict on no joint in particular is on all."""
     cycle = record.cycle
-    everyone = tuple(range(cycle.asked_rad.shape[1]))
+    all_joints = tuple(range(cycle.asked_rad.shape[1]))
     marks = [
         (t, joint)
         for t, verdict, joints in zip(cycle.time_s, cycle.verdict, cycle.joints, strict=True)
         if verdict == kind
-        for joint in (joints or everyone)
+        for joint in (joints or all_joints)
     ]
     return np.array([t for t, _ in marks]), np.array([j for _, j in marks], dtype=np.int64)

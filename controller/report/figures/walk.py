@@ -23,12 +23,12 @@ def walk_figure(record: RunRecord) -> Figure | None:
     steps = len(walk.time_s)
     if steps == 0:
         return None
-    many = len(np.unique(walk.state)) > 1
+    has_states = len(np.unique(walk.state)) > 1
     number = np.arange(1, steps + 1)
-    figure, panels = canvas(2 if many else 1, 5.4 if many else 3.0)
+    figure, panels = canvas(2 if has_states else 1, 5.4 if has_states else 3.0)
     for axes in panels if steps > _MARKS else ():
         axes.set_rasterization_zorder(_ABOVE)
-    if many:
+    if has_states:
         states = panels[0]
         states.plot(number, walk.state, color=PALE, linewidth=0.8, zorder=1)
         size = float(np.clip(1800 / steps, 6, 26))
@@ -78,7 +78,7 @@ def walk_figure(record: RunRecord) -> Figure | None:
     )
     aim.plot(number, walk.ramp_rad, color=AMBER, linewidth=1.0, label="bend added against it")
     none = walk.candidates == 0
-    if many and none.any():
+    if has_states and none.any():
         aim.scatter(
             number[none],
             walk.heading_error_rad[none],

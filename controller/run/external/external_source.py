@@ -112,7 +112,7 @@ class ExternalSource(ABC):
                     sample, robot, config, run.start_m, ground_height(context.prepared.ground)
                 ),
             )
-            pose.keep(early)
+            pose.store_poses(early)
             health = PoseHealth(pose.fault, config.hold_s, pose.row, pose.needs_caution)
             yield PoseProvider(pose, pose.facts, health, pose.take_measured)
 

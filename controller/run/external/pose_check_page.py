@@ -63,9 +63,19 @@ class PoseCheckPage:
         straight = self._straight
         count = len(self._straight)
         unknown = np.full(count, np.nan)
-        no = np.zeros(count, np.uint8)
+        zero_bytes = np.zeros(count, np.uint8)
         state = JointState(
-            time_s, unknown, unknown, unknown, unknown, unknown, no, no, unknown, no == 1, unknown
+            time_s,
+            unknown,
+            unknown,
+            unknown,
+            unknown,
+            unknown,
+            zero_bytes,
+            zero_bytes,
+            unknown,
+            zero_bytes == 1,
+            unknown,
         )
         self._log.cycle(
             time_s,

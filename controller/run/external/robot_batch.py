@@ -165,7 +165,7 @@ class BatchRow:
         return self._batch.bodies.qvel[self._row, 6:]
 
     def advance(self, until_s: float, drive: ServoDrive) -> None:
-        """Do nothing: the batch advances all shafts."""
+        """Do nothing, because the batch advances all shafts."""
 
     # the clock
 

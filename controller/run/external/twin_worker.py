@@ -45,7 +45,7 @@ class TwinTrial:
         assert self._pilot.twin is not None
 
     def answers(self, question: TwinQuestion) -> Iterator[TwinAnswer]:
-        """Yield the answers, each when it is known."""
+        """Yield each answer as soon as it is known."""
         pilot = self._pilot
         robot = self._prepared.robot
         twin = pilot.twin
@@ -91,7 +91,7 @@ class RehearsedTwin:
         return answers
 
     def close(self) -> None:
-        """Do nothing: nothing has to be ended."""
+        """Do nothing: there is no process to end."""
 
 
 class ProcessTwin:

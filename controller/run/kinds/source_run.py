@@ -48,7 +48,7 @@ class SourceRun(PathlessRun):
         robot = self.robot
         source = self.make(self.robot)
         if self.make(robot) is source:
-            raise InputError("the motion source: make a fresh one at each call, not always one")
+            raise InputError("the motion source: return a new motion source at each call")
         source.needs.check(robot, "the motion source")
         period_s = 1.0 / self.run.cycle_hz
         first_rad = self._goal_rad(source.goal_rad(), 0.0, "goal_rad()")

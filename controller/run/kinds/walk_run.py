@@ -358,9 +358,7 @@ class WalkRun(PathRun):
                 "of the walk with behaviour.pulse_body_lengths_s"
             )
         if self.run.mapping is not None:
-            lines.append(
-                "the ground is not known before the run: the plan on paper is that of a level floor"
-            )
+            lines.append("the ground is not known before the run: the plan assumes a level floor")
         if self.run.motion == "serpenoid":
             return tuple(lines)
         if self.run.behaviour.curvature is None and self.library.curvature > 1.0:

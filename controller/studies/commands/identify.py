@@ -261,10 +261,10 @@ def _friction(
     if friction_fit.mass is not None and outs.robot is not None:
         _write_mass(outs.robot, first.robot, friction_fit.mass, paths)
     kept, _ = resistance_of(friction_fit.world(ground))
-    _tell_friction(friction_fit, laws, kept, logs, paths, outs, as_json=as_json)
+    _print_friction(friction_fit, laws, kept, logs, paths, outs, as_json=as_json)
 
 
-def _tell_friction(
+def _print_friction(
     friction_fit: FrictionFit,
     laws: LawFit | None,
     kept: Resistance,

@@ -55,5 +55,5 @@ def replay(
     else:
         for line in comparison.lines():
             console.print(line)
-    if not comparison.same:
+    if not comparison.is_equal:
         raise SystemExit(1)

@@ -171,11 +171,11 @@ def trials(
     """
     _check_results(picture, parquet, out)
     require_extra("trials need", "mujoco" if dask is None else "distributed")
-    overs = [study.parse_over(text) for text in over or ()]
+    over_values = [study.parse_over(text) for text in over or ()]
     if errors:
-        overs.append(("run.deviation.drawn", (True,)))
-    _check_keys([key for key, _ in overs])
-    cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, overs)
+        over_values.append(("run.deviation.drawn", (True,)))
+    _check_keys([key for key, _ in over_values])
+    cases = _cases(runs or [DEFAULT_RUN], motion, robot, world, relief, compliance, over_values)
     _check_used(cases, track, seconds)
     changes = {"track": track, "seconds": seconds}
     seed_range = range(first_seed, first_seed + seeds)
@@ -204,7 +204,7 @@ def trials(
             json.dumps(settings | {"table": rows, "trials": [asdict(t) for t in finished_trials]})
         )
     else:
-        _print(rows, [key for key, values in overs if len(values) > 1])
+        _print(rows, [key for key, values in over_values if len(values) > 1])
     if all(trial.cause == "refused" for trial in finished_trials):
         raise InputError(f"no run was possible: {study.reasons(finished_trials)}")
 
@@ -239,7 +239,7 @@ def _cases(
     world: list[str] | None,
     relief: list[float] | None,
     compliance: list[str] | None,
-    overs: Sequence[tuple[str, Sequence[Any]]],
+    over_values: Sequence[tuple[str, Sequence[Any]]],
 ) -> list[study.Case]:
     """Return every combination of the options' values, each once.
 
@@ -252,8 +252,8 @@ def _cases(
             raise InputError(f"--compliance {word}: expected on or off")
     motions = motion or ["walk", "walk-printed", "walk-blind", "serpenoid"]
     moved_by = {run: ["gait"] if moves_by_gait(run) else motions for run in runs}
-    keys = [key for key, _ in overs]
-    axes = [values for _, values in overs]
+    keys = [key for key, _ in over_values]
+    axes = [values for _, values in over_values]
     cases = [
         study.Case(run, m, r, k, tuple(zip(keys, values, strict=True)), c, w)
         for run in runs

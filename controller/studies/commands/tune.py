@@ -85,7 +85,7 @@ def tune(
         "default": [round(value, 4) for value in result.default],
         "tuned": [round(value, 4) for value in result.best],
         "better_by": f"{result.margin:.0%}",
-        "better_on": f"{result.wins} of {seeds} grounds",
+        "better_on": f"{result.better_seeds} of {seeds} grounds",
         "parameters": result.parameters,
     }
     if out is not None:

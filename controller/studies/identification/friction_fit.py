@@ -171,7 +171,7 @@ class FrictionLog:
         return FrictionLog(goals, answers, _motion(goals, _places(observed(links_m))))
 
     def vector(self) -> Floats:
-        """All that is compared (N,)."""
+        """All compared values (N,)."""
         return np.concatenate([features(self.goals, self.answers), self.motion.ravel()])
 
     def check_lifts(self) -> None:
@@ -227,7 +227,7 @@ class Found:
         return Found(math.exp(mean), math.exp(mean - reach), math.exp(mean + reach))
 
     def times(self, factor: float) -> "Found":
-        """Return it in another unit."""
+        """Return the evidence in another unit."""
         return Found(factor * self.value, factor * self.low, factor * self.high)
 
     @property

@@ -289,8 +289,8 @@ def _intervals(
     noise = float((weight * errors**2).mean())
     bread = np.linalg.inv(curvature + noise * np.eye(len(values)))
     degrees = max(len(sums) - len(values), 1)
-    meat = sums.T @ sums * len(sums) / degrees + noise * np.eye(len(values)) * noise
-    spread = np.sqrt(np.diag(bread @ meat @ bread)) * width
+    score_covariance = sums.T @ sums * len(sums) / degrees + noise * np.eye(len(values)) * noise
+    spread = np.sqrt(np.diag(bread @ score_covariance @ bread)) * width
     reach = float(student.ppf(0.5 + 0.5 * _COVERAGE, degrees)) * spread
     reach = np.maximum(reach, _LEAST_SHARE * np.abs(values))
     low, high = np.maximum(values - reach, lowest), np.minimum(values + reach, highest)

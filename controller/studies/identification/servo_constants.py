@@ -100,7 +100,7 @@ class ServoConstants:
     """(18,) in the order of ``CONSTANTS``."""
     low: Floats
     high: Floats
-    """(18,) ends of the 95 % intervals; NaN where nobody has worked them out."""
+    """(18,) ends of the 95 % intervals; NaN if they are unknown."""
     actuator: str
     """BAM's name of the servo: ``xl330``, ``mx64``, ..."""
 

@@ -123,7 +123,7 @@ class NamedCause:
     """Factors on friction along and across; kg; factor on torque; rad."""
 
     def text(self, robot: RobotConfig) -> str:
-        """Say it to a person."""
+        """Return the cause as a sentence."""
         if self.at is None:
             along, across = self.values
             return (
@@ -156,7 +156,7 @@ class Diagnosis:
         return best if best is not None and best.evidence >= NAMED_FROM else None
 
     def text(self, robot: RobotConfig) -> str:
-        """Say it to a person."""
+        """Return the cause as a sentence."""
         named = self.named
         most = int(np.argmax(self.residual_a))
         if named is None:
@@ -174,7 +174,7 @@ class Diagnosis:
         return self.causes[0].evidence - cause.evidence
 
     def to_dict(self, robot: RobotConfig) -> dict[str, object]:
-        """Return it for JSON."""
+        """Return the cause for JSON."""
         return {
             "named": None if self.named is None else self.named.cause,
             "at": None if self.named is None else self.named.at,
@@ -344,7 +344,7 @@ def diagnose(
 
 
 class Signatures:
-    """How the answers to some goals change with each thing that may be wrong.
+    """Derivatives of the replies to goals by each possible cause.
 
     Args:
         goals: the goals that were sent.
@@ -378,7 +378,7 @@ class Signatures:
         self._healthy = np.append(constants.healthy, _USUAL_DELAY_S)
 
     def diagnose(self, measured: Floats) -> Diagnosis:
-        """Say what differs, of measured currents and angles (2, T, J)."""
+        """Describe the differences of measured currents and angles (2, T, J)."""
         difference = features(self._goals, measured) - self._plain
         constants = self._constants
         likely = self._likelihood([difference])

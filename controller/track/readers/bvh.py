@@ -113,9 +113,11 @@ def _check_joints(file: Path, joints: list[_Joint]) -> None:
     if len(joints) > _MOST_JOINTS:
         raise InputError(f"{file}: has more than {_MOST_JOINTS} joints")
     channels = {f"{axis}{kind}" for axis in _AXES for kind in ("POSITION", "ROTATION")}
-    odd = [channel for joint in joints for channel in joint.channels if channel not in channels]
-    if odd:
-        raise InputError(f"{file}: its HIERARCHY has a channel {odd[0]}")
+    unknown_channels = [
+        channel for joint in joints for channel in joint.channels if channel not in channels
+    ]
+    if unknown_channels:
+        raise InputError(f"{file}: its HIERARCHY has a channel {unknown_channels[0]}")
 
 
 def _motion(file: Path, words: list[str], channels: int) -> tuple[int, float, Floats]:

@@ -22,7 +22,7 @@ from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.track import frame_numbers
 
 PCUTOFF = 0.6
-"""DeepLabCut's own default: below this likelihood it does not draw a point."""
+"""DeepLabCut's own default: likelihood below which a point is not drawn."""
 _LEVELS = {"scorer", "individuals", "bodyparts", "coords"}
 _NUMBER = re.compile(r"(\d+)(?:\.[A-Za-z]+)?$")  # 12, or labeled-data/film/img0012.png
 _NO_INDIVIDUAL = "single"  # body parts that belong to no animal
@@ -51,8 +51,8 @@ def load_rows(
     first = 1
     while first < len(level["coords"]) and not level["coords"][first]:
         first += 1  # hand labels have three columns: folder, video and image
-    whose = level.get("individuals", [""] * len(level["coords"]))
-    columns = list(zip(whose, level["bodyparts"], level["coords"], strict=False))[first:]
+    animal_names = level.get("individuals", [""] * len(level["coords"]))
+    columns = list(zip(animal_names, level["bodyparts"], level["coords"], strict=False))[first:]
     names = [f"{part} {axis}" for _, part, axis in columns]
     lines = range(depth + 1, len(rows) + 1)
     values = numbers_of(file, [row[first:] for row in rows[depth:]], names, lines)
@@ -124,29 +124,43 @@ def _track(
     choice: Choice,
 ) -> Keypoints:
     index_by_column = {column: k for k, column in enumerate(columns)}
-    names = list(dict.fromkeys(who for who, _, _ in columns))
-    animals = [who for who in names if who != _NO_INDIVIDUAL] or names
+    names = list(dict.fromkeys(individual for individual, _, _ in columns))
+    animals = [individual for individual in names if individual != _NO_INDIVIDUAL] or names
     animals_with_points = {
         column[0] for k, column in enumerate(columns) if np.isfinite(values[:, k]).any()
     }
-    whose = choice.animal(
-        file, animals, [who for who in animals if who in animals_with_points] or animals[:1]
+    animal_names = choice.animal(
+        file,
+        animals,
+        [individual for individual in animals if individual in animals_with_points] or animals[:1],
     )
-    parts = list(dict.fromkeys(part for who, part, _ in columns if who == whose))
-    missing = [p for p in parts if not {(whose, p, "x"), (whose, p, "y")} <= index_by_column.keys()]
+    parts = list(
+        dict.fromkeys(part for individual, part, _ in columns if individual == animal_names)
+    )
+    missing = [
+        p
+        for p in parts
+        if not {(animal_names, p, "x"), (animal_names, p, "y")} <= index_by_column.keys()
+    ]
     if missing or not parts:
         raise InputError(f"{file}: expected x and y of each body part; {missing[:3]} lacks one")
     pixels = np.stack(
         [
-            values[:, [index_by_column[whose, part, "x"], index_by_column[whose, part, "y"]]]
+            values[
+                :,
+                [
+                    index_by_column[animal_names, part, "x"],
+                    index_by_column[animal_names, part, "y"],
+                ],
+            ]
             for part in parts
         ],
         axis=1,
     )
     sure = [
-        index_by_column[whose, p, "likelihood"]
+        index_by_column[animal_names, p, "likelihood"]
         for p in parts
-        if (whose, p, "likelihood") in index_by_column
+        if (animal_names, p, "likelihood") in index_by_column
     ]
     scores = values[:, sure] if len(sure) == len(parts) else None
     return Keypoints(

@@ -66,21 +66,21 @@ def _tierpsy(file: Path, places: Any, table: Any, columns: list[str], choice: Ch
     Bodies are in micrometres in a file of features, and in pixels in one of skeletons.
     """
     choice.only(file, "a file of Tierpsy", "individual")
-    whose, frame = (table[column] for column in columns)
-    names = list(map(str, np.unique(whose[whose >= 0])))
-    mine = whose == int(choice.animal(file, names, names))
+    animal_names, frame = (table[column] for column in columns)
+    names = list(map(str, np.unique(animal_names[animal_names >= 0])))
+    is_animal = animal_names == int(choice.animal(file, names, names))
     about = places.file.get("trajectories_data", table).attrs
     stated = float(about.get("fps", about.get("expected_fps", 0.0)))
     rate_hz = choice.rate or (0.0 if "frames" in str(about.get("time_units")) else stated)
     if rate_hz <= 0.0:
-        raise InputError(f"{file}: states no frames a second; say --rate")
+        raise InputError(f"{file}: states no frame rate; give --rate")
     unit_m = 1e-6 if places.parent.name != "/" else 1e-6 * about.get("microns_per_pixel", 1)
     return track_from_points(
         file.stem,
-        places[mine] * [1.0, -1.0],
+        places[is_animal] * [1.0, -1.0],
         rate_hz,
         scale_m=None if "pixels" in str(about.get("xy_units", "pixels")) else unit_m,
-        frame=frame_numbers(str(file), frame[mine].astype(float)),
+        frame=frame_numbers(str(file), frame[is_animal].astype(float)),
     )
 
 

@@ -76,10 +76,12 @@ class Keypoints:
                 )
             places = np.where(unsure[..., None], np.nan, places)
         is_visible = np.asarray(np.isfinite(places).any(axis=(0, 2)))
-        never = [self.nodes[k] for k, there in zip(order, is_visible, strict=True) if not there]
-        if never and len(never) < len(order):
+        unseen_nodes = [
+            self.nodes[k] for k, there in zip(order, is_visible, strict=True) if not there
+        ]
+        if unseen_nodes and len(unseen_nodes) < len(order):
             raise InputError(
-                f"{file}: {', '.join(never)} is never seen: say --keypoints without it"
+                f"{file}: {', '.join(unseen_nodes)} is never seen; give --keypoints without it"
             )
         return places
 
@@ -95,7 +97,7 @@ class Keypoints:
         if choice.keypoints is None and zigzag(places) > _ZIGZAG:
             raise InputError(
                 f"{self.file}: its keypoints do not lie one after the other along a body: "
-                f"{', '.join(self.nodes)}; say --keypoints with those of the midline, head first"
+                f"{', '.join(self.nodes)}; give --keypoints with those of the midline, head first"
             )
         bridged, which = bridge(places)
         number = np.arange(len(places)) if self.frame is None else self.frame
@@ -142,15 +144,17 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
     lost = np.asarray(~np.isfinite(places).all(axis=2))
     count = places.shape[1]
     most = min(max(1, int(_MISSING * count)), count - FEWEST)
-    able = lost.any(axis=1) & (lost.sum(axis=1) <= most) & ~(lost[:, 1:] & lost[:, :-1]).any(axis=1)
+    may_fill = (
+        lost.any(axis=1) & (lost.sum(axis=1) <= most) & ~(lost[:, 1:] & lost[:, :-1]).any(axis=1)
+    )
     step = np.hypot(*np.diff(places, axis=1).transpose(2, 0, 1))
     is_known = np.isfinite(step).any(axis=0)
-    if not (able.any() and is_known.all()):
+    if not (may_fill.any() and is_known.all()):
         return places, np.zeros(len(places), dtype=bool)
     usual = np.nanmedian(step, axis=0)
     along = np.concatenate([[0.0], np.cumsum(usual)])
     out = places.copy()
-    for k in np.flatnonzero(able):
+    for k in np.flatnonzero(may_fill):
         is_visible = ~lost[k]
         curve = scipy.interpolate.CubicSpline(along[is_visible], places[k, is_visible])
         out[k, lost[k]] = curve(along[lost[k]])
@@ -158,7 +162,7 @@ def bridge(places: Floats) -> tuple[Floats, Bools]:
             out[k, 0] = _point_beyond(out[k, 1], out[k, 2], out[k, 3], usual[0])
         if lost[k, -1]:
             out[k, -1] = _point_beyond(out[k, -2], out[k, -3], out[k, -4], usual[-1])
-    return out, able
+    return out, may_fill
 
 
 def _point_beyond(last: Floats, second: Floats, third: Floats, reach: float) -> Floats:

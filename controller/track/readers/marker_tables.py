@@ -89,7 +89,7 @@ def load_trc(file: Path, choice: Choice) -> Keypoints:
     first = data[0][0]
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
     if not stated and choice.rate is None:
-        raise InputError(f"{file}: states no DataRate; say --rate with frames a second")
+        raise InputError(f"{file}: states no DataRate; give --rate in frames per second")
     keypoints = projected(file, names, places, unit, stated, choice, frame)
     _check_count(file, "NumFrames", about, len(data))
     return keypoints

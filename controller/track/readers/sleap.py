@@ -28,7 +28,7 @@ _NO_TRACK = "no track"
 def load_table(
     file: Path,
     nodes: list[str],
-    whose: list[str],
+    animal_names: list[str],
     frame: Floats,
     xy: Floats,
     scores: Floats | None,
@@ -39,7 +39,7 @@ def load_table(
     Args:
         file: for faults and the name.
         nodes: names of the K keypoints.
-        whose: track name of each of T rows.
+        animal_names: track name of each of T rows.
         frame: (T,) frame numbers.
         xy: (T, K, 2) pixels.
         scores: (T, K) scores of the keypoints.
@@ -48,11 +48,13 @@ def load_table(
     """
     if not np.isfinite(frame).all():
         raise InputError(f"{file}: frame_idx must be given in every row")
-    names = list(dict.fromkeys(name or _NO_TRACK for name in whose))
-    mine = np.array([name or _NO_TRACK for name in whose]) == choice.animal(file, names, names)
-    frame = frame[mine]
-    xy = xy[mine]
-    scores = None if scores is None else scores[mine]
+    names = list(dict.fromkeys(name or _NO_TRACK for name in animal_names))
+    is_animal = np.array([name or _NO_TRACK for name in animal_names]) == choice.animal(
+        file, names, names
+    )
+    frame = frame[is_animal]
+    xy = xy[is_animal]
+    scores = None if scores is None else scores[is_animal]
     order = _one_a_frame(file, frame, scores)
     return Keypoints(
         file,
@@ -161,9 +163,11 @@ def load_project(
     nodes = skeletons[int(instances["skeleton"][0])]
     names = [*tracks, _NO_TRACK]
     number = {int(frame["frame_id"]): int(frame["frame_idx"]) for frame in frames}
-    whose = [names[int(k)] if 0 <= k < len(tracks) else _NO_TRACK for k in instances["track"]]
-    animals = list(dict.fromkeys(whose))
-    mine = choice.animal(file, animals, animals)
+    animal_names = [
+        names[int(k)] if 0 <= k < len(tracks) else _NO_TRACK for k in instances["track"]
+    ]
+    animals = list(dict.fromkeys(animal_names))
+    is_animal = choice.animal(file, animals, animals)
     last = max(number.values(), default=-1)
     if not 0 <= last < MOST_FRAMES:
         raise InputError(f"{file}: a frame's number is {last}; at most {MOST_FRAMES} are read")
@@ -172,8 +176,8 @@ def load_project(
     by_hand = np.zeros(last + 1, dtype=bool)
     taken = np.zeros(last + 1, dtype=bool)
     shift = 0.0 if version >= _CENTRED_VERSION else -0.5
-    for instance, name in zip(instances, whose, strict=True):
-        if name != mine:
+    for instance, name in zip(instances, animal_names, strict=True):
+        if name != is_animal:
             continue
         row_index = number.get(int(instance["frame_id"]), -1)
         predicted = int(instance["instance_type"]) == _PREDICTED_TYPE
@@ -184,8 +188,8 @@ def load_project(
             raise InputError(
                 f"{file}: two animals without a track in frame {row_index}: "
                 "track them first in SLEAP"
-                if mine == _NO_TRACK
-                else f"{file}: {mine} is twice in frame {row_index}; correct it in SLEAP"
+                if is_animal == _NO_TRACK
+                else f"{file}: {is_animal} is twice in frame {row_index}; correct it in SLEAP"
             )
         if taken[row_index] and predicted:
             continue  # a row set by hand replaces the prediction

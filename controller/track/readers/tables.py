@@ -72,8 +72,11 @@ def _of_animal(
     choice.only(file, "a CSV of midlines", "individual", "time_unit")
     names = [row[animals].strip() if animals < len(row) else "" for row in rows[1:]]
     listed = list(dict.fromkeys(names))
-    mine = choice.animal(file, listed, listed)
-    return [rows[0], *(row for row, name in zip(rows[1:], names, strict=True) if name == mine)]
+    name_of_animal = choice.animal(file, listed, listed)
+    return [
+        rows[0],
+        *(row for row, name in zip(rows[1:], names, strict=True) if name == name_of_animal),
+    ]
 
 
 def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, FrameStatus]:
@@ -134,9 +137,9 @@ def _midline(
     table = table[np.lexsort((table[:, 2], table[:, 1]))]
     frames, first, count = np.unique(table[:, 1], return_index=True, return_counts=True)
     if len(set(count.tolist())) != 1:
-        odd = int(frames[np.flatnonzero(count != count[0])[0]])
+        frame = int(frames[np.flatnonzero(count != count[0])[0]])
         raise InputError(
-            f"{file}: every frame must list the same points; frame {odd} differs from the first"
+            f"{file}: every frame must list the same points; frame {frame} differs from the first"
         )
     points = table[:, 3:].reshape(len(frames), int(count[0]), 2)
     time_s = None
@@ -178,8 +181,10 @@ def _sleap(
     score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
     scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
-    whose = [""] * len(table)
+    animal_names = [""] * len(table)
     if "track" in column:
         tracks_column = column["track"]
-        whose = [row[tracks_column].strip() if tracks_column < len(row) else "" for row in rows[1:]]
-    return load_table(file, keypoints, whose, table[:, 0], xy, scores, choice)
+        animal_names = [
+            row[tracks_column].strip() if tracks_column < len(row) else "" for row in rows[1:]
+        ]
+    return load_table(file, keypoints, animal_names, table[:, 0], xy, scores, choice)

@@ -43,8 +43,10 @@ def load_wcon(file: Path, text: str, choice: Choice) -> Track:
     records = document["data"] if isinstance(document["data"], list) else [document["data"]]
     animals = sorted({str(r.get("id")) for r in records if isinstance(r, dict)})
     if len(animals) > 1 or choice.individual is not None:
-        mine = choice.animal(file, animals, animals)
-        records = [r for r in records if not isinstance(r, dict) or str(r.get("id")) == mine]
+        name_of_animal = choice.animal(file, animals, animals)
+        records = [
+            r for r in records if not isinstance(r, dict) or str(r.get("id")) == name_of_animal
+        ]
     bodies, words = _all_bodies(file, records, metres)
     time = second * np.array([moment for moment, _ in bodies])
     step = float(np.median(np.diff(time)))
@@ -151,8 +153,8 @@ def zipped_text(file: Path) -> str | None:
 
 def _bodies(record: Any, metres: dict[str, float | None]) -> list[tuple[float, Floats]]:
     """Times and head-first points (P, 2) of a record, in metres if its units are lengths."""
-    many = isinstance(record["t"], list)
-    times, xs, ys = (record[k] if many else [record[k]] for k in ("t", "x", "y"))
+    has_times = isinstance(record["t"], list)
+    times, xs, ys = (record[k] if has_times else [record[k]] for k in ("t", "x", "y"))
     if not len(times) == len(xs) == len(ys):
         raise ValueError(f"{len(times)} times, {len(xs)} x, {len(ys)} y")
     from_ = ("ox", "oy") if "ox" in record else ("cx", "cy")

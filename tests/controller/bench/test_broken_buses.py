@@ -258,7 +258,7 @@ KINDS = [
         "noise on a floating line",
         others(b"\x00\xff"),
         "second master",
-        "bytes came that nobody asked for",
+        "bytes came without a request",
     ),
     Kind(
         "noise in every reply",

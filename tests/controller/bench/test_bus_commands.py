@@ -89,7 +89,7 @@ def test_bus_set_shows_asks_and_writes(
     assert line.bank["ID"][15] == 16
     code, out, err = call(monkeypatch, capsys, *words, "--json")
     assert (code, out) == (2, "")
-    assert "--json is for programs" in err
+    assert "--json: is for programs; leave it out" in err
     code, out, _ = call(monkeypatch, capsys, *words, "--dry-run", "--yes", "--json")
     assert not json.loads(out)["written"]
     assert line.bank["ID"][15] == 16

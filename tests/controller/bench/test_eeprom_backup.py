@@ -76,7 +76,7 @@ def test_what_was_set_comes_back_and_nothing_else_is_touched(
     }
     assert bank["Homing Offset"].tolist() == [0, 0]
     assert "bus restore asks first" in str(call("restore", file)[2])  # nobody to ask
-    assert "--json is for programs" in str(call("restore", file, "--json")[2])
+    assert "--json: is for programs; leave it out" in str(call("restore", file, "--json")[2])
     assert bank["Homing Offset"].tolist() == [0, 0]
     assert call("restore", file, "--id", 3, "--yes")[0] == 0
     assert bank["Homing Offset"].tolist() == [0, -200]

@@ -124,7 +124,7 @@ def loose_plug(line: TestLine) -> None:
 
 
 def sagging(line: TestLine) -> None:
-    """A supply whose voltage falls while the doctor looks."""
+    """A supply whose voltage falls during the check."""
     protection = line.firmware.protection
     begin_s = line.clock.now_s()
     for k in range(200):

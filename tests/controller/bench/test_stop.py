@@ -351,7 +351,7 @@ def test_what_is_asked_wrongly_is_one_line(
     stop: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    assert stop("nothing") == (2, "", "snakewalk: nothing: no such run is under way\n")
+    assert stop("nothing") == (2, "", "snakewalk: nothing: no such run is active\n")
     assert stop("a", "--port", "b")[0] == 2
     code, _, err = stop()
     assert code == 2

@@ -53,7 +53,7 @@ def service() -> Iterator[TwoMakes]:
     servos = FeetechServos((4, 5, 6), BenchPlant(3), facts)
     for row in range(3):
         servos["Baud Rate"][row] = baud_code(facts, 1_000_000)
-        servos.registers.keep(row, "Baud Rate")
+        servos.registers.store(row, "Baud Rate")
         servos["Return Delay Time"][row] = 0
     first.bank["Return Delay Time"][:] = 0
     other = OpenedFeetechLine(servos, clock)

@@ -125,7 +125,7 @@ def test_joints_on_a_port_are_read_and_never_moved(
     words = ("--device", str(film / "film.avi"), "--port", "/dev/sim", "--seconds", "600")
     code, found = call(str(run), *words)
     assert (code, found["frames"]) == (0, 20)
-    assert "the whole body was seen in 0 frames, its joints were read" in str(found["findings"])
+    assert "the complete body was seen in 0 frames, its joints were read" in str(found["findings"])
     assert not line.firmware.bank["Torque Enable"].any()
 
 

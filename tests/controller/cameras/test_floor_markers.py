@@ -146,7 +146,7 @@ def test_a_turn_of_the_camera_is_told_exactly() -> None:
     there = corners(PLACES)
     found = picture_move(there, moved(there, move), TRUE.floor_from_px, MATRIX, None)
     assert found is not None
-    np.testing.assert_allclose(found.now_from_then, move, atol=1e-6)
+    np.testing.assert_allclose(found.present_from_earlier, move, atol=1e-6)
     assert found.bump.undone
     assert found.bump.turn_rad == pytest.approx(np.radians(0.8), abs=1e-3)
     assert not found.bump.left_out
@@ -161,7 +161,7 @@ def test_a_kicked_marker_is_left_out_by_its_number() -> None:
     assert found.bump.left_out == (7,)
     assert "marker 7 was moved on the floor" in str(found.bump)
     np.testing.assert_allclose(
-        cv2.perspectiveTransform(there[7][:, None], found.now_from_then)[:, 0],
+        cv2.perspectiveTransform(there[7][:, None], found.present_from_earlier)[:, 0],
         now[7] - [6.0, 2.0], atol=1e-6,
     )  # fmt: skip
 

@@ -184,7 +184,7 @@ def test_a_device_hands_over_what_it_sees_and_says_when_it_is_gone(bench: WalkRu
         tip = (0.5 + reach * np.cos(0.2), 0.1 + reach * np.sin(0.2))
         assert np.hypot(*(found.line_m[[0, -1]] - tip).T).min() < 0.012
         said = [_gone(camera) for _ in range(6)]
-        assert any("hands over no more frames" in text for text in said)
+        assert any("delivers no more frames" in text for text in said)
     finally:
         camera.close()
 

@@ -168,7 +168,7 @@ def test_frames_that_cannot_be_used_are_bridged_and_told() -> None:
         found = pose(state_at(0.02 * k, bend))
         np.testing.assert_allclose(found.head_in_world_m[:2], (0.3, 0.3), atol=1e-3)
     assert len(said) == 2
-    assert "lost the body: cut by the edge of the image; reckoning on" in said[0]
+    assert "lost the body: cut by the edge of the image; dead reckoning" in said[0]
     assert "has the body again" in said[1]
     assert pose.frames - pose.used == 19
 

@@ -21,7 +21,7 @@ from snakewalk.controller.capture.coil_film import CoilFilm
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import align_ends, head_end
 from snakewalk.controller.capture.options import CaptureOptions
-from snakewalk.controller.capture.verification.film_check import goes_on_faintly
+from snakewalk.controller.capture.verification.film_check import has_faint_continuation
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
@@ -179,7 +179,7 @@ def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
         assert body.status is FrameStatus.GOOD
         store.put(number, frame, body.points_px, body.length_px)
         found.append(body)
-    assert goes_on_faintly(align_ends(found).skeletons, store) is expected
+    assert has_faint_continuation(align_ends(found).skeletons, store) is expected
 
 
 @pytest.mark.nightly("a further film: 6 s of CPU")
@@ -220,7 +220,7 @@ def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_p
     if not rejected:
         check_chance_finds(options, altered)
         return
-    with pytest.raises(InputError, match="only 3 of 23 frames show a whole body"):
+    with pytest.raises(InputError, match="only 3 of 23 frames show a complete body"):
         check_chance_finds(options, altered)
 
 
@@ -247,5 +247,5 @@ def test_a_film_whose_coils_leave_no_body_is_rejected(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("snakewalk.controller.capture.capture.solve_coils", lost)
     frames = list(film(replace(SCENE, frames=5)))
-    with pytest.raises(UnusableFilmError, match="the body is never seen whole"):
+    with pytest.raises(UnusableFilmError, match="the body is never completely visible"):
         capture(frames, BodyDetector(empty(SCENE), Polarity.DARK, "given"), SCENE.rate_hz)

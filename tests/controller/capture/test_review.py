@@ -128,7 +128,7 @@ def test_the_command_writes_a_track_that_loads(
     ("change", "said"),
     [
         ({"left_out": [16]}, "frame 16 is not there: the track has 16, from 0"),
-        ({"flipped": [2, 2]}, "flipped: frame 2 stands there twice"),
+        ({"flipped": [2, 2]}, "flipped: frame 2 is listed twice"),
         ({"left_out": list(range(15))}, "fewer than 2 frames"),
         ({"track": "another"}, "belong to another track"),
         ({"flipped": ["3"]}, "flipped"),

@@ -156,7 +156,7 @@ def test_the_command_exits_with_a_code_if_an_animal_has_no_track(
 ) -> None:
     _, facts = dish
     show_several(facts, as_json=as_json)
-    lost = replace(facts.animals[0], capture=None, fault="the body is never seen whole")
+    lost = replace(facts.animals[0], capture=None, fault="the body is never completely visible")
     with pytest.raises(SystemExit) as stopped:
         show_several(replace(facts, animals=(lost, *facts.animals[1:])), as_json=as_json)
     assert stopped.value.code == 1

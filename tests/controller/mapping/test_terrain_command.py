@@ -112,7 +112,7 @@ def test_a_stereo_pair_becomes_a_world_in_the_frame_of_its_camera(tmp_path: Path
     plain = (*pair, "--calibration", tmp_path / "c.npz", "-o", tmp_path / "y.toml")
     words = (*plain, "--unit", "mm")
     made = call(*words, "--disparities", 64, "--far", 1.5, "--spacing", 0.04)
-    assert made["camera"] == "fitted to the points, which are taken for level ground"
+    assert made["camera"] == "fitted to the points, which are assumed to be level ground"
     assert made["camera_height_m"] == pytest.approx(height_m, abs=0.005)
     assert made["camera_tilt_deg"] == pytest.approx(np.degrees(tilt), abs=0.3)
     assert made["camera_roll_deg"] == pytest.approx(0.0, abs=0.3)

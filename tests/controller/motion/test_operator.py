@@ -216,7 +216,7 @@ def test_a_body_moves_only_while_the_dead_mans_button_is_held() -> None:
     still = hands.seen[-1]
     hands.press("q", seconds=1.0)
     assert np.array_equal(hands.seen[-1], still), "nothing moves it but the button"
-    assert hands.said == ["let go: it stands in its shape", "stop"]
+    assert hands.said == ["button released: the body holds its shape", "stop"]
     held[0] = True
     hands.press(seconds=0.3)
     assert np.abs(hands.seen[-1] - still).max() > 1e-3

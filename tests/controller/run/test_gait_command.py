@@ -137,7 +137,7 @@ def test_its_pitch_joints_are_stiff_enough_to_lift(sidewound) -> None:
 def test_a_log_of_a_gait_replays_exactly_and_becomes_a_job_again(sidewound, tmp_path: Path) -> None:
     record = read_log(sidewound.log)
     again = read_log(replay(record, tmp_path / "again.mcap"))
-    assert differences(record, again, 1e-9, 1e-9).same
+    assert differences(record, again, 1e-9, 1e-9).is_equal
     job = prepare_run(record.header.run, record.header.robot, record.header.world)
     assert isinstance(job, GaitRun)
 

@@ -137,22 +137,22 @@ PHASES = {
     "after the last cycle": (
         "snakewalk.drivers.safety.stop_button.StopButton.report_end",
         OFF,
-        "the run is whole",
+        "the run is complete",
     ),
     "result of the shadow": (
         "snakewalk.controller.studies.shadow.run_shadow.RunShadow.end",
         OFF,
-        "the run is whole",
+        "the run is complete",
     ),
     "bar and observers close": (
         "snakewalk.controller.console.progress.TimeBar.__exit__",
         OFF,
-        "the run is whole",
+        "the run is complete",
     ),
-    "log is read": ("snakewalk.controller.run.run_robot.read_log", OFF, "the run is whole"),
-    "report": ("snakewalk.controller.report.artifacts._draw", OFF, "the run is whole"),
-    "film": ("snakewalk.controller.report.artifacts._film", OFF, "the run is whole"),
-    "result": ("snakewalk.controller.run.results.show", OFF, "the run is whole"),
+    "log is read": ("snakewalk.controller.run.run_robot.read_log", OFF, "the run is complete"),
+    "report": ("snakewalk.controller.report.artifacts._draw", OFF, "the run is complete"),
+    "film": ("snakewalk.controller.report.artifacts._film", OFF, "the run is complete"),
+    "result": ("snakewalk.controller.run.results.show", OFF, "the run is complete"),
 }
 """What a signal interrupts: the function called then, the state of torque, the name of the log."""
 

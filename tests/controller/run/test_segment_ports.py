@@ -171,7 +171,7 @@ def test_a_servo_is_found_on_its_port(service: Service) -> None:
     assert line.bank["Return Delay Time"][row] == 0
     done = service("bus", "blink", "--id", 40)
     assert done.returncode == 2
-    assert "has no ID 40; say which port it is on" in done.stderr
+    assert "has no ID 40; give its port" in done.stderr
 
 
 @pytest.mark.slow

@@ -70,7 +70,7 @@ def test_what_is_set_moves_the_body_stands_in_the_log_and_replays(
         assert header.robot.mean_link_mass_kg == 0.2
         assert header.run.start_heading_rad == pytest.approx(math.pi / 2.0)
         again = read_log(replay(record, tmp_path / f"{across}.mcap"))
-        assert differences(record, again, 1e-12, 1e-12).same
+        assert differences(record, again, 1e-12, 1e-12).is_equal
         heads.append(record.pose.head_m[-1])
     assert abs(heads[0] - heads[1]).max() > 1e-3
 

@@ -58,14 +58,14 @@ def test_other_ground_is_found_out(record: RunRecord, tmp_path: Path) -> None:
     friction = record.header.world.friction.model_copy(update={"along": 0.3})
     again = changed(record, tmp_path / "log.mcap", friction=friction)
     found = differences(record, again, 0.01, 0.01)
-    assert not found.same
+    assert not found.is_equal
     by_name = {d.name: d for d in found.differences}
     assert by_name["sent_rad"].largest == 0.0, "what was sent is the log's"
     head = by_name["head_m"]
     assert head.first_s is not None
     assert 0.01 < head.largest < 1.0
     assert 0.0 < head.rms < head.largest
-    assert by_name["current_a"].same, "currents are told, not held against it"
+    assert by_name["current_a"].is_equal, "currents are told, not held against it"
     assert by_name["current_a"].largest > 0.0
 
 
@@ -92,7 +92,9 @@ def test_metal_begins_where_its_joints_were(record: RunRecord, tmp_path: Path) -
     again = read_log(replay(metal, tmp_path / "log.mcap"))
     np.testing.assert_allclose(again.cycle.measured_rad, still, atol=0.01)
     found = differences(metal, again, 0.01, 0.0)
-    assert found.same, "where the head of metal was is reckoned, and not held against the replay"
+    assert found.is_equal, (
+        "where the head of metal was is reckoned, and not held against the replay"
+    )
 
 
 def test_a_log_without_a_cycle_is_refused(record: RunRecord, tmp_path: Path) -> None:

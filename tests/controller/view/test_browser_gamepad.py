@@ -137,7 +137,7 @@ def test_who_lets_go_or_says_nothing_stops_the_body_until_it_is_done_without() -
     now_s = [10.0]
     dead_man = DeadMan(lambda: now_s[0])
     assert dead_man.is_enabled
-    assert dead_man.sort_out(["m", hold_command(True, 10.0), "frequency_hz=0.4"]) == [
+    assert dead_man.process(["m", hold_command(True, 10.0), "frequency_hz=0.4"]) == [
         "m",
         "frequency_hz=0.4",
     ]
@@ -145,13 +145,13 @@ def test_who_lets_go_or_says_nothing_stops_the_body_until_it_is_done_without() -
     assert dead_man.is_enabled
     now_s[0] = 10.31
     assert not dead_man.is_enabled
-    dead_man.sort_out([hold_command(True, 10.0)])  # it came late
+    dead_man.process([hold_command(True, 10.0)])  # it came late
     assert not dead_man.is_enabled
-    dead_man.sort_out([hold_command(True, 10.3)])
+    dead_man.process([hold_command(True, 10.3)])
     assert dead_man.is_enabled
-    dead_man.sort_out([hold_command(False, 10.31)])
+    dead_man.process([hold_command(False, 10.31)])
     assert not dead_man.is_enabled
-    dead_man.sort_out([WITHOUT])
+    dead_man.process([WITHOUT])
     assert dead_man.is_enabled
 
 
@@ -230,8 +230,8 @@ DAMAGED = [
 @pytest.mark.parametrize("command", DAMAGED)
 def test_a_damaged_or_future_word_of_a_gamepad_moves_nothing_and_is_handed_on(command: str) -> None:
     dead_man = DeadMan(lambda: 5.0)
-    assert dead_man.sort_out([hold_command(False, 4.9)]) == []
-    assert dead_man.sort_out([command, "d"]) == [command, "d"]
+    assert dead_man.process([hold_command(False, 4.9)]) == []
+    assert dead_man.process([command, "d"]) == [command, "d"]
     assert not dead_man.is_enabled
-    assert dead_man.sort_out([hold_command(True, 5.0)]) == []
+    assert dead_man.process([hold_command(True, 5.0)]) == []
     assert dead_man.is_enabled

@@ -263,7 +263,7 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
     view.close()
     assert finished.outcome.tripped == "stop requested by E-STOP of a gamepad"
     events = [each for each in finished.record.events if each.kind == "operator"]
-    let_go, held = "let go: it stands in its shape", "held: it moves"
+    let_go, held = "button released: the body holds its shape", "held: it moves"
     assert [each.text for each in events[:4]] == [let_go, held, "mirror = True", let_go]
     assert 0.3 < events[3].time_s - events[1].time_s < 0.4  # it said nothing any more
     for what in ("No gamepad.", "Let go:", "Held:", "It says nothing any more:"):
@@ -637,7 +637,7 @@ def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path
         page.get_by_role("tab", name="gamepad").click()
         page.get_by_text("No gamepad. Press a button").wait_for()
         page.evaluate("window.pads = [window.pad]")
-        page.get_by_text("Let go: the body stands in its shape.").wait_for()
+        page.get_by_text("Button released: the body holds its shape.").wait_for()
         page.evaluate("window.press(4, true)")
         page.get_by_text("Held: the body moves.").wait_for()
         page.evaluate("window.press(1, true)")
@@ -648,7 +648,7 @@ def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path
         assert child.wait(PATIENCE_S) == 1
     record = read_log(tmp_path / "run" / "log.mcap")
     said = [event.text for event in record.events if event.kind == "operator"]
-    assert said[:2] == ["let go: it stands in its shape", "held: it moves"]
+    assert said[:2] == ["button released: the body holds its shape", "held: it moves"]
 
 
 @pytest.mark.nightly("a browser and a run in real time, which a busy computer delays")

@@ -111,9 +111,9 @@ def test_a_line_that_is_faster_than_its_baud_rate_is_believed_in_the_end() -> No
     for _ in range(2):
         free_s = line.reserve(request_s)
         clock.advance(0.5 * (request_s + reply_s))
-        assert line.came_twice(free_s, request_s, reply_s)
+        assert line.has_second_reply(free_s, request_s, reply_s)
         line.note_copies(answered=False)
         clock.advance(0.01)
     free_s = line.reserve(request_s)
-    assert not line.came_twice(free_s, request_s, reply_s)
-    assert not LineReservation(clock).came_twice(free_s, request_s, reply_s)
+    assert not line.has_second_reply(free_s, request_s, reply_s)
+    assert not LineReservation(clock).has_second_reply(free_s, request_s, reply_s)

@@ -232,7 +232,7 @@ def test_going_on_sets_it_up_again(change: Callable[[Rig], None]) -> None:
 FINGERPRINT_CHANGES = [
     ("Homing Offset", 100, "its zero has moved by +0.15 rad"),
     ("Homing Offset", 300, "its zero has moved by +0.46 rad"),
-    ("Drive Mode", 1, "it turns the other way round"),
+    ("Drive Mode", 1, "its direction is reversed"),
     ("Drive Mode", 8, "Drive Mode is 8, was 0"),
     ("Shutdown", 0, "Shutdown is 0, was 52"),
     ("Min Position Limit", 2000, "Min Position Limit is 2000"),

@@ -52,7 +52,7 @@ def test_a_missing_file_is_created_and_reported_once(line: SimLine, file: Finger
     ("register", "value", "said"),
     [
         ("Homing Offset", 100, "Homing Offset is 100, was 0: its zero has moved by +0.15 rad"),
-        ("Drive Mode", 1, "Drive Mode is 1, was 0: it turns the other way round"),
+        ("Drive Mode", 1, "Drive Mode is 1, was 0: its direction is reversed"),
         ("Current Limit", 500, "Current Limit is 500, was 1193"),
         ("PWM Limit", 500, "PWM Limit is 500, was 885"),
         ("Velocity Limit", 900, "Velocity Limit is 900, was 200"),

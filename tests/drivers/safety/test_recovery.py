@@ -146,7 +146,7 @@ def test_a_vanished_port_that_returns(rig: Rig) -> None:
     assert np.abs(held - before).max() < 0.15  # ran on for one watchdog time at most
     assert rig.torque() == [1] * 4
     assert rig.link.recoveries == 1
-    assert rig.events[-1] == "going on from where it stands"
+    assert rig.events[-1] == "the run continues from the present position"
     assert "moved by at most" in rig.events[1]
     goal = rig.goal
     rig.cycles(40)
@@ -469,7 +469,7 @@ def test_an_overloaded_servo_is_rebooted_set_up_again_and_goes_on_slowly(patient
         "1 more after this one"
     )
     assert "to be set up again: joint pitch_02 (ID 2)" in patient.events[1]
-    assert last == "going on from where it stands"
+    assert last == "the run continues from the present position"
     # it is asked for 0.8 rad more at once, and begins at nothing
     patient.goal = float(held[0]) + 0.8
     goals = []

@@ -175,7 +175,7 @@ def test_a_bag_without_joints_or_that_is_cut_is_one_line(tmp_path: Path) -> None
 @pytest.mark.parametrize("version", ["v2.1", "v3.0"])
 def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
     dataset(tmp_path / "set", version, 180.0 / np.pi)
-    with pytest.raises(InputError, match="has 2 episodes; say --episode 0 to 1"):
+    with pytest.raises(InputError, match="has 2 episodes; give --episode 0 to 1"):
         plays(tmp_path / "set")
     with pytest.raises(InputError, match=r"states no unit of angles.*--unit deg"):
         plays(tmp_path / "set", episode=1)

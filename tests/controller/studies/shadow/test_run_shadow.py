@@ -112,7 +112,7 @@ def test_a_robot_as_told_is_its_shadow_and_a_shadow_changes_nothing(tmp_path: Pa
     beside = runs[0].shadow
     assert np.abs(beside.current_a - runs[0].cycle.current_a).max() < 0.1 * ALARM_A
     assert np.abs(beside.position_rad - runs[0].cycle.measured_rad).max() < 1e-6
-    assert compare(runs[0], runs[1], tolerances={}).same
+    assert compare(runs[0], runs[1], tolerances={}).is_equal
     assert len(runs[1].shadow.time_s) == 0
 
 
