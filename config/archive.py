@@ -251,6 +251,6 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> "NDArray[Any]":
     if dtype.hasobject:
         raise ValueError(f"{member.filename}: holds Python objects")
     if math.prod(shape) * max(dtype.itemsize, 1) > member.file_size:
-        raise ValueError(f"{member.filename}: says {shape}, and holds less")
+        raise ValueError(f"{member.filename}: states {shape}, and contains less")
     with archive.open(member) as stream:
         return np.lib.format.read_array(stream, allow_pickle=False)

@@ -39,7 +39,7 @@ class AshoreConfig(Strict):
 class GaitConfig(Strict):
     """A gait in place of a walk; its parameters and their ranges: `snakewalk gait show NAME`."""
 
-    name: str = Field(description="one of `snakewalk gait list`")
+    name: str = Field(description="name of the gait; `snakewalk gait list` shows all")
     parameters: Parameters = Field(
         {}, description="values of gait parameters by name; the others keep their defaults"
     )

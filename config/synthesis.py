@@ -182,5 +182,7 @@ class SynthesisConfig(Strict):
         if not all(0.0 <= f <= 1.0 for f in self.sliding_along):
             raise ValueError("sliding_along: factors from 0 to 1")
         if self.viscous / self.rate_hz >= 2.0:
-            raise ValueError(f"viscous: below {2.0 * self.rate_hz:g} at this rate, or it diverges")
+            raise ValueError(
+                f"viscous: below {2.0 * self.rate_hz:g} at this rate, otherwise the motion diverges"
+            )
         return self

@@ -50,10 +50,9 @@ class RobotConfig(JointValues):
             return self
         if len(self.joints) != self.joint_count:
             raise ValueError(
-                f"joints: {len(self.joints)} of them, but joint_axes has {self.joint_count}"
+                f"joints: {len(self.joints)} given, but joint_axes has {self.joint_count}"
                 if not self.limbs
-                else f"joints: {len(self.joints)} of them, but spine and legs have "
-                f"{self.joint_count}"
+                else f"joints: {len(self.joints)} given, but spine and legs have {self.joint_count}"
             )
         for k, (joint, axis) in enumerate(zip(self.joints, self.all_axes, strict=True)):
             label = self.joint_label(k)
@@ -76,7 +75,7 @@ class RobotConfig(JointValues):
             return self
         if len(self.links) != self.link_count:
             raise ValueError(
-                f"links: {len(self.links)} of them, but a spine of {self.link_count - 1} joints "
+                f"links: {len(self.links)} given, but a spine of {self.link_count - 1} joints "
                 f"has {self.link_count}"
             )
         lengths_m, radii_m = self.link_lengths_m, self.link_radii_m

@@ -206,7 +206,11 @@ def _wait_for_end(button: PressedButton, clock: WallClock) -> StopOutcome:
     said = button.end
     safe = said is not None and "torque off failed" not in said and "torque may be on" not in said
     if said is None:
-        said = "it ended without a message" if not button.is_held else "it does not end"
+        said = (
+            "the program ended without a message"
+            if not button.is_held
+            else "the program does not end"
+        )
         safe = not run.ports and not button.is_held
     return StopOutcome(
         run.name, how, said, safe, round(after_s, 4), run.process, run.ports, run.folder

@@ -34,8 +34,12 @@ def background_candidates(
     """
     stack = np.stack(frames)
     yield _quantile(stack, 0.5), None, "the median of frames"
-    yield _quantile(stack, _QUANTILE), Polarity.DARK, "the lighter frames at each place"
-    yield _quantile(stack, 1.0 - _QUANTILE), Polarity.LIGHT, "the darker frames at each place"
+    yield _quantile(stack, _QUANTILE), Polarity.DARK, "the lighter half of the frames at each place"
+    yield (
+        _quantile(stack, 1.0 - _QUANTILE),
+        Polarity.LIGHT,
+        "the darker half of the frames at each place",
+    )
 
 
 def _quantile(stack: DeepImage, quantile: float) -> DeepImage:

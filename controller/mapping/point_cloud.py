@@ -85,7 +85,7 @@ def _pcd(file: Path, data: bytes) -> Floats:
     )
     row = np.dtype([(n, k, (c,)) for n, k, c in zip(names, kinds, counts, strict=True)])
     if total < 0:
-        raise ValueError(f"says {total} points")
+        raise ValueError(f"states {total} points")
     encoding = header["DATA"][0]
     body = data[start:]
     if encoding == "ascii":
@@ -93,7 +93,7 @@ def _pcd(file: Path, data: bytes) -> Floats:
     check_expansion(file, len(data), total * row.itemsize)
     if encoding == "binary":
         if len(body) < total * row.itemsize:
-            raise ValueError(f"says {total} points, and holds {len(body) // row.itemsize}")
+            raise ValueError(f"states {total} points, and contains {len(body) // row.itemsize}")
         points = np.frombuffer(body, row, total)
         return np.stack([points[axis][:, 0].astype(float) for axis in "xyz"], axis=-1)
     if encoding != "binary_compressed":
@@ -135,7 +135,7 @@ def _ascii(body: bytes, names: list[str], counts: list[int], total: int) -> Floa
     first = dict(zip(names, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
     rows = [line.split() for line in body.splitlines()[:total]]
     if len(rows) < total:
-        raise ValueError(f"says {total} points, and holds {len(rows)}")
+        raise ValueError(f"states {total} points, and contains {len(rows)}")
     rows_m = [[float(row[first[axis]]) for axis in "xyz"] for row in rows]
     return np.array(rows_m, dtype=float).reshape(-1, 3)
 

@@ -150,7 +150,7 @@ class Sensors:
     pose_sd_m: float = 0.0
     """Standard deviation of a measured position."""
     pose_is_measured: bool = True
-    """Whether something measures the pose; otherwise the run only believes where the body is."""
+    """Whether a source measures the pose; otherwise it is dead-reckoned."""
 
 
 class DrivePlan(Protocol):

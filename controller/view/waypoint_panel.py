@@ -32,8 +32,12 @@ class WaypointPanel:
             ):
                 gui.add_button(label, hint=what).on_click(self._arming(word))
             for word, label, what in (
-                (CLEAR, "leave out what is left", "it comes to rest, and waits for a waypoint"),
-                (END, "end the run", "it comes to rest, then torque goes off"),
+                (
+                    CLEAR,
+                    "omit the remaining waypoints",
+                    "the body comes to rest, and waits for a waypoint",
+                ),
+                (END, "end the run", "the body comes to rest, then torque goes off"),
             ):
                 gui.add_button(label, hint=what).on_click(self._commanding(word))
             self._text = gui.add_html("")
@@ -79,7 +83,7 @@ class WaypointPanel:
             self._show("refused: you did not click on the ground", _FAULT_COLOUR)
             return
         self._commands.put(f"{word}={point_m[0]:.3f},{point_m[1]:.3f}")
-        self._show("asked of the run")
+        self._show("requested from the run")
 
     def _show(self, text: str, color: str = "inherit") -> None:
         style = f"padding:.2em .8em .6em;font-size:13px;color:{color}"

@@ -118,7 +118,7 @@ class LiveCourse(MotionWrapper, OnCourse):
             self._refusals.add(why, self._time_s)
         self._refusals.step(self._time_s)
         if self.course.complete and not self._reported_complete and not self._ends:
-            self._on_event("operator", "no waypoint is left: it holds, and waits for another")
+            self._on_event("operator", "no waypoint is left: the body holds, and waits for another")
         self._reported_complete = self.course.complete
         return goal_rad
 
@@ -141,7 +141,7 @@ class LiveCourse(MotionWrapper, OnCourse):
             else:
                 self._lead_to(left_m[:0], view)
                 self._ends = word == END
-                text = "it comes to rest, and the run ends" if self._ends else "it stops here"
+                text = "the body comes to rest, and the run ends" if self._ends else "it stops here"
         except InputError as error:
             self._refusals.add(error.faults[0], self._time_s)
             return

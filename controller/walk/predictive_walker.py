@@ -31,8 +31,8 @@ CLIMBING = (
     SerpenoidParameters(amplitude_rad=1.1, waves=1.1),
     SerpenoidParameters(amplitude_rad=1.3, waves=1.0),
 )
-"""Carriers of states uphill. On paper a slope of 15 degrees leaves the first 0.27 of the progress
-without slip, one of 18 degrees the second 0.17."""
+"""Carriers of states uphill. The predicted progress of the first at 15 degrees is 0.27 of that
+without slip, of the second at 18 degrees 0.17."""
 SERPENOIDS = (SerpenoidParameters(), *CLIMBING)
 """Carriers that the walk falls back on."""
 _JOIN = 0.1

@@ -65,7 +65,7 @@ def test_a_leg_joint_may_have_an_id_and_a_limit_of_its_own() -> None:
     assert robot.servo_ids == (1, 2, 40, 4, 5)
     assert robot.limit_rad == (1.5, 1.2, 0.7, 1.2, 1.5)
     assert robot.current_limits_a == (float("inf"),) * 5
-    with pytest.raises(ValidationError, match="3 of them, but spine and legs have 5"):
+    with pytest.raises(ValidationError, match="3 given, but spine and legs have 5"):
         RobotConfig.model_validate(
             {"name": "mine", "joint_axes": "y", "joints": joints[:3], "limbs": [{"link": 1}]}
         )

@@ -73,7 +73,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"joint_axes": "yy", "joints": [{}]}, "joints: 1 of them, but joint_axes has 2"),
+        ({"joint_axes": "yy", "joints": [{}]}, "joints: 1 given, but joint_axes has 2"),
         (
             {"joint_axes": "y", "joints": [{"axis": "p"}]},
             "joint yaw_01 (ID 1): axis is p, joint_axes says y",
@@ -112,7 +112,7 @@ def test_a_chain_without_joints_of_its_own_is_as_before() -> None:
                 "links": [{"radius_m": 0.02}, {}],
                 "body_profile": [0.5, 1.0],
             },
-            "radius_m and body_profile: one of them",
+            "radius_m and body_profile: both state",
         ),
         (
             {"joint_axes": "yp", "links": [{}, {"length_m": 0, "shape": "capsule"}, {}]},

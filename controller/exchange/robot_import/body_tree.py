@@ -86,7 +86,9 @@ def body_tree(model: mujoco.MjModel, data: mujoco.MjData, source: ModelSource) -
     """
     if model.neq:
         name = element_name(model, "equality", 0)
-        raise InputError(f"{name}: couples joints or closes a loop; each joint here is a servo")
+        raise InputError(
+            f"{name}: couples joints or closes a loop; each joint of a robot's file is a servo"
+        )
     root = _root(model, data)
     for body in _walk(root):
         body.name = source.part_names.get(body.name, body.name)
@@ -242,7 +244,7 @@ def _bodies_off_path(body: MovingBody, path: list[MovingBody]) -> list[MovingBod
 
 
 def _is_pair(children: list[MovingBody]) -> bool:
-    """Whether bodies are no pair of legs: not two, or with different numbers of hinges."""
+    """Whether bodies differ from a pair of legs: not two, or unequal numbers of hinges."""
     if not children:
         return True
     if len(children) != 2:

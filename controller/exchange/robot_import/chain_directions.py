@@ -100,7 +100,7 @@ def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
             raise InputError(
                 f"joint {hinge.name}: its axis is {math.degrees(off):.3g} degrees from that of "
                 f"{before.name}: neither parallel to it nor at a right angle to it and to the "
-                "body; joints here yaw or pitch"
+                "body; joints yaw or pitch"
             )
         kinds.append(kind)
         off_neighbour = max(off_neighbour, abs(math.pi / 2 - off) if turns else off)
@@ -111,7 +111,7 @@ def _kinds(hinges: list[Hinge], notes: list[str]) -> list[bool]:
     if off_neighbour > TOLD_RAD or off_first > TOLD_RAD:
         notes.append(
             f"axes are rounded: up to {off_neighbour:.2g} rad from right angles or parallels "
-            f"between neighbours, up to {off_first:.2g} rad along the chain; they are exact here"
+            f"between neighbours, up to {off_first:.2g} rad along the chain"
         )
     return kinds
 

@@ -98,7 +98,7 @@ def _leg(
         if max(abs(swings), abs(lifts)) < math.cos(ROUNDED_RAD):
             raise InputError(
                 f"joint {hinge.name} of leg {branch.name}: its axis is neither upright nor along "
-                "the body; joints of legs swing or lift here"
+                "the body; joints of a leg swing or lift"
             )
         axes += "y" if abs(swings) > abs(lifts) else "r"
         side_sign = -swings if axes[-1] == "y" else lifts
@@ -163,7 +163,7 @@ def _check_straight(
             if abs(place - middle) > _LEG_TOLERANCE * reach_m:
                 raise InputError(
                     f"joint {name} of leg {branch.name}: is {abs(place - middle):.3g} m off the "
-                    "straight leg at zero angles; a leg stands straight out to the side there, at "
+                    "straight leg at zero angles; a leg must point straight to the side there, at "
                     "the height of the spine"
                 )
 
@@ -217,14 +217,14 @@ def _pair(
     mean_kg = float(np.mean(masses))
     if max(masses) - min(masses) > 1e-9:
         notes.append(
-            f"legs of {name}: segments of {min(masses):.3g} to {max(masses):.3g} kg; each has the "
-            f"mean here, {mean_kg:.3g}"
+            f"legs of {name}: segments of {min(masses):.3g} to {max(masses):.3g} kg; the "
+            f"robot's file has their mean, {mean_kg:.3g}"
         )
     ahead_m = 0.5 * (left.ahead_m + right.ahead_m)
     if abs(ahead_m) > 1e-6:
         notes.append(
-            f"legs of {name}: their hips are {ahead_m:.3g} m ahead of the middle of the link; here "
-            "they are there"
+            f"legs of {name}: their hips are {ahead_m:.3g} m ahead of the middle of the link; the "
+            "robot's file puts them at the middle"
         )
     table = {
         "link": link,

@@ -349,13 +349,13 @@ def uneven_notes(links: list[LinkFigures], names: list[str]) -> list[str]:
     if offset > 0.01:
         notes.append(
             f"centres of mass are up to {100.0 * offset:.0f} % of their link's length from its "
-            f"middle ({name}); here they are in the middle"
+            f"middle ({name}); the robot's file puts them in the middle"
         )
     spread = max((abs(math.log(max(link.spread, 1e-9))), link.spread) for link in links)[1]
     if spread > _POINT and abs(math.log(spread)) > math.log(1.0 + _SPREAD):
         notes.append(
             f"inertia across the body is up to {spread:.2g} times that of an even cylinder, which "
-            "it is here"
+            "the robot's file assumes"
         )
     return notes
 

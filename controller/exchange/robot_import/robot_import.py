@@ -326,8 +326,8 @@ def _joints(
             )
         elif abs(low + high) > 1e-6:
             notes.append(
-                f"joint {hinge.name}: turns from {low:.3g} to {high:.3g} rad in the model; ranges "
-                f"here are even: {half:.3g} rad both ways"
+                f"joint {hinge.name}: turns from {low:.3g} to {high:.3g} rad in the model; the "
+                f"robot's file has an even range: {half:.3g} rad both ways"
             )
         elif half < high:
             notes.append(

@@ -60,7 +60,7 @@ def prepare_urdf(root: LineElement, path: Path, *, meshes: bool = True) -> Model
         if joint.find("mimic") is not None:
             raise InputError(
                 f"{path}: joint {joint.get('name')}, {_element_place(joint)}: mimics another; "
-                "each joint here is a servo"
+                "each joint of a robot's file is a servo"
             )
     _drop_repeated(source)
     _check_names(root, path)
@@ -246,7 +246,7 @@ def _check_names(root: LineElement, path: Path) -> None:
             first = first_of.setdefault(element.get("name"), element)
             if first is not element:
                 raise InputError(
-                    f"{path}: {tag} {element.get('name')} is there twice, {first.where} and "
+                    f"{path}: {tag} {element.get('name')} occurs twice, {first.where} and "
                     f"{element.where}; names must differ"
                 )
 

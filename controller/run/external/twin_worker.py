@@ -91,7 +91,7 @@ class RehearsedTwin:
         return answers
 
     def close(self) -> None:
-        """Do nothing: there is no process to end."""
+        """Do nothing; only a worker has a process to end."""
 
 
 class ProcessTwin:

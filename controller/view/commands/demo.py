@@ -38,7 +38,7 @@ def demo(view_at: ViewAt = VIEW_AT) -> None:
     compiler = start(_compile_behind, daemon=True)
     clock = WallClock()
     play(page, clock, lambda: not compiler.is_alive())
-    print(f"{_LIVE_COMMAND}  runs the same live; Enter does it now", flush=True)
+    print(f"{_LIVE_COMMAND}  runs the same live; Enter starts it now", flush=True)
     play(page, clock, _is_enter_pressed)
     page.server.stop()
     raise SystemExit(run_command([*_LIVE_COMMAND.split()[1:], "--view-at", view_at]))

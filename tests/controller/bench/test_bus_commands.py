@@ -53,7 +53,7 @@ def test_a_silent_bus_is_reported_with_the_rates_that_were_searched(
 ) -> None:
     code, out, _ = call(monkeypatch, capsys, "scan", "--port", device, "--baud", "57600")
     assert code == 1
-    assert "nobody answers at 57600 baud; leave --baud out to search all rates" in out
+    assert "no servo replies at 57600 baud; leave --baud out to search all rates" in out
 
 
 def test_doctor(

@@ -78,7 +78,7 @@ def test_the_advice_is_the_best_place_that_there_is() -> None:
     found = cable_finding(load_robot("yaw16"), voltage_v, drawn_a)
     assert found.grade == "warn"
     assert "at ID 1 to" in found.found
-    assert "taken for granted: power comes in at ID 1" in found.found
+    assert "assumed: power enters at ID 1" in found.found
     assert found.remedy.startswith("inject power at ID 1")  # 10 to 12: beyond the middle
     loads_a = np.full(16, 0.3)
     cabling = Cabling.of(robot, robot.power)  # type: ignore[arg-type]

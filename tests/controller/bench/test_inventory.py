@@ -69,7 +69,7 @@ def test_an_empty_wire_is_told(monkeypatch: pytest.MonkeyPatch, line: SimLine) -
     monkeypatch.setattr(line, "setBaudRate", lambda rate: False)
     error = call().exception
     assert isinstance(error, InputError)
-    assert "nobody answers" in str(error)
+    assert "no servo replies" in str(error)
 
 
 @pytest.mark.parametrize("line", [{1: "XL430-W250", 2: "XL430-W250"}], indirect=True)

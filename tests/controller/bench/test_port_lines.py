@@ -94,7 +94,7 @@ def test_the_doctor_examines_every_port_and_wiggles_the_whole_chain(service: Two
     [
         ("1-8=/dev/a,9-16=/dev/a", "/dev/a is named twice"),
         ("1-8=/dev/a,8-16=/dev/b", "ID 8 is on more than one port"),
-        ("1-8=/dev/a,9-16=sim", "sim is of runs"),
+        ("1-8=/dev/a,9-16=sim", "sim works in runs only"),
     ],
 )
 def test_a_port_map_that_no_bench_has_is_refused(port: str, said: str) -> None:

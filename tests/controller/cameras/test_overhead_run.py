@@ -80,7 +80,7 @@ def test_a_body_that_leaves_the_image_is_reckoned_on_and_the_log_says_so(tmp_pat
 @pytest.mark.slow
 @pytest.mark.usefixtures("drawn")
 def test_a_robot_out_of_view_at_its_start_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not seen whole at its start: nothing seen"):
+    with pytest.raises(InputError, match="not completely visible at its start: nothing seen"):
         run_robot(RunRequest(short(pose="camera", camera={"centre_m": (30.0, 0.0)}), tmp_path))
 
 

@@ -99,7 +99,7 @@ ROWS = [
     ("bus serve --servos 1 --for nan", "--for: must be a finite number (got nan)"),
     ("bus serve --servos 1 --for -1", "--for -1: must be over 0 s"),
     ("bus serve --servos 1 --record x --link x", "--record and --link have the same name"),
-    ("gait run rolling --gamepad file.txt", "file.txt: is a file; a gamepad is such as"),
+    ("gait run rolling --gamepad file.txt", "file.txt: is a file, not a gamepad; name one such as"),
     ("run flat-square --set run.waypoints_m=[[1e30,1]]", "waypoints_m.0.0: must be at most 1000"),
     ("ros --namespace ../x", "--namespace ../x: expected a name as snake"),
     ("world from high.csv -o w.toml --cell 0.1", "high.csv: holds heights of 3e+38 m"),

@@ -48,7 +48,7 @@ def test_nothing_is_replaced_unless_told(log: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ((), "say what to write"),
+        ((), "choose what to write"),
         (("--ros2", "bag.db3"), "bag.db3: is an MCAP file; name it bag.mcap"),
         (("--ros2", "a.mcap", "--foxglove", "a.mcap"), "have the same name"),
         (("--csv", "no/such/folder"), "no/such: no such folder"),

@@ -110,7 +110,10 @@ def test_goals_are_reached_without_overshoot_and_other_joints_keep_theirs() -> N
         (points((0.0, 0.1)), "its only point is at 0 s"),
         (points((0.0, 0.5), (1.0, 0.2)), "begins at 0 s 0.50 rad from where joint3 is"),
         (points((0.01, 0.5)), "joint3 moves at"),
-        (points((1.0, 0.5), velocity_rad_s=np.array([[1.0]])), "velocities there must be 0"),
+        (
+            points((1.0, 0.5), velocity_rad_s=np.array([[1.0]])),
+            "velocities of its last point must be 0",
+        ),
         (points((1.0, 0.5), velocity_rad_s=np.array([[math.nan]])), "is not a number"),
         (points((1.0, 0.5), velocity_rad_s=np.zeros((2, 1))), "needs 1 positions"),
         (

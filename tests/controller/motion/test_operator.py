@@ -297,7 +297,7 @@ def test_conflicting_values_leave_the_last_and_pasted_text_holds_no_cycle_up() -
     hands.press("winding_rad=0.5", "winding_rad=0.6")
     assert hands.operator.motion.gait.params.winding_rad == 0.6
     hands.press(*["right"] * 5000)
-    assert hands.said.count("refused: 5000 keys at once; only the first 100 are carried out") == 1
+    assert hands.said.count("refused: 5000 keys at once; only the first 100 count") == 1
 
 
 def test_pasted_text_is_read_in_parts_and_a_closed_terminal_is_known() -> None:

@@ -81,7 +81,7 @@ def test_help_gives_an_example() -> None:
         (STRAIGHT + "-3,0,nan\n", [], "line 7: z_m is nan"),
         ("x_m,y_m,z_m\n0,0,0\n-1,0,0\n", [], "curve.csv: a backbone curve has four points"),
         (SHORT, ["--robot", "yaw16"], "curve.csv: the curve is 0.300 m long; robot yaw16 has"),
-        (STRAIGHT.replace("-1.0", "-0.5"), [], "no two in a row the same"),
+        (STRAIGHT.replace("-1.0", "-0.5"), [], "neighbours must differ"),
         (STRAIGHT, ["--robot", "hop"], "hop"),
         (STRAIGHT, ["--picture", "fit.txt"], "a picture ends in .png"),
         (STRAIGHT, ["-o", "joints.txt"], "ends in .npz"),

@@ -102,7 +102,7 @@ def test_a_run_that_is_over_is_whole_when_its_summary_is_interrupted(
     log = tmp_path / "log.mcap"
     assert stop.value.__notes__ == [
         "torque is off",
-        f"the run is whole: {log}; its page: snakewalk log report {log}",
+        f"the run is complete: {log}; its page: snakewalk log report {log}",
     ]
     assert read_log(log).complete
 

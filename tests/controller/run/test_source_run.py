@@ -169,7 +169,7 @@ def test_one_source_for_every_call_is_refused() -> None:
         sources.append(Bend(robot))
         return sources[0]
 
-    with pytest.raises(InputError, match="a fresh one at each call"):
+    with pytest.raises(InputError, match="return a new motion source at each call"):
         prepare_source(always_one).check_plan()
 
 

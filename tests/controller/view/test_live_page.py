@@ -266,7 +266,7 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
     let_go, held = "button released: the body holds its shape", "held: it moves"
     assert [each.text for each in events[:4]] == [let_go, held, "mirror = True", let_go]
     assert 0.3 < events[3].time_s - events[1].time_s < 0.4  # it said nothing any more
-    for what in ("No gamepad.", "Let go:", "Held:", "It says nothing any more:"):
+    for what in ("No gamepad.", "Button released:", "Held:", "The gamepad does not respond:"):
         assert any(what in text for text in texts)
 
 
@@ -311,7 +311,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
             at["end"] = progress.time_s
             assert len(scene._waypoints) == 2
             assert "waypoint 2 of 2" in view.shown("_state")
-            assert "no waypoint is left: it holds" in panel._text.content
+            assert "no waypoint is left: the body holds" in panel._text.content
             panel._commanding("end")(None)
 
     finished = run_robot(
@@ -666,7 +666,7 @@ def test_in_a_browser_a_click_on_the_ground_is_where_the_body_goes(
         while armed.is_visible():  # a page that still draws its first picture receives no click
             page.mouse.click(420, 330)
             page.wait_for_timeout(1000.0)
-        page.get_by_text("no waypoint is left: it holds, and waits for another").wait_for()
+        page.get_by_text("no waypoint is left: the body holds, and waits for another").wait_for()
         page.get_by_role("button", name="end the run").click()
         page.get_by_text("the run has ended").wait_for()
         assert child.wait(PATIENCE_S) == 0

@@ -90,7 +90,7 @@ def test_it_goes_to_a_waypoint_that_was_added_after_those_it_has() -> None:
     assert live.walker.at_m[1] == pytest.approx(1.0, abs=0.2)
     assert live.said == [
         ("operator", "waypoint 2 at (1.00, 1.00)"),
-        ("operator", "no waypoint is left: it holds, and waits for another"),
+        ("operator", "no waypoint is left: the body holds, and waits for another"),
     ]
 
 
@@ -195,4 +195,4 @@ def test_more_commands_than_a_person_clicks_are_not_all_carried_out() -> None:
     live = Live()
     live.steps(1, *(f"waypoint=1,{k}" for k in range(1, 30)))
     assert len(live.motion.waypoints_m) == 11
-    assert live.said[-1] == ("refused", "29 commands at once; only the first 10 are carried out")
+    assert live.said[-1] == ("refused", "29 commands at once; only the first 10 count")

@@ -72,7 +72,7 @@ def test_serve_says_where_and_what_and_sniff_reads_its_recording(tmp_path: Path)
         (("serve", "--faults", "nowhere.toml"), "nowhere.toml: No such file"),
         (("serve", "--servos", "1-4", "--imu", "4"), "--imu 4: a servo has this ID"),
         (("serve", "--servos", "1-4", "--imu", "200:BNO"), "no such model; there are imu_to_dxl"),
-        (("serve", "--robot", "yaw16", "--imu", "200"), "its file says it: table [imu]"),
+        (("serve", "--robot", "yaw16", "--imu", "200"), "describes its IMU in the table [imu]"),
         (("serve", "--servos", "1:AX-12A", "--imu", "9"), "1.0 and imu_to_dxl Protocol 2.0"),
         (("sniff", "nowhere.jsonl"), "nowhere.jsonl: no such file"),
     ],

@@ -145,10 +145,10 @@ def test_a_table_of_joint_angles(
 
 def test_a_table_that_states_no_unit_is_asked_about_with_the_likely_one(tmp_path: Path) -> None:
     table(tmp_path / "a.csv", ["time", *NAMES])
-    with pytest.raises(InputError, match=r"states no unit of angles.*say --unit rad"):
+    with pytest.raises(InputError, match=r"states no unit of angles.*give --unit rad"):
         plays(tmp_path / "a.csv")
     table(tmp_path / "a.csv", ["time", *NAMES], 180.0 / np.pi * ANGLES)
-    with pytest.raises(InputError, match=r"go to 17\.2; say --unit deg"):
+    with pytest.raises(InputError, match=r"go to 17\.2; give --unit deg"):
         plays(tmp_path / "a.csv")
 
 
@@ -231,7 +231,7 @@ def broken(change: Callable[[str], str]) -> Callable[[Path], None]:
         (broken(lambda text: text.replace("0.0500,", "0.0000,", 1)), "time must increase"),
         (broken(lambda text: text.replace("0.1000,", "0.1000,left,", 1)), "line 4: 17 cells|18"),
         (broken(lambda text: text.replace(f",{NAMES[1]},", f",{NAMES[0]},", 1)), "is there twice"),
-        (broken(lambda text: "\n".join(text.splitlines()[:2])), "1 whole rows"),
+        (broken(lambda text: "\n".join(text.splitlines()[:2])), "1 complete rows"),
     ],
 )
 def test_faults_of_a_table(make: Callable[[Path], None], said: str, tmp_path: Path) -> None:

@@ -503,8 +503,8 @@ def made_way(made: ImportedRobot) -> int:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('<link name="l3">', '<link name="l2">', "link l2 is there twice, line 6 and line 7"),
-        ('<joint name="j2"', '<joint name="j1"', "joint j1 is there twice, line 9 and line 10"),
+        ('<link name="l3">', '<link name="l2">', "link l2 occurs twice, line 6 and line 7"),
+        ('<joint name="j2"', '<joint name="j1"', "joint j1 occurs twice, line 9 and line 10"),
     ],
 )
 def test_a_repeated_name_is_named_with_both_lines(
