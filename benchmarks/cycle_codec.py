@@ -15,7 +15,7 @@ the program's hands (the kernel passing it on, waking up, parsing). Both are sho
 pseudo-terminal itself was. It does not model what an adapter adds.
 
 Ours is measured as a chain uses it (goals written when they are known, the state read in the next
-cycle: two writes), and as one call, ``ControlCycle.transact`` (both packets in one write). The
+cycle: two writes), and as one call, ``ControlCycle.read`` (both packets in one write). The
 rivals have no such call.
 """
 
@@ -108,7 +108,7 @@ def ours(
 
     def turn(k: int) -> bool:
         if at_once:
-            return bool(cycle.transact(goals + k).valid.all())
+            return bool(cycle.read(goals + k).valid.all())
         cycle.write_goals(goals + k)
         return bool(cycle.read().valid.all())
 

@@ -65,6 +65,8 @@ class JointState(NamedTuple):
     """(J,) the same for temperature and voltage; infinite until first read."""
     imu: ImuState | None = None
     """Attitude measured by the robot's IMU; None without an IMU, or before its first attitude."""
+    stalled_s: float = 0.0
+    """Total time by which reads ended late because the computer paused."""
 
 
 class BodyPose(NamedTuple):

@@ -114,7 +114,10 @@ def _missing_remedy(
         )
     if len(missing) == len(expected):
         return "is the servo power on? is the adapter's switch at TTL or RS-485 as the servos need?"
-    return f"look at the cable in front of servo {missing[0]}; snakewalk bus scan --port {port}"
+    return (
+        f"look at the cable in front of servo {missing[0]}; snakewalk bus scan --port {port}. If "
+        "it has power, another servo may have the same ID: turn it by hand and run doctor again"
+    )
 
 
 def unnamed_robot(findings: Sequence[Finding], robot: RobotConfig) -> Finding | None:
@@ -137,27 +140,22 @@ def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = 
     """
     check = "duplicate IDs"
     probes = (*pings, *reads)
-    doubled = sorted({p.servo_id for p in probes if p.doubled})
-    if doubled:
-        return Finding(
-            check,
-            "fail",
-            f"{shown_subject(doubled, 'answer')} twice: two servos have this ID",
-            _DUPLICATE_REMEDY,
-        )
+    shared = sorted({p.servo_id for p in probes if p.doubled})
+    how = "twice"
     requests = sum(p.requests for p in probes)
-    if noisy:
+    if noisy and not shared:
         duplicates_text = (
             f"no servo answers twice in {requests} requests; noise hides further checks"
         )
         return Finding(check, "ok", duplicates_text)
-    damaged_ids = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
-    if damaged_ids:
+    if not shared:
+        shared = sorted({p.servo_id for p in probes if p.damaged == p.requests and not p.answered})
+        how = "with damaged bytes only"
+    if shared:
         return Finding(
             check,
             "fail",
-            f"{shown_subject(damaged_ids, 'answer')} with damaged bytes only: "
-            "two servos have this ID",
+            f"{shown_subject(shared, 'answer')} {how}: two servos have this ID",
             _DUPLICATE_REMEDY,
         )
     damaged = sorted({p.servo_id for p in probes if p.damaged})

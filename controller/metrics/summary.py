@@ -138,6 +138,10 @@ class RunSummary:
     cycles: int
     missed_deadlines: int
     lateness_max_s: float | None
+    stalls: int
+    """Cycles whose read the computer interrupted by a pause; not counted in older logs."""
+    stalled_s: float | None
+    """Total time of these pauses beyond the deadlines of the reads."""
     wire_use_mean: float | None
     """Share of the cycle that bytes were on the wire."""
     wire_use_max: float | None
@@ -300,6 +304,8 @@ def _summary(record: RunRecord, moved: Travel) -> RunSummary:
         cycles=len(cycle.time_s),
         missed_deadlines=int(skipped_cycles(record).sum()),
         lateness_max_s=_digits(_peak(cycle.lateness_s)),
+        stalls=int(np.count_nonzero(np.diff(record.slow.stalled_s, prepend=0.0) > 0.0)),
+        stalled_s=_digits(_peak(record.slow.stalled_s)),
         wire_use_mean=_digits(_mean(use)),
         wire_use_max=_digits(_peak(use)),
         decisions=len(walk.time_s),

@@ -174,6 +174,8 @@ def _facts(n: RunSummary, run_verdict: RunVerdict) -> tuple[tuple[str, object], 
 def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     """Name, value and the line below it of each headline number."""
     wire = f"{_pct(n.wire_use_mean)} of the wire" if n.wire_use_mean is not None else ""
+    if n.stalls:
+        wire += f"; {n.stalls} pauses of the computer, {_fmt(n.stalled_s, 2)} s"
     torque = "" if n.peak_torque_n_m is None else f"{_fmt(n.peak_torque_n_m, 2)} N m"
     vetoes = _count(n.vetoes, "veto", "vetoes")
     missed = f"{n.missed_deadlines} of {n.cycles}"

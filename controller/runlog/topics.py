@@ -171,6 +171,9 @@ class SlowTable(Table):
         ),
     ]
     hardware_error: Annotated[Ints, _per_joint("(J,) register 70", "integer")]
+    stalled_s: Annotated[
+        Floats, _optional("so far by which reads ended late because the computer paused")
+    ]
 
 
 @topic("/shadow", is_fast=True)

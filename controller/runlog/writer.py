@@ -166,6 +166,7 @@ class RunLog:
             temperature_c=state.temperature_c,
             voltage_v=state.voltage_v,
             hardware_error=state.hardware_error,
+            stalled_s=state.stalled_s,
         )
         if state.imu is not None:
             imu = state.imu

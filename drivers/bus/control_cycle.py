@@ -50,21 +50,18 @@ saves
 class CycleCounters:
     """Irregular reads so far."""
 
-    reads: int = 0
     timeouts: int = 0
     """Reads whose deadline passed before all bytes had arrived."""
     unclean: int = 0
     """Reads with noise, damage, or late replies in them."""
     copies: int = 0
     """Older replies that had come twice, and were dropped."""
-    drained_bytes: int = 0
     fast_given_up: int = 0
     late_bytes: int = 0
     """Bytes that arrived after the time-out of their read."""
-    stalls: int = 0
-    """Reads that ended long after their deadline: this program or its computer paused."""
     stalled_s: float = 0.0
-    """Total time between the deadlines and the ends of these reads."""
+    """Total time between the deadlines and the ends of reads that ended long after them: this
+    program or its computer paused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,24 +181,16 @@ class ControlCycle:
         elif sent < self._goals.size:
             self._port.write(self._goals.encode(goals)[sent:])
 
-    def transact(self, goals: NDArray[np.int32]) -> GroupReadReply:
-        """``write_goals`` and ``read``, with both packets in one write.
+    def read(self, goals: NDArray[np.int32] | None = None) -> GroupReadReply:
+        """Read the block of all servos; ``data`` is (N, read_bytes).
+
+        Goals (N,) are sent first if given, with the request in one write.
 
         Raises:
             PortError: the port is gone.
 
         """
         self.begin_read(goals)
-        return self.finish_read()
-
-    def read(self) -> GroupReadReply:
-        """Read the block of all servos; ``data`` is (N, read_bytes).
-
-        Raises:
-            PortError: the port is gone.
-
-        """
-        self.begin_read()
         return self.finish_read()
 
     def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
@@ -213,7 +202,6 @@ class ControlCycle:
             PortError: the port is gone.
 
         """
-        self.counters.reads += 1
         fast_path = self._fast_path
         request = self._next_request()
         if fast_path is not None and request is self._default_request and fast_path.begin(goals):
@@ -261,7 +249,6 @@ class ControlCycle:
         allowed_s = request.reply_bytes * self._byte_s + self._latency_s
         late_s = self._line.since_sent_s - allowed_s
         if late_s > STALL_S:
-            self.counters.stalls += 1
             self.counters.stalled_s += late_s
 
     def _without_late_replies(
@@ -399,6 +386,4 @@ class ControlCycle:
         if not responded.all():
             first = int(np.argmin(responded))  # those after it could not respond
             self._order = (*order[:first], *order[first + 1 :], order[first])
-        drained = self._port.drain_until_quiet(self._latency_s)
-        self.counters.drained_bytes += drained
-        self.counters.late_bytes += drained * timed_out
+        self.counters.late_bytes += timed_out * self._port.drain_until_quiet(self._latency_s)

@@ -166,6 +166,8 @@ class FeetechSingleReads(FeetechCycle):
         super().__init__(
             port, ids, facts, span, convert, latency_s=latency_s, pending=pending, line=line
         )
+        for single in self._singles:
+            single.counters = self.counters
         self._begun_s = self._clock.now_s()
 
     @property
@@ -178,22 +180,10 @@ class FeetechSingleReads(FeetechCycle):
         if goals is not None:
             self.write_goals(goals)
         self._begun_s = self._clock.now_s()
-        self.counters.reads += 1
 
     def finish_read(self) -> GroupReadReply:
         """Read each servo."""
         replies = [single.read() for single in self._singles]
-        for name in (
-            "timeouts",
-            "unclean",
-            "copies",
-            "drained_bytes",
-            "late_bytes",
-            "stalls",
-            "stalled_s",
-        ):
-            total = sum(getattr(single.counters, name) for single in self._singles)
-            setattr(self.counters, name, total)
         return GroupReadReply(
             np.concatenate([reply.data for reply in replies]),
             np.concatenate([reply.valid for reply in replies]),

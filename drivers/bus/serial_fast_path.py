@@ -19,7 +19,7 @@ _BYTE_NS_BAUD = 10_000_000_000
 
 
 LATENCY_ESTIMATE = 0
-"""Place of the latency estimate in a plan: 2 numbers from ``new_latency_estimate``."""
+"""Place of the latency estimate in a plan: 2 numbers, first zeros."""
 ZERO_NS, BEGUN_NS, REMAINING_NS = 2, 3, 4
 """Zero of the port's clock; time of the request; longest remaining time of the reply of an
 irregular cycle."""

@@ -175,16 +175,16 @@ class ServoChain:
             self._imu.find()
         if self._rate_hz is not None:
             self._budget(fast=self.inspection.fast_reads).check(self._rate_hz)
-        moving = taken_over(self.inspection.servos, self.robot, self._units)
-        for line in (*limitations(self.robot), *moving):
+        for line in (
+            *limitations(self.robot),
+            *taken_over(self.inspection.servos, self.robot, self._units),
+        ):
             self.on_event(line)
         self._note(configure(self._bus, self.robot, self._units, None, self.on_event))
         if self._file is not None:
-            fingerprint_by_id = {
-                self.robot.servo_ids[j]: fingerprint
-                for j, fingerprint in self._fingerprints.items()
-            }
-            for line in self._file.check(self.robot, fingerprint_by_id):
+            ids = self.robot.servo_ids
+            by_id = {ids[joint]: value for joint, value in self._fingerprints.items()}
+            for line in self._file.check(self.robot, by_id):
                 self.on_event(line)
         self._prepare_reads(fast=self.inspection.fast_reads)
         return self._begin()
@@ -284,12 +284,14 @@ class ServoChain:
         ids = self.robot.servo_ids
         watched = [ids[joint] for joint in self._watchdogs]
         if watched:
+            self._torque_off.is_watched = False
             bus.sync_write(watched, WATCHDOG, 0)  # goals follow at once, else an old goal counts
         for is_last in (False, True):
             goals = self._send_goals(here_rad)
             if watched:  # before torque, which is never on without it
                 bus.sync_write(watched, WATCHDOG, self._watchdog_ticks)
                 self._expect(WATCHDOG, self._watchdogs)
+                self._torque_off.is_watched = True
             # read last: meanwhile another program may have written goals, or exchanged IDs
             now_rad, reported_goals = self._identified.positions_and_goals(
                 _FIRST_READS, ask_again=True
@@ -376,9 +378,9 @@ class ServoChain:
         """
         self._check_pause()
         self._sent_at_s = self._clock.now_s()
-        stalls = self.counters.stalls
+        stalled_s = self.counters.stalled_s
         reply = self._cycle.read()
-        if self.counters.stalls > stalls:  # its values are old, or nobody waited for them
+        if self.counters.stalled_s > stalled_s:  # its values are old, or nobody waited for them
             self._check_pause()
             reply = self._cycle.read()
         if self._fast_reads and not self._cycle.fast:
@@ -400,7 +402,7 @@ class ServoChain:
             self._is_called = False
             imu = None if self._imu is None else self._imu.read(self.on_event)
         state = self._readings.state(self._clock.now_s())
-        state = state if imu is None else state._replace(imu=imu)
+        state = state._replace(imu=imu, stalled_s=self.counters.stalled_s)
         self.on_state(state)
         return state
 

@@ -441,11 +441,11 @@ def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     to all at level 1. Only servos of the robot's model are written to.
     """
     replies = bus.find(robot.servo_ids)
-    right = [i for i, s in replies.items() if s.model_number == bus.table_of(i).model_number]
     by_level: dict[int, list[int]] = {}
-    for servo_id in right:
-        is_feetech = bus.table_of(servo_id).facts.is_feetech
-        by_level.setdefault(1 if is_feetech else ALL_REPLY, []).append(servo_id)
+    for servo_id, reply in replies.items():
+        table = bus.table_of(servo_id)
+        if reply.model_number == table.model_number:
+            by_level.setdefault(1 if table.facts.is_feetech else ALL_REPLY, []).append(servo_id)
     for level, ids in by_level.items():
         bus.sync_write(ids, "Status Return Level", level)
     return replies

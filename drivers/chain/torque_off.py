@@ -26,6 +26,8 @@ class TorqueOff:
         self._robot = robot
         self._clock = clock
         self._watchdog_s = watchdog_s
+        self.is_watched = True
+        """Whether the watchdogs are armed where the servos have one."""
 
     def send(self) -> None:
         """Switch torque off on every servo, even if others fail, then the watchdogs.
@@ -63,7 +65,7 @@ class TorqueOff:
         if faults:
             ids = [servo_id for part in faults for servo_id in self._ids_of(self._joints_on(part))]
             hold = "its servos hold their last goals"
-            if all(WATCHDOG in self._bus.table_of(servo_id) for servo_id in ids):
+            if self.is_watched and all(WATCHDOG in self._bus.table_of(i) for i in ids):
                 hold = f"its servos hold after the bus watchdog ({self._watchdog_s:.3g} s)"
             gone = [*faults.values()]
             text = (

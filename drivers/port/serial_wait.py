@@ -38,11 +38,6 @@ STREAK = 1
 early replies in a row."""
 
 
-def new_latency_estimate() -> NDArray[np.int64]:
-    """(2,) estimate before the first reply."""
-    return np.zeros(2, np.int64)
-
-
 @compiled(int64(int64[::1]))
 def _now_ns(time: NDArray[np.int64]) -> int:
     _clock_gettime(_MONOTONIC, time.ctypes.data)  # into struct timespec
@@ -102,7 +97,7 @@ def receive(  # noqa: C901  a compiled loop
         wait_ns: from then to the deadline.
         spin_ns: poll for this duration before and after the expected end; 0: sleep until the
             earliest possible end, then until bytes arrive.
-        latency_estimate: (2,) from ``new_latency_estimate``; updated.
+        latency_estimate: (2,) zeros before the first reply; updated.
 
     """
     time = np.empty(2, np.int64)  # struct timespec

@@ -1,6 +1,6 @@
 """Control tables of the servo models (files in `config/servos`)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -88,9 +88,7 @@ class ControlTable:
         try:
             return self.registers[name]
         except KeyError:
-            lower = {n.lower(): n for n in self.registers}
-            near = [lower[n] for n in get_close_matches(name.lower(), lower, 3)]
-            hint = f"; did you mean {', '.join(near)}?" if near else ""
+            hint = name_hint(name, self.registers)
             raise ControlTableError(f"{self.model}: has no register {name!r}{hint}") from None
 
     def __getitem__(self, name: str) -> Register:
@@ -107,6 +105,13 @@ class ControlTable:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.registers)
+
+
+def name_hint(name: str, names: Iterable[str]) -> str:
+    """Hint on an unknown name: the closest ones."""
+    lower = {known.lower(): known for known in names}
+    near = [lower[close] for close in get_close_matches(name.lower(), lower, 3, 0.5)]
+    return f"; did you mean {', '.join(near)}?" if near else ""
 
 
 def model_numbers(protocol: int | str = 2) -> Mapping[int, str]:

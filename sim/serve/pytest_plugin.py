@@ -9,12 +9,15 @@ name: ``bus["Goal Position"]``; ``bus.set`` and ``bus.load`` change registers an
 report of a failed test states the delay of the bus, and has its last packets.
 """
 
+import threading
+import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
+    from snakewalk.sim.line.clock import SimClock
     from snakewalk.sim.serve.servo_bus import ServoBus
 
 
@@ -37,29 +40,57 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, Any, None]:
                 report.sections.append(("servo_bus", "\n".join(lines)))
 
 
-def _buses(node: pytest.Item) -> "Iterator[Callable[..., ServoBus]]":
+def make_buses(node: pytest.Item) -> "Iterator[Callable[..., ServoBus]]":
+    """Yield the function that makes the buses of a test or a module; then close them."""
     # pytest loads this in every suite of the environment: slow imports wait for the first use
     from snakewalk.sim.serve.servo_bus import ServoBus  # noqa: PLC0415  every suite loads this
 
     buses: list[ServoBus] = []
     node.stash[_BUSES] = buses
 
-    def make(servos: "str | Sequence[int]" = "1-4", **options: object) -> ServoBus:
-        buses.append(ServoBus(servos, **options))  # type: ignore[arg-type]
-        return buses[-1]
+    with pytest.MonkeyPatch.context() as patch:
 
-    yield make
+        def make(
+            servos: "str | Sequence[int]" = "1-4", *, virtual_time: bool = False, **options: object
+        ) -> ServoBus:
+            bus = ServoBus(servos, **options)  # type: ignore[arg-type]
+            buses.append(bus)
+            if virtual_time:
+                _follow(patch, bus.line.clock)
+            return bus
+
+        yield make
     for bus in buses:
         bus.close()
+
+
+def _follow(patch: pytest.MonkeyPatch, clock: "SimClock") -> None:
+    """Move ``time`` of this thread with a clock; other threads keep real time."""
+    this_thread = threading.get_ident()
+    start_s = clock.now_s()
+
+    def replace(name: str, simulated: Callable[..., float | None]) -> None:
+        real = getattr(time, name)
+
+        def function(*seconds: float) -> float | None:
+            is_here = threading.get_ident() == this_thread
+            return (simulated if is_here else real)(*seconds)
+
+        patch.setattr(time, name, function)
+
+    replace("sleep", clock.advance)
+    for name in ("time", "monotonic", "perf_counter"):
+        begin_s = getattr(time, name)() - start_s
+        replace(name, lambda begin_s=begin_s: begin_s + clock.now_s())
 
 
 @pytest.fixture
 def servo_bus(request: pytest.FixtureRequest) -> "Iterator[Callable[..., ServoBus]]":
     """Make simulated buses: ``servo_bus("1-6:XL330-M288", baud=..., faults=..., imu="200")``."""
-    yield from _buses(request.node)
+    yield from make_buses(request.node)
 
 
 @pytest.fixture(scope="module")
 def module_servo_bus(request: pytest.FixtureRequest) -> "Iterator[Callable[..., ServoBus]]":
     """Make simulated buses that the tests of a module share."""
-    yield from _buses(request.node)
+    yield from make_buses(request.node)

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
 from typing import Final
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.drivers.protocol.control_table import name_hint
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bench import BenchPlant
@@ -46,11 +46,7 @@ def register_name(line: BenchLine, name: str, rows: Sequence[int]) -> str:
         line.register_type(row, full_name) is not None for row in rows
     ):
         return full_name
-    close = [
-        names_by_lower[close_match]
-        for close_match in get_close_matches(name.lower(), names_by_lower, 3, 0.5)
-    ]
-    hint = f"; did you mean {', '.join(close)}?" if close and full_name is None else ""
+    hint = name_hint(name, _names(line)) if full_name is None else ""
     raise InputError(f"{name or 'REGISTER'}: no register of all these servos{hint}")
 
 

@@ -17,6 +17,7 @@ from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.feetech.decode import decoder_for
 from snakewalk.sim.serve.bench_line import bench_line
 from snakewalk.sim.serve.chain_spec import parse_chain, parse_imu
+from snakewalk.sim.serve.protocol_snakewalk import LINES
 from snakewalk.sim.serve.pty import PtyServer
 from snakewalk.sim.serve.register_access import (
     register_name,
@@ -54,6 +55,9 @@ class ServoBus:
         self._decoder = decoder_for(records[chain.ids[0]], records)
         self.line.taps.append(lambda at_s, _, data: self._raw_packets.append((at_s, bytes(data))))
         self._baud = baud
+        self.url = f"snakewalk://{id(self)}"
+        """URL for ``serial.serial_for_url``, in simulated time."""
+        LINES[self.url] = self.line
         self._server: PtyServer | None = None
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
@@ -179,6 +183,7 @@ class ServoBus:
 
     def close(self) -> None:
         """Stop serving; safe to call twice."""
+        LINES.pop(self.url, None)
         self._stop.set()
         if self._thread is not None:
             self._thread.join(5.0)

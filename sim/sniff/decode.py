@@ -54,6 +54,10 @@ class DecodedPacket:
         """Fields for JSON."""
         return asdict(self)
 
+    def __str__(self) -> str:
+        """Line without the time, for comparisons in tests."""
+        return " ".join(self.text().split()[1:])
+
     def text(self) -> str:
         """Line for people."""
         arrow = {"question": "->", "answer": "<-", "noise": "??"}[self.kind]

@@ -111,6 +111,19 @@ def test_two_servos_of_one_id(line: Recorder) -> None:
     assert (finding.grade, finding.found[:21]) == ("fail", "servo 2 answers twice")
 
 
+def test_alike_servos_of_one_id_at_one_angle_are_found_after_one_is_turned(line: Recorder) -> None:
+    """Only "no answer from servo 4" was reported: nothing on the wire shows the second servo."""
+    line.bank["ID"][3] = 3
+    line.refresh_ids()
+    line.firmware.plant.position_rad[:] = 0.0
+    finding = of(doctor(line), "servo IDs")
+    assert finding.found == "no answer from servo 4"
+    assert "turn it by hand and run doctor again" in finding.remedy
+    line.firmware.plant.position_rad[3] = 0.5
+    finding = of(doctor(line), "duplicate IDs")
+    assert (finding.grade, finding.found[:25]) == ("fail", "servo 3 answers with dama")
+
+
 def test_two_servos_of_one_id_that_talk_over_each_other(line: Recorder) -> None:
     turn = iter(range(10**9))
 

@@ -16,6 +16,16 @@ from snakewalk.controller.runlog.record import RunRecord
 Make = Callable[..., Path]
 
 
+def test_pauses_of_the_computer_are_counted(record: RunRecord) -> None:
+    """A run ended by an old reading, with 0 missed deadlines and 0 failed reads."""
+    assert (summary(record).stalls, summary(record).stalled_s) == (0, 0.0)
+    stalled_s = np.zeros(len(record.slow.time_s))
+    stalled_s[3:], stalled_s[7:] = 0.05, 0.11
+    slow = record.slow.with_columns(stalled_s=stalled_s)
+    n = summary(dataclasses.replace(record, slow=slow))
+    assert (n.stalls, n.stalled_s) == (2, 0.11)
+
+
 def test_numbers_of_a_known_run(record: RunRecord) -> None:
     n = summary(record)
     assert n.outcome == "3 of 4 waypoints reached"

@@ -74,7 +74,7 @@ def test_a_transaction_is_one_write_of_both_packets(servos: Servos) -> None:
     goals = np.array([1, 2, 3, 4], np.int32)
     packet = GroupWrite(IDS, 116).encode(goals)
     port = ScriptedPort(lambda raw: servos(raw.removeprefix(packet)))
-    reply = ControlCycle(port, IDS).transact(goals)
+    reply = ControlCycle(port, IDS).read(goals)
     assert len(port.written) == 1
     assert port.written[0].startswith(packet)
     assert reply.valid.all()

@@ -16,7 +16,7 @@ from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.serial_fast_path import REPLY_NS, SPIN_NS, WRITE_NS, SerialFastPath
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.serial_port import SerialPort
-from snakewalk.drivers.port.serial_wait import LATE, new_latency_estimate, update
+from snakewalk.drivers.port.serial_wait import LATE, update
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket
 from snakewalk.drivers.protocol.parser import PacketParser
 from tests.drivers.bus.test_group_codec import HEADER_LIKE, fast, plain
@@ -28,7 +28,7 @@ Reply = Callable[[InstructionPacket, int], bytes]
 """A request, and the first goal that was sent before it -> the servos' reply."""
 
 both_kinds = pytest.mark.parametrize("is_fast", [False, True], ids=["plain", "fast"])
-both_calls = pytest.mark.parametrize("with_goals", [False, True], ids=["read", "transact"])
+both_calls = pytest.mark.parametrize("with_goals", [False, True], ids=["read", "both"])
 
 
 class Servos:
@@ -167,13 +167,13 @@ def test_goals_that_must_be_stuffed_go_another_way(servos: Servos) -> None:
     servos.serve(echo)
     cycle = ControlCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
     cycle.write_goals(goals)
-    reply = cycle.transact(goals)
+    reply = cycle.read(goals)
     assert reply.data[:, 0].tolist() == [5, 6, 7, 8]
     written = PacketParser().feed(GroupWrite(IDS, 116).encode(goals))
     assert servos.received[:2] == written * 2
 
 
-@pytest.mark.parametrize("call", ["write_goals", "transact"])
+@pytest.mark.parametrize("call", ["write_goals", "both"])
 def test_a_full_device_is_waited_for(servos: Servos, call: str) -> None:
     """What it takes of a packet is not sent twice."""
     goals = np.arange(4, dtype=np.int32)
@@ -188,8 +188,8 @@ def test_a_full_device_is_waited_for(servos: Servos, call: str) -> None:
         cut = False
     servos.serve(echo)
     cycle = ControlCycle(servos.port, IDS, fast=False, latency_s=FAR_S)
-    if call == "transact":
-        reply = cycle.transact(goals)
+    if call == "both":
+        reply = cycle.read(goals)
     else:
         cycle.write_goals(goals)
         reply = cycle.read()
@@ -199,7 +199,7 @@ def test_a_full_device_is_waited_for(servos: Servos, call: str) -> None:
         assert servos.received[-2:-1] == expected
 
 
-@pytest.mark.parametrize("call", ["write_goals", "transact", "read"])
+@pytest.mark.parametrize("call", ["write_goals", "both", "read"])
 @pytest.mark.parametrize("how", ["closed", "vanished"])
 def test_a_port_that_is_gone_is_a_port_error(call: str, how: str) -> None:
     servos = Servos()
@@ -212,7 +212,7 @@ def test_a_port_that_is_gone_is_a_port_error(call: str, how: str) -> None:
     goals = np.zeros(4, np.int32)
     calls = {
         "write_goals": lambda: cycle.write_goals(goals),
-        "transact": lambda: cycle.transact(goals),
+        "both": lambda: cycle.read(goals),
         "read": cycle.read,
     }
     with pytest.raises(PortError, match="is closed" if how == "closed" else "the port is gone"):
@@ -228,7 +228,7 @@ def test_a_port_that_was_opened_again_is_used_again(servos: Servos) -> None:
     servos.port.closePort()
     assert servos.port.openPort()
     servos.serve(echo)
-    assert cycle.transact(np.zeros(4, np.int32)).valid.all()
+    assert cycle.read(np.zeros(4, np.int32)).valid.all()
 
 
 @both_kinds
@@ -250,7 +250,7 @@ def test_a_late_reply_is_never_taken_for_a_new_one(servos: Servos, is_fast: bool
     cycle = ControlCycle(servos.port, IDS, fast=is_fast, latency_s=0.1)
     seen = []
     for k in range(12):
-        found = cycle.transact(np.full(4, 10 * k, np.int32))
+        found = cycle.read(np.full(4, 10 * k, np.int32))
         now = np.arange(10 * k, 10 * k + 4)[:, None] & 0x7F
         assert (found.data == now)[found.valid].all()
         seen.append(bool(found.valid.all()))
@@ -273,7 +273,7 @@ late_ns = st.integers(-50_000, 2_000_000)
 
 @given(late_ns)
 def test_a_steady_lateness_is_estimated(lateness_ns: int) -> None:
-    latency_estimate = new_latency_estimate()
+    latency_estimate = np.zeros(2, np.int64)
     for _ in range(1000):
         update(latency_estimate, lateness_ns, 1_000_000, 40_000)
     assert abs(latency_estimate[LATE] - lateness_ns) <= 8
@@ -281,7 +281,7 @@ def test_a_steady_lateness_is_estimated(lateness_ns: int) -> None:
 
 @given(st.integers(1, 10**8))
 def test_replies_that_are_early_soon_end_all_sleeps(least_ns: int) -> None:
-    latency_estimate = new_latency_estimate()
+    latency_estimate = np.zeros(2, np.int64)
     for _ in range(13):
         update(latency_estimate, -least_ns, least_ns, 40_000)
     assert latency_estimate[LATE] == -least_ns
@@ -289,7 +289,7 @@ def test_replies_that_are_early_soon_end_all_sleeps(least_ns: int) -> None:
 
 @given(st.lists(late_ns, min_size=1, max_size=50), st.integers(-(10**9), 10**9))
 def test_one_odd_reply_hardly_changes_the_estimate(before: list[int], odd_ns: int) -> None:
-    latency_estimate = new_latency_estimate()
+    latency_estimate = np.zeros(2, np.int64)
     for lateness_ns in before:
         update(latency_estimate, lateness_ns, 2_000_000_000, 40_000)
     was_ns = latency_estimate[LATE]

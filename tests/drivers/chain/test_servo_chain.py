@@ -788,3 +788,37 @@ def test_a_cycle_in_which_nobody_is_read_asks_for_nothing_else(place: int) -> No
     assert len(line.heard) == asked + 1
     line.tamper = None
     assert chain.read().valid.all()
+
+
+@pytest.mark.parametrize("value", [0, 10])
+def test_a_port_that_vanishes_before_the_watchdogs_are_armed_promises_none(
+    chain: ServoChain, line: Recorder, value: int
+) -> None:
+    """Five of six servos held with torque and no watchdog, and the event promised one."""
+    compared = chain.recheck(chain.enable().position_rad)
+
+    def vanish(_: float, is_host: bool, packet: bytes) -> None:
+        is_write = packet[7:10] == bytes([Instruction.SYNC_WRITE, 98, 0])
+        if is_host and is_write and packet[13] == value:
+            line.disconnect()
+
+    line.taps.append(vanish)
+    with pytest.raises(PortError, match="its servos hold their last goals; switch the"):
+        chain.resume(compared)
+
+
+def test_a_pause_of_the_computer_during_a_read_is_in_the_state(
+    chain: ServoChain, line: Recorder
+) -> None:
+    assert chain.enable().stalled_s == 0.0
+
+    def pause(_: float, is_host: bool, packet: bytes) -> None:
+        del packet
+        if not is_host and line.taps:
+            line.taps.clear()
+            line.clock.advance(0.15)
+
+    line.taps.append(pause)
+    state = chain.read()
+    assert state.stalled_s == pytest.approx(0.15, abs=0.01)
+    assert chain.read().stalled_s == state.stalled_s

@@ -5,19 +5,22 @@ import math
 import re
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import serial
 
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.packet import InstructionPacket, encode_instruction
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.serve.pty import IDLE_S, LATE_S, PtyServer
-from snakewalk.sim.serve.pytest_plugin import _BUSES, pytest_runtest_makereport
+from snakewalk.sim.serve.pytest_plugin import _BUSES, make_buses, pytest_runtest_makereport
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.bus import a_line
 
@@ -207,14 +210,67 @@ def test_a_module_shares_its_bus(module_servo_bus: MakeBus) -> None:
     assert module_servo_bus("1-2")["ID"].tolist() == [1, 2]
 
 
+def test_a_port_of_pyserial_has_simulated_time(servo_bus: MakeBus) -> None:
+    bus = servo_bus("1")
+    with serial.serial_for_url(bus.url, 1_000_000, timeout=0.05) as port:
+        port.write(encode_instruction(InstructionPacket(1, 1)))
+        looks = 0
+        while port.in_waiting < 14:
+            looks += 1
+        assert 0 < looks < 100
+        assert len(port.read(14)) == 14
+        begin_s = bus.line.clock.now_s()
+        assert port.read(3) == b""
+        assert bus.line.clock.now_s() == pytest.approx(begin_s + 0.05)
+        port.timeout = None
+        with pytest.raises(serial.SerialException, match=r"waits without end for 3 bytes"):
+            port.read(3)
+        port.baudrate = 57_600
+        assert "the client uses 57600 baud" in str(bus.lateness) or bus.lateness is None
+        bus.fault("port", for_s=1.0)
+        bus.line.clock.advance(0.01)
+        with pytest.raises(serial.SerialException, match="vanished"):
+            port.write(b"a")
+    with pytest.raises(serial.SerialException, match="not open"):
+        port.read()
+    bus.close()
+    with pytest.raises(serial.SerialException, match="no bus has this URL"):
+        serial.serial_for_url(bus.url)
+
+
+def test_virtual_time_is_of_one_thread_and_ends_with_the_test() -> None:
+    before = (time.sleep, time.monotonic, time.time, time.perf_counter)
+    fixture = make_buses(SimpleNamespace(stash=pytest.Stash()))  # type: ignore[arg-type]
+    bus = next(fixture)("1", virtual_time=True)
+    begin_s, elsewhere_s = time.monotonic(), [0.0]
+    try:
+        time.sleep(500.0)
+        other = threading.Thread(target=lambda: elsewhere_s.append(time.monotonic()))
+        other.start()
+        other.join()
+        passed_s = time.monotonic() - begin_s
+    finally:
+        assert next(fixture, None) is None
+    assert passed_s == pytest.approx(500.0)
+    assert bus.line.clock.now_s() == pytest.approx(500.0)
+    assert elsewhere_s[1] < begin_s + 250.0
+    assert (time.sleep, time.monotonic, time.time, time.perf_counter) == before
+
+
 PAGE = (Path(__file__).resolve().parents[3] / "docs/start/ci.md").read_text(encoding="utf-8")
-FIVE = next(part.partition("```")[0] for part in PAGE.split("```python") if "PacketHandler" in part)
+BLOCKS = [part.partition("```")[0] for part in PAGE.split("```python")]
+FIVE, PYSERIAL = (part for part in BLOCKS if "PacketHandler" in part or "import serial" in part)
+TESTS = [
+    (block, name)
+    for block in (FIVE, PYSERIAL)
+    for name in re.findall(r"^def (test_\w+)", block, re.MULTILINE)
+]
 
 
-@pytest.mark.parametrize("name", re.findall(r"^def (test_\w+)", FIVE, re.MULTILINE))
-def test_the_tests_of_the_page_pass(servo_bus: MakeBus, name: str) -> None:
+@pytest.mark.parametrize(("block", "name"), TESTS, ids=[name for _, name in TESTS])
+def test_the_tests_of_the_page_pass(servo_bus: MakeBus, block: str, name: str) -> None:
     names: dict[str, Callable[[MakeBus], None]] = {}
-    exec(FIVE, names)
+    exec(block, names)
     names[name](servo_bus)
 
 
