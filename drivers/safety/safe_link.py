@@ -184,8 +184,9 @@ class SafeLink:
         age_s = float(np.max(state.age_s))
         if age_s > SLOW_SHARE * self._limits.stale_limit_s:
             self._on_event(
-                f"replies need up to {age_s:.3f} s: one that is lost or late may end the run, as "
-                f"safety.stale_limit_s is {self._limits.stale_limit_s:g}"
+                f"replies need up to {age_s:.3f} s, some cycles two of them: the run may end, as "
+                f"safety.stale_limit_s is {self._limits.stale_limit_s:g}; set it to "
+                f"{3.0 * age_s:.2f}"
             )
         return state
 

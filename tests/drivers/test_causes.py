@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from benchmarks import odd_servos as odd
-from tests.helpers.adapters import JOINTS, NETWORK_S, AdapterLine, swing
+from tests.helpers.adapters import JOINTS, NETWORK_S, AdapterLine, Swing, swing
 
 X, STS = "XM430-W350", "STS3215"
 SDK = "ROBOTIS-GIT/DynamixelSDK#"
@@ -275,9 +275,9 @@ def _sound(seed: int) -> str:
         {"kind": "stall", "at_s": rng.uniform(0.0, 2.0), "for_s": rng.uniform(0.005, 0.04)}
         for _ in range(3 * (seed % 2))
     ]
-    return swing(
+    run = partial(
+        swing,
         X,
-        line=AdapterLine(**{adapter: late_s}),
         amplitude_rad=min(rng.uniform(0.1, 0.7), 2.4 / speed_rad_s),
         speed_rad_s=speed_rad_s,
         phase_rad=rng.uniform(0.0, 6.0),
@@ -286,14 +286,22 @@ def _sound(seed: int) -> str:
         at_s=0.5,
         load_n_m=rng.choice((0.0, 0.3, 0.6)),
         latency_s=NETWORK_S,
-    ).said
+    )
+    ran = run(line=AdapterLine(**{adapter: late_s}))
+    if not ran.at_start:
+        return ran.said
+    limit_s = float(ran.at_start[0].rpartition(" ")[2])
+    return run(line=AdapterLine(**{adapter: late_s}), stale_limit_s=limit_s).said
 
 
 @pytest.mark.slow_cases(20, "500 buses")
 @pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("seed", range(500))
 def test_a_sound_bus_has_no_fault(seed: int) -> None:
-    """Blocks of 1 to 40 ms, latency up to 40 ms, and pauses of the computer."""
+    """Blocks of 1 to 40 ms, latency up to 40 ms, and pauses of the computer.
+
+    If the start names a larger ``safety.stale_limit_s``, the run has it.
+    """
     assert not _sound(seed)
 
 
@@ -331,4 +339,20 @@ def test_a_line_that_is_too_slow_for_the_limit_is_reported_at_the_start() -> Non
     line = AdapterLine(in_grid_s=0.036, out_grid_s=0.036)
     reports = swing(X, line=line, seconds=0.1, latency_s=NETWORK_S).at_start
     assert reports[0].startswith("replies need up to 0.")
-    assert "safety.stale_limit_s is 0.1" in reports[0]
+    assert "safety.stale_limit_s is 0.1; set it to 0." in reports[0]
+
+
+@pytest.mark.parametrize(("way_s", "limit_s"), [(0.015, 0.1), (0.025, 0.15), (0.04, 0.24)])
+def test_a_network_works_with_the_limit_that_the_start_names(way_s: float, limit_s: float) -> None:
+    """With 25 ms each way, each run at the default limit ended within a second."""
+
+    def there_and_back(limit_s: float) -> Swing:
+        line = AdapterLine(in_s=way_s, out_s=way_s)
+        return swing(X, line=line, seconds=2.5, latency_s=NETWORK_S, stale_limit_s=limit_s)
+
+    if limit_s > 0.1:
+        at_default = there_and_back(0.1)
+        assert f"set it to {limit_s:g}" in at_default.at_start[0]
+        assert "its reply was slow: the latency of adapter or network" in at_default.said
+    ran = there_and_back(limit_s)
+    assert not ran.said + "".join(ran.at_start)
