@@ -7,6 +7,7 @@ from snakewalk.drivers.bus.control_cycle import CycleCounters
 from snakewalk.drivers.bus.group_read import GroupReadReply
 from snakewalk.drivers.chain.goal_check import (
     FOREIGN_READS,
+    MOST_LATE,
     OWN_READS,
     WATCHED_READS,
     GoalCheck,
@@ -106,6 +107,20 @@ def test_goals_that_are_late_by_the_same_number_of_cycles_are_named_so() -> None
     cause = r"^b: Goal Position is 14, not 15: it accepts goals 1 cycle late$"
     with pytest.raises(BusError, match=cause):
         rig.cycles([{1: 11 + k} for k in range(OWN_READS)])
+
+
+@pytest.mark.parametrize(("value", "is_foreign"), [(11, True), (12, False)])
+def test_a_goal_replaced_long_before_the_last_right_one_does_not_come_back(
+    value: int, is_foreign: bool
+) -> None:
+    """The limit is ``MOST_LATE`` goals before it, however many were sent since."""
+    rig = Rig()
+    for _ in range(12 + MOST_LATE):
+        rig.cycle()
+    for _ in range(5):
+        rig.cycle(is_read=False)
+    rig.cycle(hold={0: value})
+    assert rig.check.is_due is is_foreign
 
 
 def test_a_goal_of_this_run_after_a_foreign_one_is_of_a_second_master() -> None:
