@@ -15,7 +15,7 @@ from tests.mutation.mutants import Mutant
 from tests.tiers.selection import CPU_S, distances, mirrored_folder, texts_of_tests
 
 LINES: Final = 100
-"""A drawn module has more lines."""
+"""A drawn module has more lines, if the package has such a module."""
 FILES: Final = 6
 """Test files that are run on a mutant: those nearest to its module."""
 FURTHER_FILES: Final = 12
@@ -36,17 +36,16 @@ def drawn_modules() -> Iterator[tuple[str, str]]:
     """Yield each package with a module of it, without ``snakewalk``."""
     for module in ALWAYS:
         yield package_of(module), module
-    large = [
-        module
+    lines = {
+        module: len(file.read_text(encoding="utf-8").splitlines())
         for module in sources()
-        if module not in ELSEWHERE
-        and (file := ROOT / (module.replace(".", "/") + ".py")).is_file()
-        and len(file.read_text(encoding="utf-8").splitlines()) > LINES
-    ]
+        if module not in ELSEWHERE and (file := ROOT / f"{module.replace('.', '/')}.py").is_file()
+    }
     for package in (package for order in ORDER.values() for package in order):
-        modules = sorted(module for module in large if package_of(module) == package)
+        modules = sorted(module for module in lines if package_of(module) == package)
+        large = [module for module in modules if lines[module] > LINES]
         if modules:
-            yield package, random.Random(0).choice(modules)
+            yield package, random.Random(0).choice(large or modules)
 
 
 def sample(mutants: Sequence[Mutant], count: int) -> list[Mutant]:

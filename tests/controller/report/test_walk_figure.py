@@ -13,6 +13,7 @@ from snakewalk.config.colours import BLUE
 from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.topics import WalkTable
+from tests.helpers.legible_figures import figure_faults
 
 STATES = [5, 5, 9, 5, 2, 2, 9]
 VISITED = [1, 1, 2, 2, 3, 3, 3]
@@ -37,6 +38,9 @@ def walk(states: ArrayLike = STATES, carrier_rad: ArrayLike = 0.0) -> WalkTable:
 def drawn(record: RunRecord, table: WalkTable) -> list[Axes]:
     figure = walk_figure(replace(record, walk=table))
     assert figure is not None
+    for axes in figure.axes:
+        assert all(line.get_linewidth() > 0.0 for line in axes.lines)
+        assert axes.get_title() or not axes.get_legend(), "a panel has a title"
     return list(figure.axes)
 
 
@@ -59,6 +63,12 @@ def test_decisions_start_a_state_continue_it_or_repeat_an_earlier_one(record: Ru
     assert places(states, "repeated") == [[4, 5], [7, 9]]
     assert legend(states) == ["started", "continued", "repeated"]
     assert states.lines[0].get_xydata().tolist() == [[k + 1, s] for k, s in enumerate(STATES)]
+
+
+def test_axes_are_labelled_and_text_is_whole(record: RunRecord) -> None:
+    figure = walk_figure(replace(record, walk=walk()))
+    assert figure is not None
+    assert figure_faults(figure) == []
 
 
 def test_the_count_of_states_has_a_scale_of_its_own_in_its_colour(record: RunRecord) -> None:
@@ -89,6 +99,8 @@ def test_wide_waves_shade_their_decisions_and_state_their_share(record: RunRecor
 def test_the_aim_marks_decisions_without_a_fitting_shape(record: RunRecord) -> None:
     _, aim, _ = drawn(record, walk())
     assert places(aim, "no shape within the tolerance") == [[1, 0.0], [2, 0.1]]
+    thin, *thick = (line.get_linewidth() for line in aim.lines)
+    assert thin < thick[0] == thick[1], "error and bend alike, over a thinner 0"
     level, error, bend = (np.asarray(line.get_ydata()) for line in aim.lines)
     np.testing.assert_array_equal(level, [0.0, 0.0])
     np.testing.assert_array_equal(error, ERROR_RAD)
