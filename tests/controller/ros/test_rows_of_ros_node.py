@@ -215,7 +215,7 @@ def test_events_are_logged_by_their_level_and_the_newest_is_in_the_diagnostics(r
     }
 
 
-def test_the_end_of_a_run_that_said_nothing_asks_for_the_torque(run: Run) -> None:
+def test_a_run_that_ends_without_a_message_is_an_error(run: Run) -> None:
     run.begin()
     run.robot.end()
     assert run.says()["snakewalk: run"].message == "it has come to its end"
@@ -224,7 +224,7 @@ def test_the_end_of_a_run_that_said_nothing_asks_for_the_torque(run: Run) -> Non
         run.robot.step(0.0)
         run.robot.end()
     said = run.says()["snakewalk: run"]
-    assert said.message == "the run is gone without a word: is torque off?"
+    assert said.message == "the run ended without a message; check that torque is off"
     assert said.level == DiagnosticStatus.ERROR
 
 
