@@ -143,6 +143,13 @@ RunPort = Annotated[
     ),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
+Marked = Annotated[
+    bool,
+    typer.Option(
+        "--marks/--no-marks",
+        help="draw waypoints, path, contour lines, scale and caption into the film",
+    ),
+]
 Look = Annotated[
     str,
     typer.Option(
@@ -280,7 +287,7 @@ def check_idle(options: Mapping[str, object], defaults: Mapping[str, object]) ->
     if options.get("film") is False and "film" in given:
         faults += [
             f"--{name}: is of the film, which --no-film leaves out"
-            for name in ("look", "fine")
+            for name in ("look", "fine", "marks")
             if name in given
         ]
     if faults:

@@ -1,5 +1,6 @@
 """Files made from a run's record: ``summary.json``, ``film.mp4`` and ``report.html``."""
 
+from functools import partial
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -20,7 +21,7 @@ from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Drawings, film_on_page, page
 from snakewalk.controller.run.results import SERVOS, Artifacts, film_look
 from snakewalk.controller.run.run_robot import write_summary
-from snakewalk.controller.runlog.record import RunRecord
+from snakewalk.controller.runlog.record import Header, RunRecord
 
 
 @plugin("results", "report")
@@ -32,6 +33,7 @@ def make_artifacts(
     film: bool = True,
     fine: bool = False,
     look: str = SERVOS,
+    marks: bool = True,
     made: str = "",
     folders: bool = False,
 ) -> Artifacts:
@@ -48,6 +50,7 @@ def make_artifacts(
         film: draw a film.
         fine: better and slower.
         look: body in the film, as for ``film_look``.
+        marks: draw waypoints, path, contour lines, scale and caption into the film.
         made: words at the foot of the page.
         folders: show the folders of the user's files in the page.
 
@@ -62,7 +65,8 @@ def make_artifacts(
         _write_page(record, folder, path if path.exists() else None, numbers, drawn, folders)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
-    if film and _film(record, path, fine, look, notes) and drawn is not None:
+    styled = partial(film_run, record, fine=fine, marks=marks)
+    if film and _film(styled, record.header, path, look, notes) and drawn is not None:
         _write_page(record, folder, path, numbers, drawn, folders)
     report = None if drawn is None else folder / REPORT
     return Artifacts(report, path if path.exists() else None, tuple(notes))
@@ -99,12 +103,11 @@ def _write_page(
     return path
 
 
-def _film(record: RunRecord, path: Path, fine: bool, look: str, notes: list[str]) -> bool:
+def _film(film: "partial[int]", header: Header, path: Path, look: str, notes: list[str]) -> bool:
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
-                skin = film_look(look, record.header)
-                film_run(record, part, look=skin, fine=fine, on_progress=bar.update)
+                film(part, look=film_look(look, header), on_progress=bar.update)
         except InputError as error:
             bar.hide()
             notes += [f"no film: {line}" for line in error.faults]

@@ -35,6 +35,7 @@ def film_run(
     *,
     look: "SkinLook | None" = None,
     fine: bool = False,
+    marks: bool = True,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> int:
     """Draw the film of a run into ``path`` (.mp4); the number of its frames.
@@ -45,6 +46,7 @@ def film_run(
         look: the body's skin; None is a capsule a link. The waypoints of a dead-reckoned run are
             hollow, and the caption names its pose.
         fine: larger, smoother, and eight times slower to draw.
+        marks: draw waypoints, path, contour lines, scale and caption.
         on_progress: called with (frames done, of).
 
     Raises:
@@ -81,7 +83,9 @@ def film_run(
             reached_s=[float(t) for t in waypoint_times_s(record.pose, plan)],
             paths=record.paths,
             hollow=not measured,
-        ),
+        )
+        if marks
+        else None,
         on_frame=on_progress,
     )
     return drawn

@@ -103,6 +103,7 @@ def write_artifacts(
     film: bool,
     fine: bool = False,
     look: str = LOOK,
+    marks: bool = True,
     folders: bool = False,
 ) -> Artifacts:
     """Make report and film of a run; print on standard error why a file is missing.
@@ -117,7 +118,15 @@ def write_artifacts(
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
         artifacts: Artifacts = require("results", "report", "--film").load()(
-            record, folder, numbers, film=film, fine=fine, look=look, made=what, folders=folders
+            record,
+            folder,
+            numbers,
+            film=film,
+            fine=fine,
+            look=look,
+            marks=marks,
+            made=what,
+            folders=folders,
         )
     for line in artifacts.notes:
         LOGGER.warning("%s", line)

@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.sim.rendering.follow_camera import BodyTrack, follow
-from snakewalk.sim.rendering.looks import Marks, Scene, SkinLook, dressed_model, mark_reached
+from snakewalk.sim.rendering.looks import (
+    Marks,
+    Scene,
+    SkinLook,
+    dressed_model,
+    mark_reached,
+    mark_size,
+)
 from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m, surface_points_m
@@ -43,13 +50,14 @@ def render_film(
     path: Path,
     *,
     style: Style = Style(),
-    marks: Marks = Marks(),
+    marks: Marks | None = Marks(),
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write an MP4 (H.264 if PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,), increasing.
 
-    ``qpos`` are ``MujocoPlant.qpos``; of a free look, (T, 7 L). ``on_frame`` is called with (frames
-    done, of) after each.
+    ``qpos`` are ``MujocoPlant.qpos``; of a free look, (T, 7 L). ``marks`` None draws neither
+    waypoints nor paths, trails, scale and caption. ``on_frame`` is called with (frames done, of)
+    after each.
 
     Returns:
         Number of frames.
@@ -69,8 +77,12 @@ def render_film(
     shot_s = times[0] + np.arange(len(shots)) * style.speed_up / style.fps
     camera, centre = stage.camera(shots, style)
     centre_m = np.column_stack([np.interp(times, shot_s, column) for column in centre.T])
-    trail = make_trail(marks.paths, times, poses, centre_m, scene.ground)
-    shown = stage.scene(trail.most)
+    trail = (
+        None
+        if marks is None
+        else make_trail(marks.paths, times, poses, centre_m, scene.ground, mark_size(scene.robot))
+    )
+    shown = stage.scene(0 if trail is None else trail.most)
     with (
         Offscreen(stage.model, *style.size) as screen,
         MovieFile(path, style.fps, style.size) as film,
@@ -79,9 +91,11 @@ def render_film(
             now = float(shot_s[k])
             stage.pose(shown, shot, camera[k], now)
             screen.reload(stage.model, stage.shade.texture)
-            trail.add(shown, now)
-            add_axes(shown, _corner(camera[k]), _scale_m(scene.robot.length_m), scene.ground)
-            caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
+            caption = ""
+            if trail is not None:
+                trail.add(shown, now)
+                add_axes(shown, _corner(camera[k]), _scale_m(scene.robot.length_m), scene.ground)
+                caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
             film.add(screen.draw(shown, caption))
             if on_frame is not None:
                 on_frame(k + 1, len(shots))
@@ -105,12 +119,12 @@ class _Stage:
         self,
         scene: Scene,
         style: Style,
-        marks: Marks,
+        marks: Marks | None,
     ) -> None:
         look = style.look
         robot = scene.robot
         self._robot = robot
-        self._reached_s = marks.reached_s
+        self._reached_s = () if marks is None else marks.reached_s
         self.bodies = len(look.rest_m) if look is not None and look.free else 1
         bones = self.bodies if self.bodies > 1 else robot.link_count + len(robot.limb_joints)
         spine = self.bodies if self.bodies > 1 else robot.link_count

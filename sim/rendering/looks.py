@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import gaussian_filter
 
 from snakewalk.config import colours
 from snakewalk.config.arrays import Floats, Image, Ints
@@ -35,6 +36,10 @@ LOWLAND, HIGHLAND = (np.array(rgb(colour), float) for colour in (colours.LOWLAND
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
 SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
 CONTOURS = 12
+GRASS, ROCK = (np.array(rgb, float) for rgb in ((122, 128, 78), (142, 124, 100)))
+"""Colours of ground without marks, level and steep (ours)."""
+ROCK_SLOPE = 0.5
+"""Slope at which ground without marks is half rock (ours)."""
 TEXELS = 1024
 _CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 _ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
@@ -105,7 +110,7 @@ class Scene:
 
 def dressed_model(
     scene: Scene,
-    marks: Marks = Marks(),
+    marks: Marks | None = Marks(),
     *,
     look: SkinLook | None = None,
     fine: bool = False,
@@ -114,8 +119,9 @@ def dressed_model(
 ) -> mujoco.MjModel:
     """Build the model with skin, floor, sky, and waypoints (poles and rings).
 
-    ``look`` None is a capsule per link. ``fine`` smooths edges, at three times the cost of a
-    software renderer. ``additions`` change the model before it is compiled.
+    ``marks`` None is natural ground, without waypoints and contour lines. ``look`` None is a
+    capsule per link. ``fine`` smooths edges, at three times the cost of a software renderer.
+    ``additions`` change the model before it is compiled.
 
     Raises:
         InputError: the installed MuJoCo cannot edit models.
@@ -143,32 +149,40 @@ def dressed_model(
     _water(spec, world, ground)
     for k, sheet in enumerate(prints):
         _print(spec, f"print{k}", sheet)
-    for k, (x, y) in enumerate(marks.waypoints_m):
-        _mark(spec, f"waypoint{k}", ground, x, y, marks.waypoint_radius_m, marks.hollow)
+    if marks is not None:
+        for k, (x, y) in enumerate(marks.waypoints_m):
+            _mark(spec, f"waypoint{k}", ground, (x, y), marks, mark_size(robot))
     model = finish(spec.compile(), ground)
-    if ground is not None:
-        _paint(model, ground)
+    if ground is not None or (marks is None and water_surface_m(world, ground) is None):
+        _paint(model, ground, marks is None)
     return model
+
+
+def mark_size(robot: RobotConfig) -> float:
+    """Size of marks relative to those of a body of 1 m, at most 1."""
+    return min(1.0, robot.length_m)
 
 
 def _mark(
     spec: mujoco.MjSpec,
     name: str,
     ground: HeightField | None,
-    x: float,
-    y: float,
-    radius_m: float,
-    hollow: bool,
+    at_m: tuple[float, float],
+    marks: Marks,
+    size: float,
 ) -> None:
     """Add a waypoint: a pole and a ring."""
+    x, y = at_m
+    hollow = marks.hollow
     z = 0.0 if ground is None else float(ground.elevation_m(x, y))
-    pole = _add(spec.worldbody, _CYLINDER, (0.008, 0.15, 0), AHEAD, pos=(x, y, z + 0.15))
+    half_m = 0.15 * size
+    pole = _add(spec.worldbody, _CYLINDER, (0.008 * size, half_m, 0), AHEAD, pos=(x, y, z + half_m))
     pole.name = name
     if hollow:
         pole.rgba = HIDDEN
-    ring = _ring(ground, x, y, radius_m)
+    ring = _ring(ground, x, y, marks.waypoint_radius_m)
     for part, (before, other) in enumerate(itertools.pairwise(ring)):
-        piece = _rod(spec.worldbody, 0.007, AHEAD, (*before, *other))
+        piece = _rod(spec.worldbody, 0.007 * size, AHEAD, (*before, *other))
         piece.name = f"{name}ring{part}"
         if hollow and part % 2:
             piece.rgba = HIDDEN
@@ -260,27 +274,16 @@ def _floor(spec: mujoco.MjSpec, ground: HeightField | None) -> None:
         width=256,
         height=256,
     )
-    if ground is None:
-        spec.add_texture(
-            name="ground",
-            type=mujoco.mjtTexture.mjTEXTURE_2D,
-            builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-            mark=mujoco.mjtMark.mjMARK_EDGE,
-            rgb1=[0.66, 0.68, 0.70],
-            rgb2=[0.60, 0.62, 0.645],
-            markrgb=[0.72, 0.74, 0.76],
-            width=512,
-            height=512,
-        )
-    else:
-        spec.add_texture(
-            name="ground",
-            type=mujoco.mjtTexture.mjTEXTURE_2D,
-            builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-            rgb1=[0.5, 0.5, 0.5],
-            width=TEXELS,
-            height=TEXELS,
-        )
+    texture = spec.add_texture(
+        name="ground",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        mark=mujoco.mjtMark.mjMARK_EDGE,
+        rgb1=[0.66, 0.68, 0.70],
+        rgb2=[0.60, 0.62, 0.645],
+        markrgb=[0.72, 0.74, 0.76],
+    )
+    texture.width = texture.height = 512 if ground is None else TEXELS
     material = spec.add_material(name="ground", texuniform=ground is None)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
     material.specular = 0.05
@@ -320,24 +323,46 @@ def _water(spec: mujoco.MjSpec, world: WorldConfig, ground: HeightField | None) 
     _add(spec.worldbody, mujoco.mjtGeom.mjGEOM_BOX, surface, SURFACE, pos=middle_m.tolist())
 
 
-def _paint(model: mujoco.MjModel, ground: HeightField) -> None:
-    """Colour the ground by the map's colours, else by elevation with contour lines."""
+def _paint(model: mujoco.MjModel, ground: HeightField | None, is_natural: bool) -> None:
+    """Colour the ground by the map's colours, else naturally or by elevation with contour lines."""
+    texture = model.tex("ground")
+    size = int(texture.width[0]) * int(texture.height[0]) * 3
+    start = int(texture.adr[0])
+    if ground is None:
+        colour = _natural_colours(np.zeros((int(texture.height[0]), int(texture.width[0]))))
+    else:
+        colour = _ground_colours(ground, is_natural)
+    # the first row of a texture has the largest y, that of a height field the smallest
+    model.tex_data[start : start + size] = colour[::-1].clip(0, 255).astype(np.uint8).ravel()
+
+
+def _ground_colours(ground: HeightField, is_natural: bool) -> Floats:
+    """Colours (TEXELS, TEXELS, 3) of a height field, 0 to 255."""
     w, h = ground.size_m
     x = ground.x0_m + (np.arange(TEXELS) + 0.5) / TEXELS * w
     y = ground.y0_m + (np.arange(TEXELS) + 0.5) / TEXELS * h
     z = ground.elevation_m(*np.meshgrid(x, y))
-    level = (z - z.min()) / max(float(np.ptp(z)), 1e-9)
-    colour = LOWLAND + (HIGHLAND - LOWLAND) * level[..., None]
-    colour *= 1.0 - 0.28 * _contours(level * CONTOURS)[..., None]
     if ground.colour is not None:
         column = np.rint((x - ground.x0_m) / ground.spacing_m).astype(int)
         row = np.rint((y - ground.y0_m) / ground.spacing_m).astype(int)
-        colour = ground.colour[row[:, None], column[None]]
-    texture = model.tex("ground")
-    size = TEXELS * TEXELS * 3
-    start = int(texture.adr[0])
-    # the first row of a texture has the largest y, that of a height field the smallest
-    model.tex_data[start : start + size] = colour[::-1].astype(np.uint8).ravel()
+        return np.asarray(ground.colour[row[:, None], column[None]])
+    if is_natural:
+        return _natural_colours(np.hypot(*np.gradient(z, h / TEXELS, w / TEXELS)))
+    level = (z - z.min()) / max(float(np.ptp(z)), 1e-9)
+    colour = LOWLAND + (HIGHLAND - LOWLAND) * level[..., None]
+    colour *= 1.0 - 0.28 * _contours(level * CONTOURS)[..., None]
+    return np.asarray(colour)
+
+
+def _natural_colours(slope: Floats) -> Floats:
+    """Colours (n, m, 3) of grass with spots of several sizes, and of rock where it is steep."""
+    rng = np.random.default_rng(0)
+    spots = np.zeros_like(slope)
+    for size in (1, 4, 16, 64):
+        noise = rng.standard_normal(slope.shape)
+        spots += size * gaussian_filter(noise, size, mode="wrap")
+    rock = np.clip(0.5 + (slope - ROCK_SLOPE) / ROCK_SLOPE + 0.3 * spots, 0.0, 1.0)[..., None]
+    return np.asarray((GRASS + (ROCK - GRASS) * rock) * (1.0 + 0.25 * spots[..., None]))
 
 
 def _contours(level: Floats) -> Floats:

@@ -65,6 +65,7 @@ class Trail:
     """Dots of K paths, (D, 3) each, on the ground."""
     lines: tuple[TrailLine, ...]
     """Lines of the head and of the body's centre."""
+    dot_radius_m: float
 
     @property
     def most(self) -> int:
@@ -82,7 +83,7 @@ class Trail:
                 mujoco.mjv_initGeom(
                     _next_geom(scene),
                     mujoco.mjtGeom.mjGEOM_SPHERE,
-                    np.full(3, 0.012),
+                    np.full(3, self.dot_radius_m),
                     at_m,
                     np.eye(3).ravel(),
                     colour,
@@ -97,19 +98,21 @@ def make_trail(
     head_m: Floats,
     centre_m: Floats,
     ground: HeightField | None,
+    size: float = 1.0,
 ) -> Trail:
     """Lay paths (P, 2), each with its start time, and trails on the ground.
 
     ``paths`` are in order of time. ``time_s`` (T,) increases; ``head_m`` and ``centre_m`` are (T, 2
-    or more). ``ground`` None is a plane.
+    or more). ``ground`` None is a plane. ``size`` is ``looks.mark_size``.
     """
     return Trail(
         starts_s=np.array([start for start, _ in paths], dtype=float),
-        dots_m=tuple(_on_ground(_dots(path), ground) for _, path in paths),
+        dots_m=tuple(_on_ground(_dots(path, size), ground) for _, path in paths),
         lines=(
             _line(time_s, centre_m, ground, CENTRE),
             _line(time_s, head_m, ground, TRAIL),
         ),
+        dot_radius_m=0.012 * size,
     )
 
 
@@ -151,12 +154,12 @@ def _next_geom(scene: mujoco.MjvScene) -> mujoco.MjvGeom:
     return scene.geoms[scene.ngeom - 1]
 
 
-def _dots(path_m: Floats) -> Floats:
+def _dots(path_m: Floats, size: float) -> Floats:
     """Points of a path at equal arc lengths (D, 2)."""
     if len(path_m) < 2:
         return np.zeros((0, 2))
     arc = _arc_m(path_m)
-    arc_m = np.arange(0.0, arc[-1], max(SPACING_M, arc[-1] / MOST))
+    arc_m = np.arange(0.0, arc[-1], max(SPACING_M * size, arc[-1] / MOST))
     return np.column_stack([np.interp(arc_m, arc, path_m[:, k]) for k in range(2)])
 
 

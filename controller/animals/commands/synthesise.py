@@ -20,6 +20,7 @@ from snakewalk.controller.console.options import (
     DEFAULT_RUN,
     Force,
     Json,
+    Marked,
     Robot,
     RunName,
     Set,
@@ -124,6 +125,7 @@ def synthesise(
     set_: Set = None,
     frames: Frames = None,
     film: Film = False,
+    marks: Marked = False,
     glb: Glb = False,
     look: Look = "animal",
     force: Force = False,
@@ -155,7 +157,7 @@ def synthesise(
     if animal is None:
         if feet is not None:
             raise InputError(f"--feet {feet}: is for animals with legs; add --animal")
-        facts, complete = _snake(prepared, frames, look, record, files)
+        facts, complete = _snake(prepared, frames, look, record, files, marks)
     else:
         kept = {"--motion": motion, "--track": track, "--tongue": tongue}
         kept["--look"] = None if look == "animal" else look
@@ -164,7 +166,7 @@ def synthesise(
             raise InputError(
                 f"{wrong[0]}: is for snakes; --animal {animal} has its own motion and skin"
             )
-        facts, complete = _with_legs(prepared, frames, animal, feet, files)
+        facts, complete = _with_legs(prepared, frames, animal, feet, files, marks)
     if frames is not None and facts["frames"] != frames:
         LOGGER.warning(_END, frames, facts["frames"], prepared.world.name)
     show(facts | {what: str(files[what]) if what in files else None for what in _ENDINGS}, as_json)
@@ -178,6 +180,7 @@ def _snake(
     look: str,
     tongue: TongueRecord | None,
     files: Mapping[str, Path],
+    marks: bool,
 ) -> tuple[dict[str, object], bool]:
     """Synthesise a snake by states; facts of it, and whether it reached its last waypoint."""
     worn = None
@@ -196,12 +199,17 @@ def _snake(
     if worn is not None and "skin" in files:
         worn.write(walk, files["skin"])
     if worn is not None and "film" in files:
-        worn.film(walk, prepared, files["film"])
+        worn.film(walk, prepared, files["film"], marks)
     return walk.facts(), walk.complete
 
 
 def _with_legs(
-    prepared: WalkRun, frames: int | None, name: str, feet: str | None, files: Mapping[str, Path]
+    prepared: WalkRun,
+    frames: int | None,
+    name: str,
+    feet: str | None,
+    files: Mapping[str, Path],
+    marks: bool,
 ) -> tuple[dict[str, object], bool]:
     """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
     config = read_animal(name)
@@ -221,5 +229,5 @@ def _with_legs(
     if body is not None and "skin" in files:
         body.write(animal_motion, files["skin"])
     if body is not None and "film" in files:
-        body.film(animal_motion, prepared, files["film"])
+        body.film(animal_motion, prepared, files["film"], marks)
     return animal_motion.facts(), animal_motion.complete

@@ -49,7 +49,9 @@ class AnimalBody:
         with atomic_write(file) as part:
             write_skin(part, self.rig, bones, self.texture, animal_motion.animal.name)
 
-    def film(self, animal_motion: SynthesisedAnimal, prepared: WalkRun, file: Path) -> int:
+    def film(
+        self, animal_motion: SynthesisedAnimal, prepared: WalkRun, file: Path, marks: bool
+    ) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
@@ -65,6 +67,6 @@ class AnimalBody:
             rig_look(self.rig, self.texture, spine=SEGMENTS),
             robot=as_long_robot(prepared.robot, _FRAMED_LENGTH * animal_motion.animal.length_m),
             reached_s=animal_motion.reached_s(),
-            paths=[(0.0, dots)],
+            paths=[(0.0, dots)] if marks else None,
             title=f"{animal_motion.animal.name}, {prepared.run.name}",
         )

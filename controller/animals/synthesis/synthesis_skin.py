@@ -21,7 +21,7 @@ from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.images.mesh import Mesh
-from snakewalk.controller.report.film import FPS, SIZE, renderer, speed_up
+from snakewalk.controller.report.film import SIZE, renderer, speed_up
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 from snakewalk.controller.run.results import ANIMAL
 from snakewalk.controller.track.bone_motion import BoneMotion
@@ -31,6 +31,7 @@ LENGTH = 0.05
 RADIUS = 0.0018
 """Length and radius of the whole tongue, over the body's length (ours)."""
 _RGB = 191, 26, 38
+_FPS = 30
 _ROWS = 8
 """Rows that the texture gets for the tongue's colour."""
 _RING_CORNERS = 8
@@ -154,7 +155,7 @@ class SynthesisSkin:
         rig, texture = rig_with_tongue(rig, bones.length_m, texture)
         return rig, bones_with_tongue(bones, walk.tongue), texture
 
-    def film(self, walk: SynthesisedWalk, prepared: WalkRun, file: Path) -> int:
+    def film(self, walk: SynthesisedWalk, prepared: WalkRun, file: Path, marks: bool) -> int:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
@@ -169,7 +170,7 @@ class SynthesisSkin:
             rig_look(rig, texture, spine=walk.bones(FILM_SEGMENTS).front_m.shape[1]),
             robot=prepared.robot,
             reached_s=walk.reached_s(),
-            paths=walk.targets.paths(walk.rate_hz),
+            paths=walk.targets.paths(walk.rate_hz) if marks else None,
             title=prepared.run.name,
         )
 
@@ -182,7 +183,7 @@ def film_over(
     *,
     robot: RobotConfig,
     reached_s: Sequence[float],
-    paths: Sequence[tuple[float, Floats]],
+    paths: Sequence[tuple[float, Floats]] | None,
     title: str,
 ) -> int:
     """Draw a skin that moves over a run's world; shows progress on standard error.
@@ -194,7 +195,7 @@ def film_over(
         look: the skin.
         robot: the body in the camera's frame, of the skin's length.
         reached_s: time at each waypoint.
-        paths: paths (P, 2) from a time on.
+        paths: paths (P, 2) from a time on; None draws a film without marks.
         title: in the picture.
 
     Returns:
@@ -215,8 +216,10 @@ def film_over(
             bones.time_s,
             poses.reshape(frames, -1),
             part,
-            style=film.Style(FPS, speed_up(float(bones.time_s[-1])), SIZE, title, look),
-            marks=film.Marks(run.waypoints_m, run.waypoint_radius_m, reached_s, paths),
+            style=film.Style(_FPS, speed_up(float(bones.time_s[-1])), SIZE, title, look),
+            marks=None
+            if paths is None
+            else film.Marks(run.waypoints_m, run.waypoint_radius_m, reached_s, paths),
             on_frame=bar.update,
         )
         return drawn

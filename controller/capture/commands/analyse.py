@@ -114,7 +114,8 @@ def _show(facts: dict[str, Any]) -> None:
         f"slope along the body by {facts['one_pulse_error_correlation']}",
         "frequency x wavelength": no_wave or f"{facts['wave_speed_body_lengths_s']} body lengths/s",
         "travel": no_travel
-        or f"{facts['travel']} of the pulse speed; sliding weight w_d {facts['sliding_weight']}",
+        or f"{facts['travel']} of the pulse speed; sliding weight w_d {facts['sliding_weight']}"
+        + (" (below 0: slips backwards)" if (facts["sliding_weight"] or 0) < 0 else ""),
         "angle amplitude": _profile_text(facts["angle_amplitude_rad"], "rad"),
         "sideways amplitude": _profile_text(
             facts["lateral_amplitude_body_lengths"], "body lengths"

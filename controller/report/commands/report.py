@@ -8,7 +8,7 @@ import typer
 from snakewalk.config.constants import LOOK
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.opened_log import open_log
-from snakewalk.controller.console.options import Force, Json, Look, RunLog, show
+from snakewalk.controller.console.options import Force, Json, Look, Marked, RunLog, show
 from snakewalk.controller.console.result_files import refuse_mixture
 from snakewalk.controller.run.results import check_look, write_artifacts
 
@@ -25,6 +25,7 @@ def report(
         bool, typer.Option("--fine", help="draw the film in 1280 x 720, which is slow")
     ] = False,
     look: Look = LOOK,
+    marks: Marked = True,
     folders: Annotated[
         bool, typer.Option("--folders", help="keep the folder names of your files in report.html")
     ] = False,
@@ -36,7 +37,9 @@ def report(
     record = open_log(log)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
-    artifacts = write_artifacts(record, folder, film=film, fine=fine, look=look, folders=folders)
+    artifacts = write_artifacts(
+        record, folder, film=film, fine=fine, look=look, marks=marks, folders=folders
+    )
     if artifacts.report is None:
         raise SystemExit(2)
     files = artifacts.to_dict()

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -86,6 +87,40 @@ def test_a_waypoint_is_green_from_when_the_log_has_it_reached(
         on_frame=on_frame,
     )
     assert marked == [(0, 4), (1, 4)]
+
+
+def test_a_film_without_marks_has_no_caption_and_nothing_but_body_and_ground(
+    record: RunRecord, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("av")
+    from snakewalk.sim.rendering import film
+
+    drawn: list[tuple[int, str]] = []
+
+    class Counted(_Blank):
+        def draw(self, *shown: Any) -> np.ndarray:
+            drawn.append((shown[0].ngeom, shown[1]))
+            return super().draw(*shown)
+
+    monkeypatch.setattr(film, "Offscreen", Counted)
+    time_s, qpos = body_qpos(record)
+    scene = film.Scene(record.header.robot, record.header.world, None)
+    for marks in (None, film.Marks(), film.Marks([(5.0, 5.0)])):
+        film.render_film(
+            scene,
+            time_s[:50],
+            qpos[:50],
+            tmp_path / "film.mp4",
+            style=film.Style(fps=5, size=(32, 32), title="walk"),
+            marks=marks,
+        )
+    frames = len(drawn) // 3
+    plain, without_waypoints, marked = drawn[:frames], drawn[frames:-frames], drawn[-frames:]
+    assert {caption for _, caption in plain} == {""}
+    assert all(caption.startswith("walk") for _, caption in (*without_waypoints, *marked))
+    assert all(a < b for (a, _), (b, _) in zip(plain, without_waypoints, strict=True))
+    assert all(a < b for (a, _), (b, _) in zip(without_waypoints, marked, strict=True))
 
 
 class _Blank:

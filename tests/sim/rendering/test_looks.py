@@ -14,6 +14,7 @@ from snakewalk.sim.rendering.looks import (
     BACK,
     CONTOURS,
     EYE,
+    GRASS,
     HEAD,
     HIDDEN,
     HIGHLAND,
@@ -21,6 +22,7 @@ from snakewalk.sim.rendering.looks import (
     PUPIL,
     REACHED,
     RING_PARTS,
+    ROCK,
     SHALLOW,
     SURFACE,
     TEXELS,
@@ -422,3 +424,43 @@ def test_a_waypoint_on_a_hill_stands_on_it() -> None:
         for east, north, up in ends(model, model.geom(f"waypoint0ring{part}").id):
             assert up == pytest.approx(0.1 * east + 0.2 * north + 0.004, abs=1e-6)
     assert ground[2] <= 0.0
+
+
+def test_marks_are_as_large_as_the_body_and_beside_a_long_body_no_larger() -> None:
+    def radius_m(link_length_m: float) -> float:
+        robot = ROBOT.model_copy(update={"link_length_m": link_length_m})
+        scene = Scene(robot, load_world("flat"), None)
+        pole = dressed_model(scene, Marks([(1.0, 0.0)])).geom("waypoint0")
+        assert pole.pos[2] == pytest.approx(pole.size[1])
+        return float(pole.size[0]) / robot.length_m
+
+    lengths_m = (0.01, 0.03)
+    assert radius_m(lengths_m[0]) == pytest.approx(radius_m(lengths_m[1])) == pytest.approx(0.008)
+    assert radius_m(0.3) < 0.5 * radius_m(0.03)
+
+
+def test_ground_without_marks_is_grass_where_it_is_level_and_rock_where_it_is_steep() -> None:
+    east_m = np.linspace(0.0, 4.0, 81)
+    elevation_m = np.broadcast_to(np.maximum(east_m - 2.0, 0.0), (81, 81))
+    ground = HeightField(elevation_m, 0.05, 0.0, 0.0)
+
+    def colours(marks: Marks | None) -> np.ndarray:
+        model = dressed_model(Scene(ROBOT, load_world("flat"), ground), marks)
+        texture = model.tex("ground")
+        rows, columns = int(texture.height[0]), int(texture.width[0])
+        pixels = model.tex_data[int(texture.adr[0]) :][: rows * columns * 3]
+        return pixels.reshape(rows, columns, 3).astype(float)
+
+    natural = colours(None)
+    for part, colour in ((natural[:, :500], GRASS), (natural[:, 530:], ROCK)):
+        np.testing.assert_allclose(part.mean(axis=(0, 1)), colour, atol=4.0)
+    # a contour line has the same colour along a level line, and nature has not
+    assert np.ptp(colours(Marks())[:, 900], axis=0).max() < 2.0
+    assert np.ptp(natural[:, 900], axis=0).max() > 20.0
+
+
+def test_a_floor_without_marks_has_no_lines_a_metre() -> None:
+    model = dressed_model(Scene(ROBOT, load_world("flat"), None), None)
+    texture = model.tex("ground")
+    pixels = model.tex_data[int(texture.adr[0]) :][: int(texture.width[0]) ** 2 * 3]
+    np.testing.assert_allclose(pixels.reshape(-1, 3).mean(axis=0), GRASS, atol=4.0)

@@ -79,6 +79,15 @@ def test_lines_lie_on_the_ground() -> None:
         assert np.ptp(points_m[:, 2]) > 0.4
 
 
+def test_dots_beside_a_small_body_are_as_small_and_as_close() -> None:
+    large, small = (
+        make_trail([(0.0, FIRST)], TIMES, HEAD, CENTRE_M, None, size) for size in (1.0, 0.5)
+    )
+    assert small.dot_radius_m == 0.5 * large.dot_radius_m
+    spacing_m = [np.diff(trail.dots_m[0][:, 0])[0] for trail in (large, small)]
+    assert spacing_m[1] == pytest.approx(0.5 * spacing_m[0])
+
+
 def test_a_run_without_a_path_has_none() -> None:
     assert make_trail([(0.0, np.zeros((0, 2)))], TIMES, HEAD, CENTRE_M, None).dots_m[0].shape == (
         0,
