@@ -1,6 +1,5 @@
 """Files made from a run's record: ``summary.json``, ``film.mp4`` and ``report.html``."""
 
-from functools import partial
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
@@ -19,9 +18,9 @@ from snakewalk.controller.console.result_files import (
 from snakewalk.controller.metrics.summary import RunSummary, summary
 from snakewalk.controller.report.film import film_run, film_times
 from snakewalk.controller.report.page import Drawings, film_on_page, page
-from snakewalk.controller.run.results import SERVOS, Artifacts, film_look
+from snakewalk.controller.run.results import Artifacts, FilmChoice, film_look
 from snakewalk.controller.run.run_robot import write_summary
-from snakewalk.controller.runlog.record import Header, RunRecord
+from snakewalk.controller.runlog.record import RunRecord
 
 
 @plugin("results", "report")
@@ -30,10 +29,7 @@ def make_artifacts(
     folder: Path,
     numbers: RunSummary | None = None,
     *,
-    film: bool = True,
-    fine: bool = False,
-    look: str = SERVOS,
-    marks: bool = True,
+    film: FilmChoice | None = FilmChoice(),
     made: str = "",
     folders: bool = False,
 ) -> Artifacts:
@@ -47,10 +43,7 @@ def make_artifacts(
         record: the run.
         folder: of the files.
         numbers: the summary of ``run_robot``; computed by default.
-        film: draw a film.
-        fine: better and slower.
-        look: body in the film, as for ``film_look``.
-        marks: draw waypoints, path, contour lines, scale and caption into the film.
+        film: how the film is drawn; None draws none.
         made: words at the foot of the page.
         folders: show the folders of the user's files in the page.
 
@@ -65,8 +58,7 @@ def make_artifacts(
         _write_page(record, folder, path if path.exists() else None, numbers, drawn, folders)
     except InputError as error:
         notes += [f"no report: {line}" for line in error.faults]
-    styled = partial(film_run, record, fine=fine, marks=marks)
-    if film and _film(styled, record.header, path, look, notes) and drawn is not None:
+    if film and _film(record, path, film, notes) and drawn is not None:
         _write_page(record, folder, path, numbers, drawn, folders)
     report = None if drawn is None else folder / REPORT
     return Artifacts(report, path if path.exists() else None, tuple(notes))
@@ -103,11 +95,18 @@ def _write_page(
     return path
 
 
-def _film(film: "partial[int]", header: Header, path: Path, look: str, notes: list[str]) -> bool:
+def _film(record: RunRecord, path: Path, choice: FilmChoice, notes: list[str]) -> bool:
     with ProgressBar("film") as bar:
         try:
             with atomic_write(path) as part:
-                film(part, look=film_look(look, header), on_progress=bar.update)
+                film_run(
+                    record,
+                    part,
+                    look=film_look(choice.look, record.header),
+                    fine=choice.fine,
+                    marks=choice.marks,
+                    on_progress=bar.update,
+                )
         except InputError as error:
             bar.hide()
             notes += [f"no film: {line}" for line in error.faults]

@@ -24,8 +24,6 @@ from snakewalk.controller.runlog.record import Header, RunRecord
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook
 
-SERVOS: Final = "servos"
-"""Look of the body in a film: a capsule per link."""
 ANIMAL: Final = "animal"
 """Name of the look of the animal in the run's recording."""
 _BODY: Final = "body"
@@ -51,8 +49,20 @@ def check_look(look: str) -> None:
         InputError: the look does not exist, or an extra is missing.
 
     """
-    if look != SERVOS:
+    if look != LOOK:
         _look_plugin(look).check(look)
+
+
+@dataclass(frozen=True, slots=True)
+class FilmChoice:
+    """How the film of a run is drawn."""
+
+    look: str = LOOK
+    """Body in the film, as for ``film_look``."""
+    fine: bool = False
+    """Larger, smoother and slower."""
+    marks: bool = True
+    """Waypoints, path, contour lines, scale and caption."""
 
 
 def film_look(look: str, header: Header) -> "SkinLook | None":
@@ -62,11 +72,11 @@ def film_look(look: str, header: Header) -> "SkinLook | None":
         InputError: the look does not exist, or an extra is missing.
 
     """
-    return None if look == SERVOS else _look_plugin(look).make(look, header)
+    return None if look == LOOK else _look_plugin(look).make(look, header)
 
 
 def _look_plugin(look: str) -> LookPlugin:
-    plugin = find("look", look) or find("look", _BODY) or require("look", look, "--look", [SERVOS])
+    plugin = find("look", look) or find("look", _BODY) or require("look", look, "--look", [LOOK])
     look_plugin: LookPlugin = plugin.load()()
     return look_plugin
 
@@ -100,10 +110,7 @@ def write_artifacts(
     folder: Path,
     numbers: RunSummary | None = None,
     *,
-    film: bool,
-    fine: bool = False,
-    look: str = LOOK,
-    marks: bool = True,
+    film: FilmChoice | None,
     folders: bool = False,
 ) -> Artifacts:
     """Make report and film of a run; print on standard error why a file is missing.
@@ -118,15 +125,7 @@ def write_artifacts(
     folder.mkdir(parents=True, exist_ok=True)
     with locked_folder(folder):
         artifacts: Artifacts = require("results", "report", "--film").load()(
-            record,
-            folder,
-            numbers,
-            film=film,
-            fine=fine,
-            look=look,
-            marks=marks,
-            made=what,
-            folders=folders,
+            record, folder, numbers, film=film, made=what, folders=folders
         )
     for line in artifacts.notes:
         LOGGER.warning("%s", line)
@@ -138,7 +137,7 @@ def show_result(
     facts: Mapping[str, object],
     options: RunOptions,
     *,
-    look: str = SERVOS,
+    look: str = LOOK,
     accept_dead_reckoning: bool = False,
 ) -> None:
     """Make report and film, and print facts and files.
@@ -150,7 +149,10 @@ def show_result(
     is_accepted = result.verdict.accepted(accept_dead_reckoning)
     with result.ending.noted():
         artifacts = write_artifacts(
-            result.record, result.folder, result.summary, film=options.film, look=look
+            result.record,
+            result.folder,
+            result.summary,
+            film=FilmChoice(look) if options.film else None,
         )
         _show(result, is_accepted, facts, artifacts, options.as_json)
     if is_accepted.exit_code:

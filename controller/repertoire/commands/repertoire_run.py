@@ -13,7 +13,7 @@ from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.action_table import plots
 from snakewalk.controller.repertoire.repertoire_planning import load_plan
 from snakewalk.controller.repertoire.repertoire_run import RepertoireRun, RouteRun, run_name
-from snakewalk.controller.run.results import write_artifacts
+from snakewalk.controller.run.results import FilmChoice, write_artifacts
 from snakewalk.controller.run.run_for_user import run_for_user
 
 
@@ -52,7 +52,8 @@ def run_route(
         job, run_name(job), options, bar=TimeBar(job.run.name, job.route.duration_s)
     )
     with result.ending.noted():
-        artifacts = write_artifacts(result.record, result.folder, result.summary, film=options.film)
+        choice = FilmChoice() if options.film else None
+        artifacts = write_artifacts(result.record, result.folder, result.summary, film=choice)
     if picture is not None:
         plots().draw_route(job, result.record, picture)
     ran = RouteRun(job, result)

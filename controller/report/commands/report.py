@@ -10,7 +10,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.opened_log import open_log
 from snakewalk.controller.console.options import Force, Json, Look, Marked, RunLog, show
 from snakewalk.controller.console.result_files import refuse_mixture
-from snakewalk.controller.run.results import check_look, write_artifacts
+from snakewalk.controller.run.results import FilmChoice, check_look, write_artifacts
 
 
 @command("log report", examples=("log report runs/flat-square-walk-seed0/log.mcap",))
@@ -37,9 +37,8 @@ def report(
     record = open_log(log)
     folder = log.parent if out is None else out
     refuse_mixture(log, folder, force)
-    artifacts = write_artifacts(
-        record, folder, film=film, fine=fine, look=look, marks=marks, folders=folders
-    )
+    choice = FilmChoice(look, fine, marks) if film else None
+    artifacts = write_artifacts(record, folder, film=choice, folders=folders)
     if artifacts.report is None:
         raise SystemExit(2)
     files = artifacts.to_dict()

@@ -45,7 +45,7 @@ def test_terminal_summary_and_report_agree(tmp_path: Path) -> None:
     assert reached_s == pytest.approx(first, abs=1e-4)
     event = next(e for e in record.from_torque_on().events if e.kind == "waypoint")
     assert 0.0 <= event.time_s - reached_s < record.period_s
-    made = make_artifacts(record, tmp_path / "out", numbers, film=False)
+    made = make_artifacts(record, tmp_path / "out", numbers, film=None)
     assert made.report is not None
     page = made.report.read_text(encoding="utf-8")
     assert f"in {numbers.duration_s:.1f} s" in page

@@ -58,7 +58,7 @@ def parsed(html: str) -> Sources:
 
 
 def build_report(record: RunRecord, folder: Path, numbers: RunSummary | None = None) -> Path:
-    page_path = make_artifacts(record, folder, numbers, film=False).report
+    page_path = make_artifacts(record, folder, numbers, film=None).report
     assert page_path is not None
     return page_path
 
