@@ -76,6 +76,11 @@ def test_the_skin_swells_to_the_middle_tapers_to_the_tail_and_lies_on_the_ground
     assert (np.diff(share)[:widest] > 0.0).all()
     assert (np.diff(share)[widest:] < 0.0).all()
     assert share[-1] == pytest.approx(0.45, abs=0.01)
+    for link, geom in enumerate(geoms, start=1):
+        near, far = ends(model, geom)
+        np.testing.assert_allclose(near[:2], 0.0, atol=1e-9)
+        np.testing.assert_allclose(far[:2], [-ROBOT.link_lengths_m[link], 0.0], atol=1e-9)
+        assert near[2] == pytest.approx(far[2])
     # the lower edge is where that of the link itself is
     np.testing.assert_allclose(model.geom_pos[geoms, 2] - thick, -radius, atol=1e-9)
 
@@ -130,9 +135,11 @@ def test_the_skin_is_thinnest_at_the_tail_and_bent_nowhere() -> None:
 
 
 def test_head_neck_and_tongue_fit_together_over_the_ground() -> None:
-    model = drawn()
-    radius_m = ROBOT.link_radii_m[0]
-    half_m = 0.5 * ROBOT.link_lengths_m[0]
+    links = [{"length_m": 0.1}, *4 * [{"length_m": 0.07}]]
+    robot = RobotConfig.model_validate({"name": "big-headed", "joint_axes": "yyyy", "links": links})
+    model = drawn(robot)
+    radius_m = robot.link_radii_m[0]
+    half_m = 0.05
     (skull,) = of_colours(model, ELLIPSOID, HEAD)
     size, middle = model.geom_size[skull], model.geom_pos[skull]
 
