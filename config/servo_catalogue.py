@@ -1,6 +1,6 @@
 """Servo models by name, by number or by file."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -15,6 +15,13 @@ FOLDER: Final = Path(__file__).parent / "servos"
 """Folder with a file for each shipped servo model."""
 _MOST_FILES: Final = 5
 """Longest chain of files that are each like the next (ours)."""
+
+
+def name_hint(name: str, names: Iterable[str]) -> str:
+    """Hint on an unknown name: the closest ones."""
+    lower = {known.lower(): known for known in names}
+    near = [lower[close] for close in get_close_matches(name.lower(), lower, 3, 0.5)]
+    return f"; did you mean {', '.join(near)}?" if near else ""
 
 
 def printed_name(name: str) -> str:
@@ -145,17 +152,20 @@ def _merged_with_like(path: Path, data: dict[str, Any], depth: int) -> dict[str,
         raise ConfigError(f"{path}: like: {like}: no such servo model")
     if depth == _MOST_FILES:
         raise ConfigError(f"{path}: like: more than {_MOST_FILES} files that are each like another")
-    shipped = other.parent == FOLDER
-    base = (
+    base = dict(
         _shipped_data(other.stem)[0]
-        if shipped
+        if other.parent == FOLDER
         else _merged_with_like(other, read_toml(other)[0], depth + 1)
     )
-    base = dict(base)
     registers = dict(base.get("registers", {}))
-    unknown = [name for name in without if name not in registers]
-    if unknown:
-        raise ConfigError(f"{path}: without: {like} has no register {unknown[0]}")
+    rows = table.get("registers")
+    changed = []
+    if isinstance(rows, dict):  # a row without an address changes a register of the other model
+        changed = [n for n, row in rows.items() if isinstance(row, dict) and "address" not in row]
+    for name in (*without, *changed):
+        if name not in registers:
+            hint = name_hint(name, registers)
+            raise ConfigError(f"{path}: {like} has no register {name!r}{hint}")
     base["registers"] = {name: row for name, row in registers.items() if name not in without}
     for key in ("source", "friction"):  # they belong to the other model
         base.pop(key, None)

@@ -1,14 +1,18 @@
 """Control tables of the servo models (files in `config/servos`)."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
 from snakewalk.config.errors import ConfigError
-from snakewalk.config.servo_catalogue import models_by_number, servo_model, shipped_models
+from snakewalk.config.servo_catalogue import (
+    models_by_number,
+    name_hint,
+    servo_model,
+    shipped_models,
+)
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.errors import ControlTableError
 
@@ -105,13 +109,6 @@ class ControlTable:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.registers)
-
-
-def name_hint(name: str, names: Iterable[str]) -> str:
-    """Hint on an unknown name: the closest ones."""
-    lower = {known.lower(): known for known in names}
-    near = [lower[close] for close in get_close_matches(name.lower(), lower, 3, 0.5)]
-    return f"; did you mean {', '.join(near)}?" if near else ""
 
 
 def model_numbers(protocol: int | str = 2) -> Mapping[int, str]:

@@ -227,11 +227,6 @@ class MujocoPlant:
         return float(self.mechanics.totals[0])
 
     @property
-    def gear_loss_j(self) -> float:
-        """Energy lost to gear drag since the reset."""
-        return float(self.mechanics.totals[2])
-
-    @property
     def slip_m(self) -> float:
         """Mean distance slipped across the links since the reset."""
         return float(self.mechanics.totals[1])

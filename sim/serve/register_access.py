@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.drivers.protocol.control_table import name_hint
+from snakewalk.config.servo_catalogue import name_hint
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bench import BenchPlant

@@ -67,7 +67,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "controller.console": (7750, "0188-options-are-fields.md"),
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),
-    "config": (20_250, "0270-one-reader-of-text-tables.md"),
+    "config": (20_300, "0259-a-bus-of-a-test-has-a-url.md"),
     "controller.mapping": (19_200, "0270-one-reader-of-text-tables.md"),
     "controller.motion": (10_280, "0266-the-page-says-how-old-it-is.md"),
     "controller.pose": (8300, "0261-what-agreement-cannot-show-is-inaccuracy.md"),

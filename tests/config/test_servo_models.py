@@ -88,7 +88,12 @@ def test_measurements_of_another_model_are_not_taken_over(tmp_path: Path) -> Non
     [
         (MINE.replace("XM430-W350", "XM9"), "like: XM9: no such servo model"),
         (MINE + "colour = 3\n", r"MINE-1\.toml:5: colour: unknown key"),
-        (MINE + 'without = ["Colour"]\n', "without: XM430-W350 has no register Colour"),
+        (MINE + 'without = ["Colour"]\n', "XM430-W350 has no register 'Colour'"),
+        (
+            MINE + '[registers]\n"velocity limt" = { initial = 3 }\n',
+            "no register 'velocity limt'; did you mean Velocity Limit",
+        ),
+        (MINE + '[registers]\n"Velocity Limit" = 3\n', "registers.Velocity Limit: must be a t"),
         (MINE + "without = 3\n", "without: must be a list of registers"),
         (MINE.replace("MINE-1", "a/b"), "model: "),
         (MINE.replace("9999", "70000"), "model_number: must be at most 65535"),

@@ -98,7 +98,7 @@ def test_motors_pay_for_friction_gears_and_motion(
         drive.goal_rad[:] = serpenoid(k * hold_s)
         body.advance(k * hold_s, drive)
     worked = float(drive.work_j.sum())
-    spent = body.friction_loss_j + body.gear_loss_j + sum(body.energy_j) - before
+    spent = sum(body.mechanics.totals[[0, 2]]) + sum(body.energy_j) - before
     # k_t is that of the output shaft: what it lacks to k_e, the gears take
     passed_on = float((drive.back_emf_v_s / drive.torque_constant_n_m_a) @ drive.work_j)
     taken = float((drive.drawn_j - drive.returned_j).sum())
