@@ -222,11 +222,6 @@ class MujocoPlant:
         return m.body_subtreemass[1] * d.subtree_linvel[1], d.subtree_angmom[1].copy()
 
     @property
-    def friction_loss_j(self) -> float:
-        """Energy lost to ground friction and water since the reset."""
-        return float(self.mechanics.totals[0])
-
-    @property
     def slip_m(self) -> float:
         """Mean distance slipped across the links since the reset."""
         return float(self.mechanics.totals[1])

@@ -107,7 +107,7 @@ def test_motors_pay_for_friction_gears_and_motion(
         f"mu {mu}: motors {worked:.3f} J, {spent:.3f} J accounted for ({spent / worked - 1:+.2%}); "
         f"electrical {taken:.3f} J, {used:.3f} J accounted for ({used / taken - 1:+.2%})"
     )
-    assert body.friction_loss_j > 0.5 * worked > 0.0
+    assert body.mechanics.totals[0] > 0.5 * worked > 0.0
     assert spent == pytest.approx(worked, rel=0.02)
     assert used == pytest.approx(taken, rel=0.005)
     assert float(drive.drawn_j.sum()) > worked
@@ -133,8 +133,8 @@ def test_an_undulation_pays_at_least_for_sliding_along_itself() -> None:
     body.advance(6.0 + rest_s, drive)  # what is still in motion is not paid for twice
     bound_j = mu_along * MASS_KG * GRAVITY_M_S2 * way_m
     print(
-        f"way {way_m:.2f} m: bound {bound_j:.2f} J, friction {body.friction_loss_j:.2f} J, "
+        f"way {way_m:.2f} m: bound {bound_j:.2f} J, friction {body.mechanics.totals[0]:.2f} J, "
         f"shafts {drive.work_j.sum():.2f} J, electrical {drive.drawn_j.sum():.2f} J"
     )
     assert way_m > 1.0
-    assert bound_j < body.friction_loss_j < drive.work_j.sum() < drive.drawn_j.sum()
+    assert bound_j < body.mechanics.totals[0] < drive.work_j.sum() < drive.drawn_j.sum()
