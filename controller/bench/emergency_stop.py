@@ -134,7 +134,7 @@ def stop_holders(ports: Iterable[str], sender: str) -> list[StopOutcome]:
             button = _button_of(holder)
             if button is not None:
                 outcomes += stop_runs([button], sender)
-            elif holder.is_ours:
+            elif holder.is_snakewalk:
                 outcomes.append(_terminate_program(holder, port))
     return outcomes
 

@@ -34,11 +34,11 @@ class Bodies(NamedTuple):
     """(phases, L) vertical part of the direction in which the back of each link points, -1 to 1."""
 
 
-def bodies_m(gait: Gait, robot: RobotConfig, phases: int = PHASES) -> Bodies:
+def bodies_m(gait: Gait, robot: RobotConfig) -> Bodies:
     """Bodies at some phases of a cycle."""
     yaw = robot.yaw_joints
     pose = BodyPose(0.0, np.zeros(3), np.eye(3))
-    joints = gait.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, 12 * phases, endpoint=False))
+    joints = gait.joints_rad(robot, np.linspace(0.0, 2.0 * np.pi, 12 * PHASES, endpoint=False))
     frame: Frame | None = None
     shown = []
     backs = []

@@ -29,7 +29,7 @@ DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
 out: 99 % and 95 % of chi square with two degrees of freedom."""
 _ESTIMATED_VARIANCE = 0.8
-"""Variance over that of the prior below which a value is estimated (ours)."""
+"""Variance, divided by the prior's, below which a value counts as estimated (ours)."""
 _TRUST = 1.39
 """Squared distance of the file from the estimate below which the file holds again: 50 %."""
 _NORMAL_95 = 1.96

@@ -21,17 +21,15 @@ from snakewalk.controller.mechanics.rigid_motion import NoBalanceError, balance
 _LINKS = 20
 
 
-def quasi_static_gain(
-    skeleton_rad: Floats, friction: FrictionConfig, links: int = _LINKS
-) -> Floats:
+def quasi_static_gain(skeleton_rad: Floats, friction: FrictionConfig) -> Floats:
     """Gain (S,) of each shape (S, N) at the moment at which the body has it.
 
-    The angles move tailwards along the body at pulse speed u. Balanced friction on ``links`` links
+    The angles move tailwards along the body at pulse speed u. Balanced friction on 20 links
     moves the body forward at ``eta_q u``: 1 without slip, below 0 backwards.
     """
     shapes = np.atleast_2d(skeleton_rad)
     points = shapes.shape[-1]
-    position = np.clip((np.arange(links) + 0.5) * points / links - 0.5, 0.0, points - 1.0)
+    position = np.clip((np.arange(_LINKS) + 0.5) * points / _LINKS - 0.5, 0.0, points - 1.0)
     left = np.minimum(position.astype(int), points - 2)
     right_share = position - left
 
@@ -44,7 +42,7 @@ def quasi_static_gain(
     turning = -at_links(np.gradient(shapes, axis=1))
     along = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     across = np.stack([-np.sin(heading), np.cos(heading)], axis=-1) * turning[..., None]
-    size = points / links  # link length in segments, the unit of length here
+    size = points / _LINKS  # link length in segments, the unit of length here
     place = -size * (np.cumsum(along, axis=1) - 0.5 * along)
     change = -size * (np.cumsum(across, axis=1) - 0.5 * across)
     velocity = rigid_velocities(place / points, heading, change / points, friction)[:, None]

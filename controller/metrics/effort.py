@@ -150,7 +150,7 @@ class Effort:
     """Net work at the shafts over weight and distance."""
     climb_m_s: float
     slip: float
-    """Distance that touching links slide sideways, over that of the centre; flat floors only."""
+    """Sideways slide of touching links, divided by the centre's distance; flat floors only."""
 
 
 def effort(record: RunRecord, moved: Travel | None = None) -> Effort:

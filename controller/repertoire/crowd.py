@@ -13,6 +13,8 @@ from snakewalk.drivers.compiling import compiled, inlined
 
 LANES = 8
 """Links are padded to a multiple of this, so that vector units process them without a remainder."""
+_LARGEST_TIP_M = 0.02
+"""Largest motion of a tip in a frame of a bridge (ours)."""
 _ROWS = "float64[:, ::1]"
 _LINKS = "float32[:, :, ::1]"
 
@@ -28,7 +30,6 @@ class Crowd:
         repertoire: Repertoire,
         bodies: int,
         *,
-        largest_tip_m: float = 0.02,
         balance_rad: float = 0.0,
     ) -> None:
         """Put all bodies at the origin, at the beginning of the first segment.
@@ -37,7 +38,6 @@ class Crowd:
         ([YT] 4.2); 0 replays exactly what was recorded.
         """
         self._balance_rad = balance_rad
-        self._largest_tip_m = largest_tip_m
         segments = repertoire.segments
         lengths = np.array([segment.frames for segment in segments])
         self._first = np.concatenate([[0], np.cumsum(lengths)[:-1]]).astype(np.int32)
@@ -52,7 +52,7 @@ class Crowd:
         self._bridge_length = np.array(
             [
                 [
-                    bridge_frames(tip_travel_m(a.link_m[-1], b.link_m[0]), largest_tip_m)
+                    bridge_frames(tip_travel_m(a.link_m[-1], b.link_m[0]), _LARGEST_TIP_M)
                     for b in segments
                 ]
                 for a in segments
@@ -64,7 +64,7 @@ class Crowd:
         self.origin_m: Floats = np.zeros((bodies, 3))
         """(N, 3) origins of the bodies, m."""
         self.scale: Floats = np.ones(bodies)
-        """(N,) size over that of the recorded body."""
+        """(N,) size of each body, divided by the recorded body's."""
         self.visible: Bools = np.ones(bodies, dtype=np.bool_)
         """(N,) whether a body is visible."""
         self.segment: Int32s = np.zeros(bodies, dtype=np.int32)
@@ -130,7 +130,7 @@ class Crowd:
         nearest = int(np.sqrt((off[:, :2] ** 2).sum(axis=(1, 2))).argmin())
         self._bridge_from[body] = now
         self._bridge_frames[body] = self._bridge_remaining[body] = bridge_frames(
-            float(travel[nearest]), self._largest_tip_m
+            float(travel[nearest]), _LARGEST_TIP_M
         )
         self.segment[body] = self._playing[body] = segment
         self._next[body] = first + nearest

@@ -122,7 +122,6 @@ class CrowdScene:
         bodies: int,
         *,
         seed: int = 0,
-        fovy_deg: float = 45.0,
         detail: bool = True,
         separate: bool = True,
     ) -> None:
@@ -134,7 +133,6 @@ class CrowdScene:
             ground: under them.
             bodies: how many.
             seed: of places, sizes and choices.
-            fovy_deg: opening of the camera.
             detail: with culling and levels; else every body is drawn in full.
             separate: bodies do not intersect.
 
@@ -144,7 +142,6 @@ class CrowdScene:
         """
         sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)
         self._ground = ground
-        self._fovy_deg = fovy_deg
         self._detail = detail
         links = repertoire.segments[0].link_m.shape[1]
         radii = np.array(robot.radii_m(2 * links + 1))[1::2]
@@ -166,7 +163,7 @@ class CrowdScene:
             begun = time.process_time()
             lookat, distance, azimuth, elevation = self._camera(k / FPS)
             frustum = ViewFrustum.orbit(
-                lookat, distance, azimuth, elevation, fovy_deg=self._fovy_deg, size_px=SIZE_PX
+                lookat, distance, azimuth, elevation, fovy_deg=45.0, size_px=SIZE_PX
             )
             levels = np.full(len(crowd.scale), NEAR)
             if self._detail:

@@ -37,9 +37,9 @@ def replay(segment: Segment, start: Frame, scale: float = 1.0) -> Replayed:
     ``scale`` is the ratio of this body's size to the recorded one's. It scales the shape (Eq. 12)
     and the travel too: a body twice as long that made the recorded steps would slip.
     """
-    turned, gone_m = segment.travel()
+    turned, travelled_m = segment.travel()
     rotation = start.rotation @ turned[1:]
-    origin = start.origin_m + scale * gone_m[1:] @ start.rotation.T
+    origin = start.origin_m + scale * travelled_m[1:] @ start.rotation.T
     link = np.einsum("tij,tlj->tli", rotation, scale * segment.link_m) + origin[:, None]
     return Replayed(rotation, origin, link)
 

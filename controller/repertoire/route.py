@@ -28,14 +28,12 @@ class RouteFollower:
         radius_m: float,
         *,
         replan: bool = True,
-        beam: int = 100,
     ) -> None:
         """Start on ``route``; with ``replan`` the search begins again at the end of each cycle."""
         self._primitives = primitives
         self._route = route
         self._waypoints_m, self._radius_m = tuple(waypoints_m), radius_m
         self._replan = replan
-        self._beam = beam
         self.reached = 0
         self.chosen: list[int] = [route.actions[0]]
         """Actions that the follower has chosen so far."""
@@ -74,7 +72,7 @@ class RouteFollower:
                 self._waypoints_m,
                 AIM_SHARE * self._radius_m,
                 reached=self.reached,
-                beam=self._beam,
+                beam=100,
                 depth=12,
             )
             action = ahead.actions[0]

@@ -97,7 +97,7 @@ class ScheduleRun(PathlessRun):
 
     @property
     def scale(self) -> float:
-        """Length of this body over that of the recorded one."""
+        """Length of this body, divided by the recorded body's."""
         return self.robot.length_m / self.repertoire.length_m
 
     def controller(self) -> SecondaryController:

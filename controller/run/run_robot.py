@@ -305,7 +305,7 @@ def drive(request: RunRequest, opened: OpenedRun) -> Outcome:
 def finish(request: RunRequest, opened: OpenedRun, outcome: Outcome, folder: Path) -> RunResult:
     """Read the log back, write the summary, and send the verdict to the observers."""
     log = folder / LOG
-    record = read_log(log, is_ours=True)
+    record = read_log(log, is_snakewalk_log=True)
     moved = travel(record)
     numbers = write_summary(summary(record, moved), folder)
     result = RunResult(

@@ -48,14 +48,14 @@ class LogError(InputError):
 def read_log(
     path: Path,
     *,
-    is_ours: bool = False,
+    is_snakewalk_log: bool = False,
     on_progress: Callable[[float, float], None] | None = None,
 ) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Args:
         path: the log.
-        is_ours: whether this process has written it, so that no limit of its expansion applies.
+        is_snakewalk_log: whether this process wrote it, so that no limit of expansion applies.
         on_progress: called with (bytes read, of) while it is read.
 
     Raises:
@@ -71,7 +71,7 @@ def read_log(
             if not start or not _MAGIC.startswith(start):  # a device without an end is not a log
                 raise LogError(f"{path}: is not an MCAP log")
             stream = file if file.seekable() else BytesIO(start + file.read())
-            return _record(path, stream, is_ours, on_progress)
+            return _record(path, stream, is_snakewalk_log, on_progress)
     except OSError as error:
         part = part_path(path)
         hint = f"; a run that was killed left {part}" if part.is_file() else ""
@@ -81,12 +81,12 @@ def read_log(
 def _record(
     path: Path,
     file: BinaryIO,
-    is_ours: bool,
+    is_snakewalk_log: bool,
     on_progress: Callable[[float, float], None] | None,
 ) -> RunRecord:
     """Return the record of an open log; only a chunk of it is in memory at once."""
     packer = RowPacker(_storage(path))
-    rows, last_s, complete, lost, fault = _rows(path, file, packer, is_ours, on_progress)
+    rows, last_s, complete, lost, fault = _rows(path, file, packer, is_snakewalk_log, on_progress)
     configs = rows[ConfigTable.topic.name]
     if not configs:
         if _whole_records(file)[1] and _crcs_agree(file) and not lost:
@@ -135,12 +135,12 @@ def _rows(
     path: Path,
     file: BinaryIO,
     packer: RowPacker,
-    is_ours: bool,
+    is_snakewalk_log: bool,
     on_progress: Callable[[float, float], None] | None,
 ) -> tuple[Rows, float, bool, int, str]:
     """Rows by topic, time of the last one, whether the file is whole, damaged parts, disk fault."""
     complete, unpacked, packed = _whole_records(file)
-    if not is_ours:
+    if not is_snakewalk_log:
         check_expansion(path, packed, unpacked, most_bytes=MOST_LOG_BYTES)
     complete = complete and _crcs_agree(file)
     rows: Rows = defaultdict(list)

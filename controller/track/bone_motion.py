@@ -67,7 +67,7 @@ def from_points(points_m: Floats, time_s: Floats) -> BoneMotion:
     return BoneMotion(time_s - time_s[0], points_m[:, :-1], rotation, np.median(length, axis=0))
 
 
-def swimming(gait: SpineGait, length_m: float, frames: int = CYCLE_FRAMES) -> BoneMotion:
+def swimming(gait: SpineGait, length_m: float) -> BoneMotion:
     """One cycle of a spine gait; the last frame repeats the first.
 
     [GC] ends its cycle at t = 1 s whatever omega is, so the body would jump. Here a cycle lasts 1 /
@@ -81,12 +81,14 @@ def swimming(gait: SpineGait, length_m: float, frames: int = CYCLE_FRAMES) -> Bo
     if p.frequency_hz <= 0.0:
         raise InputError(f"{gait.name}: a cycle needs a frequency above 0")
     u = np.linspace(0.0, TURN, 4 * SEGMENTS + 1)
-    side = offset(u, TURN * np.arange(frames + 1) / frames, p) * (-1.0 if p.mirror else 1.0)
-    points = np.empty((frames + 1, SEGMENTS + 1, 3))
+    side = offset(u, TURN * np.arange(CYCLE_FRAMES + 1) / CYCLE_FRAMES, p) * (
+        -1.0 if p.mirror else 1.0
+    )
+    points = np.empty((CYCLE_FRAMES + 1, SEGMENTS + 1, 3))
     for k, wave in enumerate(side):
         even = equal_arc_length(np.stack([-u, wave], axis=1))
         even *= length_m / np.hypot(*np.diff(even, axis=0).T).sum()
         flat = np.zeros(SEGMENTS + 1)
         x, y = even.T
         points[k] = np.stack([x, flat, y] if gait.vertical else [x, y, flat], axis=1)
-    return from_points(points, np.arange(frames + 1) / frames / p.frequency_hz)
+    return from_points(points, np.arange(CYCLE_FRAMES + 1) / CYCLE_FRAMES / p.frequency_hz)

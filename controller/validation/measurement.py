@@ -60,7 +60,7 @@ class PendulumMotion(Strict):
 
 
 class MotorMotion(Strict):
-    """One servo at full output: free, and blocked."""
+    """Test of a servo at full output, with a free and with a blocked shaft."""
 
     kind: Literal["motor"] = Field("motor", description="kind of the motion")
     supply_v: float = Field(gt=0.0, le=60.0, description="supply of the servo")

@@ -69,7 +69,7 @@ class _TriedPiece(NamedTuple):
 
     cost_m2: float
     progress: float
-    """Progress of the rollout over that at the wanted pulse without slip."""
+    """Progress of the rollout, divided by the progress at the wanted pulse without slip."""
     option: _Option
     bends: Floats
     """(2,) of the mean line over the first and second half body, relative to the limit."""

@@ -30,12 +30,8 @@ class SerpenoidParameters:
 class Serpenoid:
     """Appends short pieces of a travelling sine whose mean line turns towards the aim."""
 
-    def __init__(
-        self,
-        points: int,
-        parameters: SerpenoidParameters | None = None,
-    ) -> None:
-        self._p = parameters or SerpenoidParameters()
+    def __init__(self, points: int) -> None:
+        self._p = SerpenoidParameters()
         self._base_rad = 0.0
         self._at = points  # index of the wave's next sample
         self._points = points

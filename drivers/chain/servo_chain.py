@@ -30,8 +30,8 @@ from snakewalk.drivers.chain.start_up import (
     ServoSettings,
     check_pose,
     configure,
+    enable_replies,
     inspect,
-    let_reply,
     taken_over,
 )
 from snakewalk.drivers.chain.temperature_sensors import TemperatureSensors
@@ -167,7 +167,7 @@ class ServoChain:
             PortError: the port is gone.
 
         """
-        replies = let_reply(self._bus, self.robot)
+        replies = enable_replies(self._bus, self.robot)
         self.inspection = inspect(self._bus, self.robot, replies=replies)
         if self.inspection.faults:
             raise ChainError([str(fault) for fault in self.inspection.faults])

@@ -434,7 +434,7 @@ def _current_setting(
     return ChainSetting("Goal Current", goal)
 
 
-def let_reply(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
+def enable_replies(bus: ChainBus, robot: RobotConfig) -> dict[int, PingReply]:
     """Let servos reply to every instruction (Status Return Level(68)); return ping replies.
 
     At level 0 a servo replies to pings only, at level 1 to pings and reads; a Feetech servo replies

@@ -37,7 +37,7 @@ class PortHolder:
         return f"{self.program} (process {self.process}{other})"
 
     @property
-    def is_ours(self) -> bool:
+    def is_snakewalk(self) -> bool:
         """Whether the program is a snakewalk command."""
         return self.program.startswith(f"{_PROGRAM_NAME} ")
 

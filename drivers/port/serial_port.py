@@ -173,7 +173,7 @@ def open_fault(name: str, baud: int, error: Exception) -> str:
         return f"{name}: no permission; join the group that owns it (often 'dialout')"
     if number in _BUSY:
         holders = holders_of(name)
-        is_own = any(holder.is_ours for holder in holders)
+        is_own = any(holder.is_snakewalk for holder in holders)
         remedy = f"end it, a run by: snakewalk stop --port {name}" if is_own else "close it"
         text = ", ".join(map(str, holders))
         return f"{name}: another program has it open{text and ': '}{text}; {remedy}"

@@ -228,9 +228,9 @@ def _judge(  # noqa: C901  a compiled loop
         if valid[k]:
             error = goal_rad[k] - position_rad[k]
             sign = 1.0 if error > 0.0 else -1.0
-            towards_a = sign * current_a[k]
+            driving_current_a = sign * current_a[k]
             size = abs(error)
-            if size > rules[0, k] and towards_a < rules[1, k]:
+            if size > rules[0, k] and driving_current_a < rules[1, k]:
                 if np.isnan(memory[0, k]):
                     memory[0, k] = time_s
             else:
@@ -238,7 +238,7 @@ def _judge(  # noqa: C901  a compiled loop
             share = min(size * rules[2, k], 1.0)
             if share >= EVIDENT_OUTPUT:
                 expected_a = min(share * rules[3, k], rules[4, k])
-                if towards_a >= IDLE_SHARE * expected_a:
+                if driving_current_a >= IDLE_SHARE * expected_a:
                     memory[1, k] = 0.0
                 elif share >= IDLE_OUTPUT:
                     # the velocity sensor may be dead, so positions count too

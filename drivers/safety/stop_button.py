@@ -129,10 +129,10 @@ class StopButton:
         if info.st_size < _BYTES:
             return f"{self.path}: the stop file was truncated: nobody could stop this run"
         try:
-            is_there = os.path.samestat(info, os.stat(self.path, follow_symlinks=False))
+            is_same_file = os.path.samestat(info, os.stat(self.path, follow_symlinks=False))
         except OSError:
-            is_there = False
-        if not is_there:
+            is_same_file = False
+        if not is_same_file:
             return f"{self.path}: the stop file was deleted or moved: nobody could stop this run"
         return None
 

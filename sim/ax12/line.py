@@ -39,12 +39,8 @@ class Ax12Line(Wire):
         servos: Ax12Servos,
         clock: SimClock | None = None,
         baud: int = 1_000_000,
-        *,
-        usb_latency_s: float = 0.0,
     ) -> None:
-        super().__init__(
-            clock if clock is not None else SimClock(servos.plant.time_s), usb_latency_s
-        )
+        super().__init__(clock if clock is not None else SimClock(servos.plant.time_s))
         self.servos = servos
         self._reader = Reader1()
         self._muted, self._deaf = np.zeros((2, len(servos)), bool)

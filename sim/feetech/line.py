@@ -33,10 +33,8 @@ class FeetechLine(Ax12Line):
         servos: FeetechServos,
         clock: SimClock | None = None,
         baud: int = 1_000_000,
-        *,
-        usb_latency_s: float = 0.0,
     ) -> None:
-        super().__init__(servos, clock, baud, usb_latency_s=usb_latency_s)  # type: ignore[arg-type]
+        super().__init__(servos, clock, baud)  # type: ignore[arg-type]
         self.tamper: Tamper | None = None
         """Changes one reply on the wire: returns the packets that arrive instead, in order."""
 

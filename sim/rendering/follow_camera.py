@@ -19,7 +19,7 @@ waves."""
 DISTANCE_LENGTHS: Final = 1.2
 """Distance of the camera from the body, in lengths of the body."""
 UPRIGHT_LENGTHS: Final = 1.4
-"""The same for a body that stands on legs: head and horns are higher than the bones."""
+"""Distance of the camera from a body on legs, whose head and horns are above the bones."""
 ELEVATIONS_DEG: Final = (19.0, 26.0, 33.0, 40.0, 47.0, 54.0, 61.0, 68.0, 75.0, 82.0)
 """Heights of the camera above the horizon; the first one that sees the body is used."""
 LEVEL: Final = 33.0
@@ -27,7 +27,7 @@ LEVEL: Final = 33.0
 BEHIND_DEG: Final = (28.0, -28.0, 62.0, -62.0, 118.0, -118.0, 152.0, -152.0)
 """Directions of view from the heading, by preference: behind the body, to its side, before it."""
 BESIDE_DEG: Final = (118.0, -118.0, 62.0, -62.0, 152.0, -152.0, 28.0, -28.0)
-"""The same for a body that stands on legs: from behind, the hind legs hide the front legs."""
+"""Directions for a body on legs: from behind, the hind legs hide the front legs."""
 _RELUCTANCE_DEG: Final = 4.0
 """Decrease of mean elevation that justifies another direction."""
 _STRIDE: Final = 5

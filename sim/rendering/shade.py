@@ -26,7 +26,7 @@ _GRID = 48
 _DARKEST = 0.5
 """Share of the light that a soft shadow removes: about that of the sun (ours)."""
 _LAYER = 1.0 - (1.0 - _DARKEST) ** 0.5
-"""The same for one layer: MuJoCo draws a transparent skin twice, its back and its front."""
+"""Share for one layer: MuJoCo draws a transparent skin twice, its back and its front."""
 _TEXELS = 128
 _SOFT = 1.6
 """Standard deviation of the edge, texels."""

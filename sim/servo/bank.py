@@ -84,7 +84,6 @@ class ServoBank:
         ids: in the order of the chain.
         model: name, file or record; of all servos, or (S,) of each.
         baud: of all servos.
-        clashing: permits two servos with one ID.
 
     Raises:
         ControlTableError: a model cannot be simulated, two models have registers at different
@@ -97,8 +96,6 @@ class ServoBank:
         ids: Sequence[int],
         model: Model | Sequence[Model] = "XM430-W350",
         baud: int = 1_000_000,
-        *,
-        clashing: bool = False,
     ) -> None:
         self.ids = tuple(ids)
         self.baud = baud
@@ -116,7 +113,7 @@ class ServoBank:
             for servo_id in self.ids
             if not 0 <= servo_id <= 252
         ]
-        if len(set(self.ids)) != len(self.ids) and not clashing:
+        if len(set(self.ids)) != len(self.ids):
             faults.append(f"two servos share an ID: {', '.join(map(str, sorted(self.ids)))}")
         faults += [
             f"{baud} baud: {kind.layout.model} has {', '.join(map(str, kind.facts.bauds))}"

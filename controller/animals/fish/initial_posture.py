@@ -15,10 +15,10 @@ from snakewalk.controller.animals.fish.postures import midline_angles
 _NEIGHBOURS = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
 
 
-def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
+def rough_midline(mask: Bools) -> Floats | None:
     """Longest path through the skeleton of a mask: (P, 2), x right, y up, ends at the body's rim.
 
-    None where the mask holds no body of 8 pixels length. The mask is reduced to ``size_px`` first.
+    None where the mask holds no body of 8 pixels length. The mask is reduced to 120 pixels first.
     """
     rows, columns = np.nonzero(mask)
     if len(rows) < 8:
@@ -26,7 +26,7 @@ def rough_midline(mask: Bools, size_px: float = 120.0) -> Floats | None:
     top = int(rows.min())
     left = int(columns.min())
     part = mask[top : rows.max() + 1, left : columns.max() + 1].astype(np.uint8) * 255
-    scale = min(1.0, size_px / max(part.shape))
+    scale = min(1.0, 120.0 / max(part.shape))
     shape = (max(1, round(part.shape[1] * scale)), max(1, round(part.shape[0] * scale)))
     small = np.pad(cv2.resize(part, shape, interpolation=cv2.INTER_AREA) > 127, 2)
     bones = np.asarray(

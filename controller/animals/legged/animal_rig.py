@@ -23,7 +23,7 @@ _RING_CORNERS = 14
 _ROWS = 7
 """Rings of a bowed ornament between its ends."""
 _POINT = 0.15
-"""Radius of an ornament's tip over that of its root."""
+"""Radius of an ornament's tip, divided by the root's."""
 _PLAIN_UV = 0.3, 0.98
 """A place of the texture outside its bands."""
 _DARK_V = 0.5

@@ -27,7 +27,7 @@ _CAP = 1.5
 _IN_HOOF = 0.8
 """Share of the foot that is drawn above a hoof."""
 _TOES = ((0.45, -46.0), (0.68, -22.0), (0.86, -4.0), (1.0, 14.0), (0.62, 44.0))
-"""Length over that of the longest toe, and direction to the outer side in degrees (ours)."""
+"""Length of a toe, divided by the longest toe's, and outward direction in degrees (ours)."""
 
 Uv = tuple[float, float]
 Part = tuple[Mesh, Weights]

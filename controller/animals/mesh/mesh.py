@@ -16,7 +16,7 @@ AROUND = 32
 _CAP = 9  # rings of each tip
 
 
-def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
+def body_mesh(model: BodyModel, skeleton: Floats) -> Mesh:
     """Put the ellipses at the points of a skeleton (P, 2) in plan, in body lengths, head first.
 
     Raises:
@@ -34,7 +34,7 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     forward = np.stack([np.interp(s, even, forward[:, k]) for k in range(2)], axis=-1)
     forward /= np.hypot(*forward.T)[:, None]
     left = np.stack([-forward[:, 1], forward[:, 0]], axis=-1)
-    turn = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     # a ring of no size has no normals
     round_ = round_tips(model, s)
     wide = np.maximum(np.interp(s, even, model.half_width) * round_, 1e-5)[:, None]
@@ -44,10 +44,10 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     rings = np.concatenate([plan, z[..., None]], axis=-1).reshape(-1, 3)
     middle = np.stack([*place[[0, -1]].T, high[[0, -1], 0]], axis=-1)
     across = np.tile(0.5 + 0.5 * np.cos(turn), len(s))
-    along = np.repeat(s, around)
+    along = np.repeat(s, AROUND)
     uv = np.stack([along, across], axis=-1)
     vertices = np.concatenate([rings, middle]) * scale
-    faces = tube_faces(len(s), around)
+    faces = tube_faces(len(s), AROUND)
     return Mesh(
         vertices=vertices,
         normals=vertex_normals(vertices, faces),
@@ -56,22 +56,21 @@ def body_mesh(model: BodyModel, skeleton: Floats, around: int = AROUND) -> Mesh:
     )
 
 
-def picture_around(mesh: Mesh, around: int = AROUND) -> tuple[Mesh, Ints]:
+def picture_around(mesh: Mesh) -> tuple[Mesh, Ints]:
     """Fit a tube's places in the texture to a picture around the whole body.
 
     The picture begins and ends at the belly, where the corners are split.
 
     Args:
-        mesh: rings of ``around`` corners, from the left side over the back, then two tips.
-        around: a multiple of 4.
+        mesh: rings of ``AROUND`` corners, from the left side over the back, then two tips.
 
     Returns:
         The mesh, and (V,) the original corner of each of its corners.
 
     """
-    rings = len(mesh.vertices) // around
+    rings = len(mesh.vertices) // AROUND
     share = np.append(
-        np.tile((np.arange(around) / around + 0.25) % 1.0, rings), [0.5, 0.5]
+        np.tile((np.arange(AROUND) / AROUND + 0.25) % 1.0, rings), [0.5, 0.5]
     )  # 0 the belly, then the left side; the tips are on the back
     corner = share[mesh.faces]
     ends = (corner < 0.5) & (np.ptp(corner, axis=1) > 0.5)[:, None]

@@ -211,11 +211,13 @@ def _posture(angles_rad: Floats, how: Behaviour, frame: int) -> tuple[Floats, in
 
 def _serve(track: AngleTrack, place: float, grow: Grow | None, points_m: Floats) -> None:
     while place > track.end - 1:
-        had = track.end
+        track_end = track.end
         if grow is not None:
             grow(track, points_m)
-        if track.end == had:
-            raise ValueError(f"the track ends at sample {had - 1} and the head is at {place:.1f}")
+        if track.end == track_end:
+            raise ValueError(
+                f"the track ends at sample {track_end - 1} and the head is at {place:.1f}"
+            )
 
 
 _VALUES = readonly_array()

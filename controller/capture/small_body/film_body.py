@@ -164,7 +164,7 @@ def fit_frame(patch: Patch, start: Floats, body: FilmBody, rounds: int = 8) -> F
 
 
 def _correlation(residual: Floats, spot: float) -> float:
-    """Variance of the blurred residual over that of white noise of equal strength; at least 1."""
+    """Variance of the blurred residual, divided by equally strong white noise's; at least 1."""
     # of white noise a Gaussian leaves 1 / (4 pi spot^2); less blur than that of a pixel does not
     # count
     spot = max(spot, 0.8)

@@ -43,7 +43,7 @@ class LinkFigures:
     offset: float
     """Distance of the centre of mass from the middle over the length."""
     spread: float
-    """Inertia across the body over that of an even cylinder."""
+    """Inertia across the body, divided by an even cylinder's."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,7 @@ def walkthrough(
     if world is None or ground is None:
         show(shown, as_json)
         return
-    written = MapWorld.of(world, ground.field)
+    written = MapWorld.of(world, ground)
     written.write(
         [
             f"From {positions.name}, {len(walk_steps.models)} positions; "

@@ -1,6 +1,6 @@
 """Ground of a walk: heights and colours of all models, with holes at unseen ground."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -9,7 +9,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
-from snakewalk.controller.mapping.stereo_ground import CameraStand, fit_ground
+from snakewalk.controller.mapping.stereo_ground import fit_ground
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 _LEAST_POINTS: Final = 2
@@ -18,33 +18,21 @@ _HOLE: Final = (150, 150, 150)
 """Colour of unknown ground (ours)."""
 
 
-@dataclass(frozen=True, slots=True)
-class WalkGround:
-    """A map of the route, and the first camera's stand."""
-
-    field: HeightField
-    """Map of the ground; x is the first camera's direction of view, the origin is below this
-    camera."""
-    stand: CameraStand
-    fitted: bool
-    """Whether the stand was fitted to the points."""
-
-
 def walk_ground(
     walk: StereoWalk,
     spacing_m: float,
     error_m: float,
     fill_m: float,
-    stand: CameraStand | None = None,
-) -> WalkGround:
-    """Map the ground along a route.
+) -> HeightField:
+    """Map the ground along a route; x is the first camera's direction of view.
+
+    The origin is below this camera, whose stand is fitted to its points.
 
     Args:
         walk: models and poses of the positions.
         spacing_m: distance of samples.
         error_m: points with a larger expected error are dropped.
         fill_m: width of holes that count as known.
-        stand: of the first camera; None fits a plane to its points.
 
     Raises:
         InputError: no visible ground, or no point near enough for the error.
@@ -65,15 +53,13 @@ def walk_ground(
             f"the first position shows {len(points[0])} points with an error of at most "
             f"{error_m:g} m; raise --error, or record the pictures from nearer"
         )
-    fitted = stand is None
-    if stand is None:
-        stand = fit_ground(points[0], errors[0])
+    stand = fit_ground(points[0], errors[0])
     world = np.concatenate(points) @ stand.world_from_camera().T
     world[:, 2] += stand.height_m
     elevation_map = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
     field = elevation_map.height_field(fill_m)
     colour = _colours(elevation_map, world, np.concatenate(colours))
-    return WalkGround(replace(field, colour=colour), stand, fitted)
+    return replace(field, colour=colour)
 
 
 def _colours(elevation_map: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:

@@ -29,7 +29,7 @@ from snakewalk.controller.studies.shadow.shadow import Shadow
 
 Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
 NAMED_FROM: Final = 3.0
-"""Log of the evidence over that of a healthy robot from which on a cause is named (ours)."""
+"""Least log ratio of a cause's evidence to a healthy robot's for naming it (ours)."""
 _BIN_S: Final = 0.1
 """Angles and currents are averaged over this, so that their steps average out (ours)."""
 _CURRENT_STEP_A: Final = 2.69e-3
@@ -118,7 +118,7 @@ class NamedCause:
     at: int | None
     """Index of the joint, or of the loaded link; None for the ground."""
     evidence: float
-    """Log of its evidence over that of a healthy robot."""
+    """Log ratio of the cause's evidence to a healthy robot's."""
     values: tuple[float, ...]
     """Factors on friction along and across; kg; factor on torque; rad."""
 
@@ -170,7 +170,7 @@ class Diagnosis:
         )
 
     def evidence_over(self, cause: NamedCause) -> float:
-        """Log of the best cause's evidence over that of another."""
+        """Log ratio of the best cause's evidence to another's."""
         return self.causes[0].evidence - cause.evidence
 
     def to_dict(self, robot: RobotConfig) -> dict[str, object]:
@@ -367,14 +367,18 @@ class Signatures:
         work = partial(_answer, goals)
         columns: dict[int, Floats] = {}
         on_progress(0, count)
-        todo = range(count)
-        done = ((k, work(k)) for k in todo) if workers <= 1 else each(work, todo, workers=workers)
+        indices = range(count)
+        done = (
+            ((k, work(k)) for k in indices)
+            if workers <= 1
+            else each(work, indices, workers=workers)
+        )
         for k, answer in done:
             columns[k] = features(goals, answer) - self._plain
             on_progress(len(columns), count)
         # the delay of the host's goals is the last one; it is never a cause
         steps = np.append(constants.step, _DELAY_STEP_S)
-        self._effects = np.stack([columns[k] for k in todo], axis=1) / steps
+        self._effects = np.stack([columns[k] for k in indices], axis=1) / steps
         self._healthy = np.append(constants.healthy, _USUAL_DELAY_S)
 
     def diagnose(self, measured: Floats) -> Diagnosis:

@@ -90,7 +90,7 @@ class ShadowAlarm:
         self._cycles += 1
         if self._cycles < self.cycle_hz * _MEMORY_S:
             return ()
-        apart_a, apart_rad = np.sqrt(self._square)
+        difference_a, apart_rad = np.sqrt(self._square)
         over = (np.sqrt(self._square) / self.limits()).max(axis=0)
         joints_over = [
             int(j) for j in np.argsort(-over) if over[j] > 1.0 and int(j) not in self.named
@@ -98,7 +98,7 @@ class ShadowAlarm:
         self.named.update(joints_over)
         return tuple(
             f"{self.robot.joint_label(j)} differs from its shadow: its current by "
-            f"{apart_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
+            f"{difference_a[j]:.3f} A, its angle by {apart_rad[j]:.3f} rad (over the last seconds)"
             for j in joints_over
         )
 

@@ -120,7 +120,7 @@ class Keypoints:
 
 
 def zigzag(places: Floats) -> float:
-    """Length of the polyline through (T, K, 2) over that of the shortest tree; 1 along a body."""
+    """Length of the polyline through (T, K, 2), divided by the shortest tree's; 1: a body."""
     distance = np.hypot(*(places[:, :, None] - places[:, None]).transpose(3, 0, 1, 2))
     is_visible = np.isfinite(distance).any(axis=0)
     if not is_visible.all():

@@ -105,7 +105,7 @@ def test_a_full_disk_costs_the_rows_after_it_and_says_so(
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (8000, limits[1]))
     try:
-        record = read_log(path, is_ours=True)
+        record = read_log(path, is_snakewalk_log=True)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     assert 80 <= len(record.cycle.time_s) < 120
@@ -164,7 +164,7 @@ def test_a_log_longer_than_other_files_may_be_is_read(
     monkeypatch.setattr(reader, "MOST_LOG_BYTES", 1000)
     with pytest.raises(InputError, match=r"run\.mcap: its .* MB would expand to"):
         read_log(path)
-    assert len(read_log(path, is_ours=True).cycle.time_s) == 120
+    assert len(read_log(path, is_snakewalk_log=True).cycle.time_s) == 120
 
 
 def test_slow_rows_only_on_change(write: Write, tmp_path: Path) -> None:

@@ -182,7 +182,7 @@ def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=said):
             read_silhouettes(tmp_path / "bad.npz")
     lost = Silhouettes(np.full((2, 9, 2), np.nan), np.ones((2, 9)), None, pixels=True)
-    with pytest.raises(InputError, match="no frame holds"):
+    with pytest.raises(InputError, match="no frame contains"):
         body_model(lost)
 
 
