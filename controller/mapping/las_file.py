@@ -205,7 +205,7 @@ def _read(
         points = np.stack([np.asarray(getattr(chunk, axis), float) for axis in "xyz"], axis=-1)
         kinds = np.asarray(chunk.classification)
         kept_count += len(points)
-        held_back = np.asarray(chunk.withheld_count, dtype=bool)
+        held_back = np.asarray(chunk.withheld, dtype=bool)
         withheld_count += int(held_back.sum())
         inside = ~held_back & ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
         for kind, number in zip(*np.unique(kinds[inside], return_counts=True), strict=True):

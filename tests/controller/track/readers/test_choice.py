@@ -124,7 +124,7 @@ def test_the_animal_is_chosen_and_who_is_in_the_file_is_told(tmp_path: Path) -> 
             table.append(f"{who},{k}," + ",".join(f"{x!r},{y!r},0.9" for x, y in body.tolist()))
     (tmp_path / "sleap.csv").write_text("\n".join(table) + "\n")
     for name in ("two.csv", "two.slp", "two.wcon", "sleap.csv"):
-        with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): say --individual"):
+        with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): give --individual"):
             load_file(tmp_path / name)
         with pytest.raises(InputError, match=r"no such animal; in it are eel, other"):
             load_file(tmp_path / name, choice=Choice(individual="trout"))

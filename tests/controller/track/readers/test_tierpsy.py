@@ -55,7 +55,7 @@ def write(path: Path, *, is_features: bool, states: dict[str, Any] = STATES) -> 
 def test_both_files_of_tierpsy_give_the_body_in_metres(tmp_path: Path, is_features: bool) -> None:
     path = tmp_path / "worm.hdf5"
     write(path, is_features=is_features)
-    with pytest.raises(InputError, match=r"2 animals in it \(1, 2\): say --individual"):
+    with pytest.raises(InputError, match=r"2 animals in it \(1, 2\): give --individual"):
         load_file(path)
     track = load_file(path, choice=Choice(individual="2"))
     assert (track.frames, track.dropped, track.rate_hz) == (FRAMES - 1, 1, RATE_HZ)

@@ -127,7 +127,7 @@ def test_sleap_analysis(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "one.h5")
     assert same(load_file(tmp_path / "one.h5", 20.0)).dropped == 0
     sleap_h5(tmp_path / "two.h5", animals=2)
-    with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): say --individual"):
+    with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): give --individual"):
         load_file(tmp_path / "two.h5")
     with h5py.File(tmp_path / "one.h5", "a") as file:
         del file["tracks"]
@@ -175,7 +175,7 @@ def test_keypoints_in_another_order_than_along_the_body_are_told() -> None:
     mixed = sorted(NODES)  # p0, p1, p10, p2: as sleap-io orders the columns of its tables
     places = BODY[:, [NODES.index(name) for name in mixed]]
     found = Keypoints(Path("eel.csv"), mixed, places, None, RATE_HZ)
-    with pytest.raises(InputError, match=r"eel.csv: its keypoints do not lie.*say --keypoints"):
+    with pytest.raises(InputError, match=r"eel.csv: its keypoints do not lie.*give --keypoints"):
         found.track(ALL)
     same(found.track(Choice(keypoints=tuple(NODES))))
 
@@ -269,7 +269,7 @@ def test_faults_of_wcon_are_one_line(tmp_path: Path) -> None:
         (json.dumps(good | {"units": {"t": "s", "x": "mm"}}), "units: y must be given"),
         (json.dumps(good | {"units": {"t": "mm", "x": "mm", "y": "mm"}}), "t: expected a time"),
         (json.dumps(good | {"units": {"t": "s", "x": "mm", "y": "px"}}), "some are lengths"),
-        (json.dumps(two), r"2 animals in it \(1, 2\): say --individual"),
+        (json.dumps(two), r"2 animals in it \(1, 2\): give --individual"),
         (json.dumps(uneven), r"data\[3\]: expected id"),
         (json.dumps(good | {"data": []}), "2 or more times, found 0"),
         (json.dumps(good | {"data": [good["data"][0]] * 3}), "a time twice"),
