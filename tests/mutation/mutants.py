@@ -176,6 +176,6 @@ def _calls(node: ast.Call) -> Iterator[Edit]:
         yield lambda n: setattr(n.func, "id", _NAMES[n.func.id])
     if isinstance(function, ast.Attribute) and function.attr in _NAMES:
         yield lambda n: setattr(n.func, "attr", _NAMES[n.func.attr])
-    if isinstance(function, ast.Attribute) and function.attr == "clip":
+    if isinstance(function, ast.Attribute) and function.attr == "clip" and len(node.args) == 3:
         yield lambda n: n.args.__setitem__(1, ast.parse("-np.inf", mode="eval").body)
         yield lambda n: n.args.__setitem__(2, ast.parse("np.inf", mode="eval").body)
