@@ -2,18 +2,22 @@
 
 A few kilobytes of packed zeros can fill a robot's memory. The size that a file states is compared
 with its own size before unpacking, and no more is unpacked. A device has no end, so text is read up
-to a limit.
+to a limit. Files of gzip, bzip2 and xz are unpacked, whatever their names are.
 """
 
+import bz2
+import gzip
+import io
 import json
+import lzma
 import math
 import re
 import struct
 import zipfile
 import zlib
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any, Final
 
 from snakewalk.config.errors import InputError
 
@@ -35,6 +39,13 @@ MOST_JSON_BYTES: Final = 64_000_000
 """Largest size of a JSON file that is read at once (ours)."""
 MOST_STORAGE_BYTES: Final = 1_000_000
 """Largest size of a calibration file (ours)."""
+_PIECE_BYTES: Final = 1_000_000
+_PACKED: Final[dict[bytes, Callable[..., Any]]] = {
+    b"\x1f\x8b": gzip.open,
+    b"BZh": bz2.open,
+    b"\xfd7zXZ\x00": lzma.open,
+}
+"""First bytes of compressed files, and what unpacks them."""
 _DEEPEST_NESTING, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
 _NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
 _ENDS: Final = ("]", "}", "</", "/>")
@@ -70,22 +81,45 @@ def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:
 
     """
     size = file.stat().st_size  # 0 for a device or a pipe
-    most_bytes = most_bytes if size else min(most_bytes, FREE_BYTES)
-    data = read_head(file, min(most_bytes, size or most_bytes) + 1)
+    most_bytes = min(most_bytes, max(FREE_BYTES, MOST_RATIO * size))
+    data = read_head(file, most_bytes + 1)
     if len(data) > most_bytes:
         raise InputError(f"{file}: is larger than the {most_bytes / 1e6:g} MB that are read of it")
     return data
 
 
 def read_head(file: Path, count: int) -> bytes:
-    """First bytes of a file, at most ``count``.
+    """First bytes of a file, at most ``count``; of its contents if it is compressed.
 
     Raises:
+        InputError: it is compressed, and damaged.
         OSError: it cannot be read.
 
     """
     with file.open("rb") as stream:
-        return stream.read(count)
+        start = stream.peek(1)
+        unpack = next((opener for mark, opener in _PACKED.items() if start.startswith(mark)), None)
+        if unpack is None:
+            return _first_bytes(stream, count)
+        try:
+            with unpack(stream) as unpacked:
+                return _first_bytes(unpacked, count)
+        except (*DAMAGE, lzma.LZMAError, OSError):
+            raise InputError(f"{file}: is compressed, and damaged; copy it again") from None
+
+
+def _first_bytes(stream: IO[bytes], count: int) -> bytes:
+    """Bytes in pieces: one read would reserve all of ``count``."""
+    data = io.BytesIO()
+    while piece := stream.read(min(_PIECE_BYTES, count - data.tell())):
+        data.write(piece)
+    return data.getvalue()
+
+
+def ending(file: Path) -> str:
+    """Ending of a file's name in lower case, without that of its compression."""
+    name = file.with_suffix("") if file.suffix.lower() in (".gz", ".bz2", ".xz") else file
+    return name.suffix.lower()
 
 
 def read_text(file: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:

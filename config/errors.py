@@ -5,7 +5,7 @@ with code 2. ``Assumptions`` has the answers to questions about a file.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
 
@@ -34,24 +34,11 @@ class Assumptions:
     for the output.
     """
 
-    def __init__(self, given: Iterable[str] = ()) -> None:
-        """Read ``KEY=VALUE`` words.
-
-        Raises:
-            InputError: a word has another form, or a key is repeated.
-
-        """
-        self._values: dict[str, str] = {}
+    def __init__(self, given: Mapping[str, str] | None = None) -> None:
+        self._values = dict(given or {})
         self._used: dict[str, str] = {}
         self._answered = set[str]()
         self._questions: dict[str, tuple[str, float]] = {}
-        for word in given:
-            key, sign, value = word.partition("=")
-            if not (key.strip() and sign and value.strip()):
-                raise InputError(f"--assume {word}: must be KEY=VALUE")
-            if key.strip() in self._values:
-                raise InputError(f"--assume {word}: {key.strip()} is given twice")
-            self._values[key.strip()] = value.strip()
 
     def given(self, key: str, low: float, high: float) -> float | None:
         """Value of a key as a number within limits, or None.

@@ -7,11 +7,32 @@ from pydantic import BeforeValidator, Field
 from snakewalk.config.base import Strict
 
 
+class JointRequest(Strict):
+    """Facts that a file of joint angles may not state, and parts of it to use."""
+
+    joints: dict[str, str] = Field(
+        {},
+        description="joint of the file that moves a joint of the robot; `rest` keeps it at 0",
+    )
+    unit: Literal["rad", "deg"] | None = Field(
+        None, description="unit of joint angles if the file states none: rad or deg"
+    )
+    time_unit: Literal["s", "ms", "us", "ns"] | None = Field(
+        None, description="unit of times if a table states none: s, ms, us or ns"
+    )
+    topic: str | None = Field(
+        None, description="topic of a bag that has several topics of joint angles"
+    )
+    episode: int | None = Field(
+        None, ge=0, description="number of the episode of a LeRobot dataset, from 0"
+    )
+
+
 def _number_or_auto(given: object) -> object:
     return None if given == "auto" else given
 
 
-class PlaybackConfig(Strict):
+class PlaybackConfig(JointRequest):
     """A recording in place of a walk; the file is the run's ``track``."""
 
     speed: Annotated[float | None, BeforeValidator(_number_or_auto)] = Field(
@@ -29,20 +50,4 @@ class PlaybackConfig(Strict):
     )
     clip: bool = Field(
         False, description="hold joints at their limits where the recording bends further"
-    )
-    joints: dict[str, str] = Field(
-        {},
-        description="joint of the file that moves a joint of the robot; `rest` keeps it at 0",
-    )
-    unit: Literal["rad", "deg"] | None = Field(
-        None, description="unit of joint angles if the file states none: rad or deg"
-    )
-    time_unit: Literal["s", "ms", "us", "ns"] | None = Field(
-        None, description="unit of times if a table states none: s, ms, us or ns"
-    )
-    topic: str | None = Field(
-        None, description="topic of a bag that has several topics of joint angles"
-    )
-    episode: int | None = Field(
-        None, ge=0, description="number of the episode of a LeRobot dataset, from 0"
     )

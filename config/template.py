@@ -16,7 +16,6 @@ from snakewalk.config.document import (
     value_kind,
 )
 from snakewalk.config.field_facts import description_of
-from snakewalk.config.robot import RobotConfig
 
 _COLUMN: Final = 42
 """Column in which the description behind a key begins."""
@@ -110,10 +109,10 @@ def _line(key: str, value: Any, field: FieldInfo, is_given: bool) -> str:
     return f"{left:<{_COLUMN}} # {'; '.join(word for word in words if word)}"
 
 
-def robot_toml(robot: RobotConfig, comment: str = "") -> str:
-    """Text of a robot's file without default values, with a head ``comment``."""
+def plain_toml(model: BaseModel, comment: str = "") -> str:
+    """Text of a file without default values, with a head ``comment``."""
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
-    lines += _plain_table(robot.model_dump(exclude_defaults=True), "")
+    lines += _plain_table(model.model_dump(exclude_defaults=True), "")
     return "\n".join(lines) + "\n"
 
 
@@ -122,7 +121,8 @@ def _plain_table(data: Mapping[str, Any], place: str) -> Iterator[str]:
     rows = {key: value for key, value in data.items() if _is_rows(value)}
     for key, value in data.items():
         if key not in tables and key not in rows and value is not None:
-            yield f"{key} = {toml_value(value)}"
+            name = key if re.fullmatch("[A-Za-z0-9_-]+", key) else toml_value(key)
+            yield f"{name} = {toml_value(value)}"
     for key, table in tables.items():
         where = f"{place}.{key}".removeprefix(".")
         yield from ("", f"[{where}]", *_plain_table(table, where))

@@ -5,6 +5,9 @@ from typing import Final
 UNITS: Final = {
     "_rad_cycle": "rad per cycle",
     "_body_lengths_cycle": "body lengths per cycle",
+    "_rad_per_body_length": "rad per body length",
+    "_body_lengths_s": "body lengths/s",
+    "_body_lengths": "body lengths",
     "_rad_s2": "rad/s²",
     "_m_s2": "m/s²",
     "_rad_s": "rad/s",

@@ -272,17 +272,15 @@ class ShoreGround(Water):
         return self.model_copy(update={"slope_rad": slope_rad, **heights})
 
 
-class PoleObstacle(Strict):
-    """A round pole to climb."""
+class _RoundObstacle(Strict):
+    """A round obstacle along a line."""
 
-    kind: Literal["pole"] = "pole"
-    radius_m: float = Field(gt=0.005, le=1.0, description="radius of the pole")
-    length_m: float = Field(3.0, gt=0.1, le=50.0, description="length of the pole")
+    radius_m: float = Field(gt=0.005, le=1.0, description="radius of the obstacle")
+    at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of the obstacle's middle")
     upright: bool = Field(
         True,
         description="whether the obstacle rises from the floor; otherwise it lies along x above",
     )
-    at_m: tuple[float, float] = Field((0.5, 0.0), description="x and y of the obstacle's middle")
     friction: float = Field(
         0.8,
         gt=0.0,
@@ -291,31 +289,24 @@ class PoleObstacle(Strict):
     )
 
     def is_blocked_at(self, x_m: float, y_m: float) -> bool:
-        """Whether no body can be at this place of the floor."""
+        """Whether no body can be at this place of the floor: nothing enters a pipe from outside."""
         return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
 
-class PipeObstacle(Strict):
+class PoleObstacle(_RoundObstacle):
+    """A round pole to climb."""
+
+    kind: Literal["pole"] = "pole"
+    length_m: float = Field(3.0, gt=0.1, le=50.0, description="length of the pole")
+
+
+class PipeObstacle(_RoundObstacle):
     """A round pipe to climb or creep through inside; the body starts in its middle."""
 
     kind: Literal["pipe"] = "pipe"
     radius_m: float = Field(gt=0.02, le=1.0, description="inner radius of the pipe")
     length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the pipe")
-    upright: bool = Field(
-        True,
-        description="whether the obstacle rises from the floor; otherwise it lies along x above",
-    )
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
-    friction: float = Field(
-        0.8,
-        gt=0.0,
-        le=5.0,
-        description="friction coefficient of the obstacle, equal in all directions",
-    )
-
-    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
-        """Whether this place is unreachable: nothing enters the pipe from outside."""
-        return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
 
 
 class PegsObstacle(Strict):

@@ -7,7 +7,7 @@ from itertools import cycle
 
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.bench.scan import ScanResult, scan
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.start_up import ServoReport, read_report
@@ -111,7 +111,7 @@ def robot_skeleton(
     ]
     described = {"name": name, "servo": servo, "joints": joints}
     robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)
-    return robot_toml(
+    return plain_toml(
         robot,
         f"{len(chain)} servos as snakewalk bus inventory found them. Not known, and assumed:\n"
         "- the order: by ID from the head; snakewalk bus calibrate finds it, and signs and zeros;\n"

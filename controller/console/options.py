@@ -96,10 +96,6 @@ RunName = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="print the result as JSON")]
-Assume = Annotated[
-    list[str] | None,
-    typer.Option(help="KEY=VALUE: a value that the file does not state; may be repeated"),
-]
 Workers = Annotated[int, typer.Option(min=1, help="number of processes")]
 Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="number of runs per row of the table")]
 RunSeconds = Annotated[

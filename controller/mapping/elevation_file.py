@@ -1,18 +1,26 @@
 """Elevation map in the robot's world from a file of real ground."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from snakewalk.config.archive import ending
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.reading import Fact, Facts, store, with_stored
 from snakewalk.controller.mapping.geo_raster import read_geo_raster
 from snakewalk.controller.mapping.las_file import in_metres, read_las
-from snakewalk.controller.mapping.length_units import DEGREE, unit_m
+from snakewalk.controller.mapping.length_units import (
+    DEGREE,
+    UNSTATED_HEIGHTS,
+    UNSTATED_UNIT,
+    unit_m,
+)
 from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
 from snakewalk.controller.mapping.point_units import points_in_metres
@@ -20,11 +28,11 @@ from snakewalk.controller.mapping.raster_file import (
     GEO_RASTERS,
     RASTERS,
     Crop,
+    ElevationChoice,
     Raster,
-    RasterUnits,
     read_plain_raster,
 )
-from snakewalk.controller.terrain.elevation_map import CellHeight, ElevationMap
+from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 LOWEST_M: Final = -430.0
 """Height of the lowest dry land: the shore of the Dead Sea, which sinks by a metre a year."""
@@ -99,6 +107,7 @@ def _question(finite: Floats, value: float, per_value_m: float, why: str, key: s
     )
 
 
+_UNSTATED: Final = (UNSTATED_UNIT, UNSTATED_HEIGHTS)
 _FEW_SHARE: Final = 0.2
 """Share of points that may be outliers (ours)."""
 _SAME_PLACE: Final = 1e-7
@@ -116,8 +125,6 @@ _STACKED_SHARE, _STACKED_RELIEF, _STACKED_POINTS = 0.2, 0.5, 3
 """Share of the points, in cells with some of them, that lie one above the other by a share of the
 relief: beyond it a cloud is not seen from above (ours)."""
 _FEW_CELLS: Final = 10
-AXES: Final = ("z", "y", "x", "-z", "-y", "-x")
-"""Choices of the axis that points up."""
 _TURNS: Final = {
     "z": ((0, 1, 2), (1.0, 1.0, 1.0)), "-z": ((0, 1, 2), (1.0, -1.0, -1.0)),
     "y": ((0, 2, 1), (1.0, -1.0, 1.0)), "-y": ((0, 2, 1), (1.0, 1.0, -1.0)),
@@ -132,7 +139,7 @@ _MESH_SAMPLES: Final = 200
 class MapOptions:
     """Options of a map from a file."""
 
-    units: RasterUnits = field(default_factory=RasterUnits)
+    choice: ElevationChoice = field(default_factory=ElevationChoice)
     """Facts that the file does not state."""
     crop: Crop | None = None
     """Metres from the south-west corner of the file; None: all of it."""
@@ -142,15 +149,8 @@ class MapOptions:
     """Factor on the heights; None: as ``scale``."""
     spacing_m: float | None = None
     """Distance between samples in the robot's world; None: as in the file, scaled."""
-    height: CellHeight | None = None
-    """Which of the points in a cell counts; None: the median, of a cloud seen from above."""
-    up: str | None = None
-    """Axis of a mesh's or cloud's file that points up, of ``AXES``; None: z, if nothing else is
-    likely."""
-    classes: tuple[int, ...] | None = None
-    """Classes of the points of a laser scanner that count; None: the ground's."""
     assumed: Assumptions = field(default_factory=Assumptions)
-    """Facts that the file does not state, besides units."""
+    """Values of ``choice.assume``, and which of them were used."""
 
     @property
     def rise(self) -> float:
@@ -169,6 +169,8 @@ class FileMap:
     """Highest less lowest of that part, in metres of the file."""
     kind: str
     """Content of the file: raster, points or triangles."""
+    facts: Facts
+    """Quantity, unit and order of the values."""
     notes: tuple[str, ...] = ()
     """Parts that were used, changed or left out."""
 
@@ -181,38 +183,43 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
         OSError: the file cannot be opened.
 
     """
-    elevation_file = _read(file, options)
+    choice, lines = with_stored(file, options.choice)
+    assumed = Assumptions(choice.assume)
+    elevation_file = _read(file, replace(options, choice=choice, assumed=assumed))
+    assumed.check_used("keys: lowest_m, highest_m")
     size_m = (max(elevation_file.elevation.z_m.shape) - 1) * elevation_file.elevation.spacing_m
     if size_m > _MOST_SIZE_M:
         raise InputError(
             f"{file}: a map of {size_m:.3g} m at a scale of {options.scale:g}; the most is "
             f"{_MOST_SIZE_M:g} m: a smaller --scale, or --crop a part"
         )
-    return elevation_file
+    if choice.remember:
+        store(file, choice)
+    return replace(elevation_file, notes=(*lines, *elevation_file.notes, *assumed.lines))
 
 
 def _read(file: Path, options: MapOptions) -> FileMap:
-    ending = file.suffix.lower()
-    if ending not in ENDINGS:
+    kind = ending(file)
+    if kind not in ENDINGS:
         raise InputError(f"{file}: ends in none of {' '.join(ENDINGS)}")
-    if ending in (*CLOUDS, *MESHES):
+    if kind in (*CLOUDS, *MESHES):
         return _solid(file, options)
-    if ending == ".csv":
+    if kind == ".csv":
         notes: list[str] = []
         names: list[str] = []
         table = read_numbers(file, notes, names)
         if table.shape[1] == 3:
-            points_m = points_in_metres(file, table, names, options.units, notes)
-            return _of_points(file, _upright(points_m, options), None, options, notes)
-    if ending in GEO_RASTERS:
+            points_m = points_in_metres(file, table, names, options.choice, notes)
+            return _of_points(file, _upright(file, points_m, options), None, options, notes)
+    if kind in GEO_RASTERS:
 
         def spacing_of(dx_m: float, dy_m: float) -> float:
             least = min(dx_m, dy_m)
             return least if options.spacing_m is None else options.spacing_m / options.scale
 
-        raster = read_geo_raster(file, options.units, options.crop, spacing_of)
+        raster = read_geo_raster(file, options.choice, options.crop, spacing_of)
     else:
-        raster = read_plain_raster(file, options.units, options.crop)
+        raster = read_plain_raster(file, options.choice, options.crop)
     return _of_raster(file, raster, options)
 
 
@@ -225,7 +232,22 @@ def _of_raster(file: Path, raster: Raster, options: MapOptions) -> FileMap:
     _check_heights(file, raster.z_m, raster.per_value_m, options)
     elevation = ElevationMap.of_raster(raster.z_m * rise, dx_m, dy_m, spacing_m)
     size_m = (columns - 1) * raster.dx_m, (rows - 1) * raster.dy_m
-    return FileMap(elevation.centred(), size_m, _relief(raster.z_m), "raster", raster.notes)
+    facts = _facts("raster", "rows from the north", options.choice, raster.notes)
+    relief_m = _relief(raster.z_m)
+    return FileMap(elevation.centred(), size_m, relief_m, "raster", facts, raster.notes)
+
+
+def _facts(kind: str, order: str, choice: ElevationChoice, notes: Sequence[str]) -> Facts:
+    stated = Fact("as stated", "file", "its format, coordinate system or columns")
+    unit = Fact(choice.unit or "m", "user", "--unit, --cell")
+    assumed = [Fact("m", "inferred", note) for note in notes if note in _UNSTATED]
+    return {
+        "quantity": Fact(f"heights ({kind})", "file", "its format"),
+        "unit": unit if choice.unit or choice.cell else [*assumed, stated][0],
+        "order": Fact(
+            order, "user" if choice.up else "file", "--up" if choice.up else "its format"
+        ),
+    }
 
 
 def _check_heights(file: Path, z_m: Floats, per_value_m: float, options: MapOptions) -> None:
@@ -236,25 +258,25 @@ def _check_heights(file: Path, z_m: Floats, per_value_m: float, options: MapOpti
 
 
 def _solid(file: Path, options: MapOptions) -> FileMap:
-    ending = file.suffix.lower()
+    kind = ending(file)
     faces = None
     notes: list[str] = []
     names: list[str] = []
-    if ending in LASERS:
+    if kind in LASERS:
         return _of_laser(file, options)
-    if ending == ".pcd":
+    if kind == ".pcd":
         cloud = read_pcd(file)
         points = cloud.points
-        if cloud.image is not None and options.up is None:
+        if cloud.image is not None and options.choice.up is None:
             raise InputError(
                 f"{file}: is a depth picture of {cloud.image[0]} by {cloud.image[1]} points "
                 "without a direction up; add --up -y if y points down in the picture, or --up "
                 "z if it is upright"
             )
         notes += cloud.notes
-    elif ending == ".xyz":
+    elif kind == ".xyz":
         points = read_numbers(file, notes, names)[:, :3]
-    elif ending == ".ply":
+    elif kind == ".ply":
         points, faces = read_ply(file)
     else:
         require_extra("meshes need", "trimesh")
@@ -263,27 +285,37 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         mesh = read_mesh(file, "+x", "+z").mesh
         points = mesh.vertices
         faces = mesh.faces
-    points_m = points_in_metres(file, points, names, options.units, notes)
-    return _of_points(file, _upright(points_m, options), faces, options, notes)
+    points_m = points_in_metres(file, points, names, options.choice, notes)
+    return _of_points(file, _upright(file, points_m, options), faces, options, notes)
 
 
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
-    units = options.units
-    laser_points = read_las(file, options.classes, options.crop, units.unit)
-    points_m, notes = in_metres(file, laser_points, units.unit, units.height_unit)
+    choice = options.choice
+    laser_points = read_las(file, choice.classes, options.crop, choice.unit)
+    points_m, notes = in_metres(file, laser_points, choice.unit, choice.height_unit)
     left = replace(options, crop=None) if laser_points.cropped else options
     return _of_points(file, points_m, None, left, [*laser_points.notes, *notes])
 
 
-def _upright(points_m: Floats, options: MapOptions) -> Floats:
+def _up(file: Path, choice: ElevationChoice) -> str:
+    """Axis that points up: glTF defines y."""
+    return choice.up or ("y" if ending(file) == ".glb" else "z")
+
+
+def _upright(file: Path, points_m: Floats, options: MapOptions) -> Floats:
     """Points (n, 3) in metres, z up."""
-    order, signs = _TURNS[options.up or "z"]
+    order, signs = _TURNS[_up(file, options.choice)]
     return np.ascontiguousarray(points_m[:, order] * signs)
 
 
 def _of_points(
-    file: Path, points_m: Floats, faces: Ints | None, options: MapOptions, notes: list[str]
+    file: Path,
+    points_m: Floats,
+    faces: Ints | None,
+    options: MapOptions,
+    notes: list[str],
 ) -> FileMap:
+    choice = options.choice
     if faces is None:
         finite = np.isfinite(points_m).all(axis=1)
         if not finite.all():
@@ -291,7 +323,7 @@ def _of_points(
             points_m = points_m[finite]
     if len(points_m) == 0:
         raise InputError(f"{file}: holds no point")
-    if faces is None and options.classes is None:
+    if faces is None and choice.classes is None:
         points_m = _without_outliers(file, points_m, options.assumed, notes)
     _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
     placed, low, high = _cropped_points(file, points_m, options.crop, is_mesh=faces is not None)
@@ -306,15 +338,16 @@ def _of_points(
     rise = options.rise
     scaled = placed * [options.scale, options.scale, rise]
     if faces is None:
-        if options.height is None and options.up is None:
+        if choice.point is None and choice.up is None:
             _check_seen_from_above(file, scaled, spacing_m)
-        elevation = ElevationMap.of_points(scaled, spacing_m, options.height or "median")
+        elevation = ElevationMap.of_points(scaled, spacing_m, choice.point or "median")
     else:
         corners = options.scale * low, options.scale * high
         elevation = ElevationMap.of_triangles(scaled, faces, *corners, spacing_m)
     relief_m = _relief(elevation.z_m) / rise
     whole_m = float(size[0]), float(size[1])
-    return FileMap(elevation.centred(), whole_m, relief_m, kind, tuple(notes))
+    facts = _facts(kind, f"{_up(file, choice)} up", choice, notes)
+    return FileMap(elevation.centred(), whole_m, relief_m, kind, facts, tuple(notes))
 
 
 def _usual_step(file: Path, placed_m: Floats, size_m: Floats, faces: Ints | None) -> float:
@@ -436,7 +469,7 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
 
 
 def _height_unit(options: MapOptions) -> str:
-    units = options.units
+    units = options.choice
     named = units.height_unit or units.unit or "m"
     return "m" if named == DEGREE else named
 

@@ -3,6 +3,7 @@
 Large files are read in strips, with the median of the heights per sample.
 """
 
+import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,12 +12,15 @@ from typing import Any, Final
 
 import numpy as np
 
+from snakewalk.config.archive import ending, read_bytes
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import MOST_SAMPLES
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
+    UNSTATED_HEIGHTS,
+    UNSTATED_UNIT,
     degree_cell_m,
     ground_lengths,
     named_unit,
@@ -26,8 +30,8 @@ from snakewalk.controller.mapping.length_units import (
 )
 from snakewalk.controller.mapping.raster_file import (
     Crop,
+    ElevationChoice,
     Raster,
-    RasterUnits,
     raster_window,
 )
 
@@ -49,7 +53,7 @@ _DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
 
 def read_geo_raster(
     file: Path,
-    units: RasterUnits,
+    units: ElevationChoice,
     crop: Crop | None,
     spacing_of: Callable[[float, float], float] | None = None,
 ) -> Raster:
@@ -70,13 +74,14 @@ def read_geo_raster(
     require_extra("GeoTIFF and ASCII grid need", "rasterio")
     import rasterio  # noqa: PLC0415  an extra
 
-    driver = "AAIGrid" if file.suffix.lower() == ".asc" else "GTiff"
+    driver = "AAIGrid" if ending(file) == ".asc" else "GTiff"
+    is_packed = ending(file) != file.suffix.lower()
     with file.open("rb"):  # reports a fault of the system as such
-        pass
+        source = io.BytesIO(read_bytes(file)) if is_packed else file.absolute()
     try:
         with (
             rasterio.Env(GTIFF_REPORT_COMPD_CS=True, GDAL_CACHEMAX=_CACHE_BYTES),
-            rasterio.open(file.absolute(), driver=driver) as opened,
+            rasterio.open(source, driver=driver) as opened,
         ):
             return _read(file, opened, units, crop, spacing_of)
     except (rasterio.errors.RasterioError, ValueError) as error:
@@ -96,7 +101,7 @@ class _Cells:
 def _read(
     file: Path,
     opened: Any,
-    units: RasterUnits,
+    units: ElevationChoice,
     crop: Crop | None,
     spacing_of: Callable[[float, float], float] | None,
 ) -> Raster:
@@ -153,6 +158,8 @@ def _read(
     if absent:
         notes.append(f"{absent} cells hold no height")
     upright = z[::-1] if turn.e < 0.0 else z
+    if opened.crs is None and units.unit is None:
+        notes.append(UNSTATED_UNIT)
     return Raster(np.ascontiguousarray(upright), dx_m, dy_m, tuple(notes), per_unit)
 
 
@@ -275,7 +282,7 @@ def _is_part_of_a_degree(cell: float) -> bool:
 
 
 def _height_unit(
-    file: Path, opened: Any, units: RasterUnits, horizontal: str
+    file: Path, opened: Any, units: ElevationChoice, horizontal: str
 ) -> tuple[str, list[str]]:
     """Unit of heights: by the user, the band, or the vertical part of the system.
 
@@ -307,14 +314,14 @@ def _height_unit(
             f"heights are in {stated}, as it states"
         ]
     if horizontal in (DEGREE, "m"):
-        return "m", ["the file states no unit of heights: metres"]
+        return "m", [UNSTATED_HEIGHTS]
     raise InputError(
         f"{file}: its cells are in {horizontal}, and it states no unit of heights: add "
         f"--height-unit {horizontal} (or --height-unit m)"
     )
 
 
-def _band_scale(opened: Any, units: RasterUnits) -> tuple[float, float, list[str]]:
+def _band_scale(opened: Any, units: ElevationChoice) -> tuple[float, float, list[str]]:
     """Factor and offset of the band's values; --height-step replaces them."""
     scale = float(opened.scales[0])
     offset = float(opened.offsets[0])

@@ -18,6 +18,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.child_process import run_code
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
+    UNSTATED_HEIGHTS,
     VERTICAL_PART,
     WKT_UNIT,
     degree_cell_m,
@@ -296,7 +297,7 @@ def _system(text_or_number: str | int) -> Any:
 def in_metres(
     file: Path, las_points: LasPoints, unit: str | None, height_unit: str | None
 ) -> tuple[Floats, list[str]]:
-    """Points in metres.
+    """Points in metres, and notes.
 
     Raises:
         InputError: the unit is unknown (the question).
@@ -317,7 +318,7 @@ def in_metres(
             )
         up = "m" if plane == DEGREE else plane
         if unit is None:
-            notes.append("the file states no unit of heights: metres")
+            notes.append(UNSTATED_HEIGHTS)
     elif height_unit is None and up != "m":
         notes.append(f"heights are in {up}, as the file states")
     points = las_points.points

@@ -19,6 +19,8 @@ UNITS_M: Final = {
 }
 """Metres per unit of length, by the names that options accept."""
 DEGREE: Final = "deg"
+UNSTATED_UNIT: Final = "the file states no unit of lengths: metres; --unit states another"
+UNSTATED_HEIGHTS: Final = "the file states no unit of heights: metres"
 _SPELLINGS: Final = {
     "m": ("m", "metre", "meter", "metres", "meters"),
     "cm": ("cm", "centimetre", "centimeter", "centimetres", "centimeters"),

@@ -9,8 +9,13 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.mapping.length_units import DEGREE, degree_cell_m, unit_m
-from snakewalk.controller.mapping.raster_file import RasterUnits
+from snakewalk.controller.mapping.length_units import (
+    DEGREE,
+    UNSTATED_UNIT,
+    degree_cell_m,
+    unit_m,
+)
+from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 _LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
 _LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
@@ -21,9 +26,9 @@ _FAR_EXTENTS: Final = 20.0
 
 
 def points_in_metres(
-    file: Path, points: Floats, names: Sequence[str], units: RasterUnits, notes: list[str]
+    file: Path, points: Floats, names: Sequence[str], units: ElevationChoice, notes: list[str]
 ) -> Floats:
-    """Return points (n, 3) in metres; longitude and latitude become metres east and north.
+    """Return points (n, 3) in metres; degrees become metres east and north.
 
     Args:
         file: for errors.
@@ -50,6 +55,7 @@ def points_in_metres(
     if unit is None:
         _ask(file, points)
         unit = "m"
+        notes.append(UNSTATED_UNIT)
     rise_m = unit_m(units.height_unit or ("m" if unit == DEGREE else unit))
     if unit != DEGREE:
         return points * [unit_m(unit), unit_m(unit), rise_m]

@@ -7,14 +7,17 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
-from snakewalk.config.archive import check_expansion, read_arrays, read_bytes
+from snakewalk.config.archive import check_expansion, ending, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.reading import LISTED, Answers
+from snakewalk.controller.console.option import Flag
 from snakewalk.controller.mapping.length_units import DEGREE, unit_m
 from snakewalk.controller.mapping.number_table import read_numbers
 
@@ -42,24 +45,51 @@ class Raster:
     """Metres of a step of one in the file's values."""
 
 
-@dataclass(frozen=True, slots=True)
-class RasterUnits:
-    """Facts about a file's numbers that it may omit."""
-
-    unit: str | None = None
-    """Unit of lengths: of ``UNITS_M``, or deg (then heights are metres); None: as the file
-    states."""
-    cell: float | None = None
-    """Distance between samples, in the unit; None: as the file says."""
-    height_step: float | None = None
-    """Height of a step of one of the file's values, in the unit; needed of pictures."""
-    no_data: float | None = None
-    """Value of empty cells, in addition to the file's own."""
-    height_unit: str | None = None
-    """Unit of heights, a name in ``UNITS_M``; None: the file's, or else ``unit``."""
+_Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
+SMALLEST: Final = 1e-6
+LARGEST: Final = 1e6
+"""Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 
 
-def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Raster:
+class ElevationChoice(Answers):
+    """Facts that a file of elevations may not state, and parts of it to use."""
+
+    unit: Literal[_Length, "deg"] | None = Field(
+        None, description="unit of the file; default: as it states"
+    )
+    height_unit: _Length | None = Field(
+        None,
+        description="unit of the file's heights; default: as it states, else as its lengths if "
+        "metric",
+    )
+    cell: float | None = Field(
+        None,
+        ge=SMALLEST,
+        le=LARGEST,
+        description="distance between samples of a PNG, CSV or NPZ, in the file's unit",
+    )
+    height_step: float | None = Field(
+        None,
+        ge=SMALLEST,
+        le=LARGEST,
+        description="height per step of the file's values, in the file's unit",
+    )
+    no_data: float | None = Field(None, description="value of empty cells, such as -9999")
+    point: Literal["lowest", "median", "highest"] | None = Field(
+        None, description="point of a cell that counts; default: median"
+    )
+    up: Literal["z", "y", "x", "-z", "-y", "-x"] | None = Field(
+        None, description="axis of a mesh or cloud that points up; default: z, of a GLB y"
+    )
+    classes: Annotated[tuple[Annotated[int, Field(ge=0, le=255)], ...] | None, LISTED] = Field(
+        None, description="classes of LAS points, such as 2,9; default: ground, else all but noise"
+    )
+    assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
+        {}, description="KEY=VALUE: a value that the file does not state; may be repeated"
+    )
+
+
+def read_plain_raster(file: Path, units: ElevationChoice, crop: Crop | None) -> Raster:
     """Read a PNG, a CSV or an NPZ, or its part within a crop.
 
     Raises:
@@ -68,13 +98,13 @@ def read_plain_raster(file: Path, units: RasterUnits, crop: Crop | None) -> Rast
         OSError: the file cannot be opened.
 
     """
-    ending = file.suffix.lower()
+    kind = ending(file)
     notes: list[str] = []
-    if ending == ".csv":
+    if kind == ".csv":
         values = read_numbers(file, notes)
     else:
-        values = _picture(file) if ending == ".png" else _array(file)
-    if ending == ".png" and units.height_step is None:
+        values = _picture(file) if kind == ".png" else _array(file)
+    if kind == ".png" and units.height_step is None:
         raise InputError(
             f"{file}: a picture states no heights; give --height-step, the height of one grey level"
         )

@@ -17,6 +17,8 @@ from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, read_ar
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import Fact, Facts
+from snakewalk.controller.mapping.length_units import unit_m
 
 _NAMES: Final = {
     "k_left": ("K1", "M1", "cameraMatrix1", "camera_matrix_left", "K_left"),
@@ -29,6 +31,8 @@ _NAMES: Final = {
 """Names that people use for the results of ``stereoCalibrate``."""
 _OPTIONAL: Final = ("distortion_left", "distortion_right")
 _MOST_BYTES: Final = 1_000_000
+_MOST_BASELINE_M: Final = 5.0
+"""Distance of the cameras above which the unit of a calibration is wrong (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +49,8 @@ class StereoCalibration:
     """(3, 3) of the right camera."""
     translation_m: Floats
     """(3,) of the right camera; its x is below 0."""
+    facts: Facts
+    """Quantity, unit and order of the values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +82,8 @@ class RectifiedPair:
         return np.stack([x, y, self.focal_px * per_px], axis=-1) @ self.turned
 
 
-def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
-    """Read a calibration by its ending; ``unit_m`` is metres per unit of the translation.
+def read_calibration(file: Path, unit: str = "m") -> StereoCalibration:
+    """Read a calibration by its ending; ``unit`` is that of the translation.
 
     Accepts files of OpenCV (.yml, .yaml, .xml, .json), .json with plain lists and .npz with the
     same names, and calib.txt of the Middlebury pairs, whose baseline is in millimetres.
@@ -91,7 +97,7 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
         raise InputError(f"{file}: is too large for a calibration")
     ending = file.suffix.lower()
     if ending == ".txt":
-        return _checked_calibration(file, _middlebury(file), 1.0)
+        return _checked_calibration(file, _middlebury(file), Fact("m", "file", "calib.txt"))
     if ending in (".yml", ".yaml", ".xml", ".json"):
         storage = _storage(file)
     elif ending == ".npz":
@@ -110,7 +116,9 @@ def read_calibration(file: Path, unit_m: float = 1.0) -> StereoCalibration:
             )
             raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
         matrices[key] = np.zeros(5) if name is None else storage[name]
-    return _checked_calibration(file, matrices, unit_m)
+    default = unit == "m"
+    source = Fact(unit, "inferred" if default else "user", f"{'default of ' * default}--unit")
+    return _checked_calibration(file, matrices, source)
 
 
 def _storage(file: Path) -> dict[str, Any]:
@@ -183,10 +191,8 @@ def _numbers(file: Path, matrices: Mapping[str, Any], unit_m: float) -> dict[str
     return values
 
 
-def _checked_calibration(
-    file: Path, matrices: Mapping[str, Any], unit_m: float
-) -> StereoCalibration:
-    values = _numbers(file, matrices, unit_m)
+def _checked_calibration(file: Path, matrices: Mapping[str, Any], unit: Fact) -> StereoCalibration:
+    values = _numbers(file, matrices, unit_m(unit.value))
     rotation = values["rotation"]
     translation = values["translation"]
     for key in ("k_left", "k_right"):
@@ -200,6 +206,17 @@ def _checked_calibration(
             f"{file}: T is ({shown}): the second camera must stand to the right of the first "
             "(x below 0, in OpenCV's order); if it stands to the left, exchange the cameras"
         )
+    baseline_m = float(np.linalg.norm(translation))
+    if baseline_m > _MOST_BASELINE_M:
+        raise InputError(
+            f"{file}: states no unit of T, and in {unit.value} its cameras stand {baseline_m:.4g} "
+            "m apart; give --unit mm (or cm)"
+        )
+    facts: Facts = {
+        "quantity": Fact("calibration of two cameras", "file", "its names of matrices"),
+        "unit": unit,
+        "order": Fact("left, then right", "file", "the sign of T"),
+    }
     return StereoCalibration(
         values["k_left"],
         values["distortion_left"],
@@ -207,6 +224,7 @@ def _checked_calibration(
         values["distortion_right"],
         rotation,
         translation,
+        facts,
     )
 
 

@@ -5,7 +5,7 @@ A reader is a plug-in of the kind ``joints`` (``docs/how-to/add-a-plug-in.md``).
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -13,6 +13,8 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.playback import JointRequest
+from snakewalk.config.reading import Fact, Facts
 from snakewalk.config.robot import RobotConfig
 
 UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0}
@@ -31,20 +33,6 @@ _STEPS_S: Final = (0.0005, 0.5)
 
 
 @dataclass(frozen=True, slots=True)
-class JointRequest:
-    """Choices of the user that a file may not state."""
-
-    unit: str | None = None
-    """Unit of the angles, one of ``UNITS``."""
-    time_unit: str | None = None
-    """Unit of the times, one of ``TIME_UNITS``."""
-    topic: str | None = None
-    """Topic of a bag."""
-    episode: int | None = None
-    """Episode of a dataset."""
-
-
-@dataclass(frozen=True, slots=True)
 class JointMotion:
     """Named joint angles over time."""
 
@@ -54,6 +42,8 @@ class JointMotion:
     """Names of the K joints of the file."""
     joint_rad: Floats
     """(T, K) joint angles, rad; NaN where a value is missing."""
+    facts: Facts
+    """Quantity, unit, order and time base of the values."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out, changed or assumed."""
 
@@ -75,15 +65,15 @@ class JointReader(Protocol):
         ...
 
 
-def radians(where: str, angles: Floats, unit: str | None, hint: str) -> Floats:
-    """Return angles in radians.
+def radians(where: str, angles: Floats, unit: Fact | None, hint: str) -> tuple[Floats, Fact]:
+    """Return angles in radians, and the fact of their unit in the file.
 
     Raises:
         InputError: neither the file nor the user states their unit; proposes the likely one.
 
     """
     if unit is not None:
-        return angles * UNITS[unit]
+        return angles * UNITS[unit.value], unit
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
     likely = "deg" if largest > 2.0 * np.pi else "rad"
     raise InputError(
@@ -92,8 +82,8 @@ def radians(where: str, angles: Floats, unit: str | None, hint: str) -> Floats:
     )
 
 
-def second(path: Path, time: Floats, column: str, unit: str | None) -> float:
-    """Return the size in seconds of the unit of times (T,), which may not be stated.
+def time_unit(path: Path, time: Floats, column: str, unit: Fact | None) -> Fact:
+    """Return the unit of times (T,), one of ``TIME_UNITS``, which may not be stated.
 
     Seconds are assumed if no other unit gives steps that a recording of motion has.
 
@@ -102,13 +92,13 @@ def second(path: Path, time: Floats, column: str, unit: str | None) -> float:
 
     """
     if unit is not None:
-        return TIME_UNITS[unit]
+        return unit
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if len(steps) else 0.01
     least_s, most_s = _STEPS_S
     possible = [unit for unit, size in TIME_UNITS.items() if least_s <= step * size <= most_s]
     if possible in ([], ["s"]):
-        return 1.0
+        return Fact("s", "inferred", "no other unit is possible")
     length = float(np.nanmax(time) - np.nanmin(time))
     readings = " or ".join(
         f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz (--time-unit {unit})"
@@ -124,8 +114,11 @@ def joint_motion(
     names: Sequence[str],
     joint_rad: Floats,
     notes: Sequence[str] = (),
+    *,
+    unit: Fact,
+    time: Fact,
 ) -> JointMotion:
-    """Check angles (T, K) of a reader; NaN is a missing value.
+    """Check angles (T, K) of a reader; NaN is a missing value. ``unit`` and ``time`` are facts.
 
     Raises:
         InputError: too many angles, repeated names, or times that do not increase.
@@ -141,7 +134,13 @@ def joint_motion(
     if not (step_s > 0.0).all():
         last_s = time_s[has_time][int(np.argmax(step_s <= 0.0))]
         raise InputError(f"{path}: time must increase, in seconds; it does not after {last_s:g} s")
-    return JointMotion(time_s, tuple(names), joint_rad, tuple(notes))
+    facts: Facts = {
+        "quantity": Fact("joint angles", "file", "its format"),
+        "unit": unit,
+        "order": Fact("by names", "file", ", ".join(names)),
+        "time": time,
+    }
+    return JointMotion(time_s, tuple(names), joint_rad, facts, tuple(notes))
 
 
 def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion:
@@ -168,7 +167,12 @@ def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion
             f"{missing} rows are missing in {int((step_s > 1.5 * usual_s).sum())} gaps of up to "
             f"{float(step_s.max()):.3g} s"
         )
-    return JointMotion(time_s - time_s[0], motion.names, joint_rad[is_complete], tuple(lines))
+    return replace(
+        motion,
+        time_s=time_s - time_s[0],
+        joint_rad=joint_rad[is_complete],
+        notes=tuple(lines),
+    )
 
 
 def _by_stem(names: Sequence[str]) -> dict[str, list[str]]:

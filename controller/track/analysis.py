@@ -1,12 +1,13 @@
 """The animal's motion in numbers: wave, pulse speed, sliding, amplitudes, energy in the state."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import texts
 from snakewalk.controller.shape.states import StateRange, energy_kept, state_range, to_states
 from snakewalk.controller.track.pulse_speed import NEIGHBOURS, PulseSpeed, measure_pulse_speed
 from snakewalk.controller.track.track import Track
@@ -24,6 +25,7 @@ TARGET_SHIFT = 4.0
 COEFFICIENTS = 7
 LEAST_TRAVEL = 0.2
 """Share of the pulse speed: recorded animals that go somewhere lie at 0.7 or more."""
+_SLIPS: Final = "w_d below 0: the body slips; the wave runs back faster than the head advances"
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,8 @@ class Analysis:
             "rate_hz": round(track.rate_hz, 3),
             "rate_assumed": track.rate_assumed,
             "times_uneven": track.uneven,
-            "notes": list(track.notes),
+            "facts": texts(track.facts),
+            "notes": [*track.notes, *([_SLIPS] if (self.sliding or 0.0) < 0.0 else [])],
             "length_m": None if track.length_m is None else round(track.length_m, 6),
             "frequency_hz": of_wave(wave.frequency_hz),
             "waves_on_body": of_wave(wave.waves),

@@ -4,24 +4,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import Field
 
-from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import LISTED, Answers
 
 FEWEST: Final = 4
 """Points for a curve."""
 PLANES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-"""Planes onto which markers in space are projected: the axis to the right, and the one upwards."""
+"""Planes onto which markers in space are projected: the axis to the right, and the one upwards.
+
+A plane is seen from the positive end of the third axis, so that no body is mirrored: z points
+downwards in ``xz``.
+"""
 
 
-NAMES: Final = BeforeValidator(
-    lambda given: [name.strip() for name in given.split(",")] if isinstance(given, str) else given
-)
-"""Rule that reads names from words: A,B,C."""
-
-
-class AnimalChoice(Strict):
+class AnimalChoice(Answers):
     """Facts that a file of keypoints may not state, and the animal to use."""
 
     rate: float | None = Field(
@@ -39,14 +37,16 @@ class AnimalChoice(Strict):
         None, description="name of the animal to use from a file of several animals"
     )
     plane: Literal["xy", "xz", "yz"] | None = Field(
-        None, description="plane of markers in space; default: xy"
+        None,
+        description="plane of markers in space, seen from the positive end of the third axis; "
+        "default: across the axis that points up",
     )
 
 
 class Choice(AnimalChoice):
     """Facts that a file of tracks may not state, and parts of it to use."""
 
-    keypoints: Annotated[tuple[str, ...] | None, NAMES] = Field(
+    keypoints: Annotated[tuple[str, ...] | None, LISTED] = Field(
         None,
         description="A,B,C: names along the midline, head first; default: all, as listed",
     )

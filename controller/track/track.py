@@ -1,13 +1,14 @@
 """A recording of a moving body: midlines over time, and the tangent angles of 100 segments."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import Facts
 from snakewalk.controller.track.frame_runs import (
     common_step,
     is_mostly_every_nth,
@@ -56,6 +57,8 @@ class Track:
     places_recorded: bool = True
     """Whether the points of different frames share one origin; not of images cropped to the animal,
     nor of a camera that moves: they contain no travel."""
+    facts: Facts = field(default_factory=dict)
+    """Quantity, unit, order and time base of a file's values."""
     head_sure: float | None = None
     """Certainty that the first point is the head, 0 to 1; None where the file does not say."""
 

@@ -9,7 +9,7 @@ import pytest
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.loader import checked, load_robot
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from tests.helpers.uneven import UNEVEN, spelt_out
 
 OWN = """
@@ -143,7 +143,7 @@ def test_a_chain_says_what_each_link_is() -> None:
     ends_m = np.array(UNEVEN.link_ends) * UNEVEN.mean_link_length_m
     np.testing.assert_allclose(np.diff(ends_m), UNEVEN.link_lengths_m, atol=1e-12)
     assert UNEVEN.radii_m(3) == (0.04, 0.04, 0.02)
-    read = checked(RobotConfig, tomllib.loads(robot_toml(UNEVEN)), "uneven.toml")
+    read = checked(RobotConfig, tomllib.loads(plain_toml(UNEVEN)), "uneven.toml")
     assert read == UNEVEN
 
 

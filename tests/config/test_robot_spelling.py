@@ -9,7 +9,7 @@ import pytest
 from snakewalk.config.loader import digest, load_robot, shipped, with_keys
 from snakewalk.config.robot import BellyConfig, JointConfig, LinkConfig, RobotConfig
 from snakewalk.config.robot.keys import READ_INSTEAD
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from tests.helpers.uneven import UNEVEN
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,7 +90,7 @@ def test_the_two_files_are_one_robot() -> None:
     assert spelt == scalar
     assert spelt.model_dump_json() == scalar.model_dump_json()
     assert digest(spelt) == digest(scalar)
-    assert robot_toml(spelt) == robot_toml(scalar)
+    assert plain_toml(spelt) == plain_toml(scalar)
     assert spelt.link_lengths_m == (0.03,) * 17
     longer = [with_keys(robot, {"link_length_m": 0.05}, "--set") for robot in (scalar, spelt)]
     assert longer[0] == longer[1]

@@ -12,7 +12,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.joint_names import joint_label
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.bench.calibration import chain_calibration
 from snakewalk.controller.bench.calibration.progress import ProgressFile, SeenBend
 from snakewalk.controller.bench.eeprom_backup import back_up, backup_text
@@ -110,7 +110,7 @@ def calibrate(
             journal=journal,
         )
         described = outcome.robot if baud is None else _at_baud(outcome.robot, baud)
-        _write(out, robot_toml(described, heading))
+        _write(out, plain_toml(described, heading))
         if backup is not None:
             bus = servo_bus(line, described.models_by_id, latency_s=line.latency_s)
             described, homing = _with_homing(bus, described, out, heading, backup, yes)
@@ -161,7 +161,7 @@ def _with_homing(
         described = without_zeros(described)
         there = "The zeros are in the servos, in Homing Offset."
         with homing_written(bus, offsets):
-            _write(out, robot_toml(described, f"{heading}\n{there}"))
+            _write(out, plain_toml(described, f"{heading}\n{there}"))
     after = {str(offset.servo_id): offset.after for offset in offsets}
     return described, {
         "backup": str(backup),

@@ -5,10 +5,11 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.errors import Assumptions, InputError
-from snakewalk.config.template import robot_toml
+from snakewalk.config.errors import InputError
+from snakewalk.config.reading import texts
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Assume, Force, Json, console, show
+from snakewalk.controller.console.options import Force, Json, console, show
 from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.exchange.robot_import import robot_import
 
@@ -27,31 +28,19 @@ def import_robot(
     servo: Annotated[
         str, typer.Option(help="model of all servos; such files do not contain it")
     ] = ("XM430-W350"),
-    scale: Annotated[
-        float, typer.Option(help="factor on lengths; its cube is the factor on masses")
-    ] = 1.0,
-    reverse: Annotated[bool, typer.Option(help="the first body of the model is the tail")] = False,
-    assume: Assume = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: robot_import.RobotChoice,
 ) -> None:
     """Make a robot's file from a URDF, SDF or MuJoCo model; report dropped and changed parts."""
     if out.suffix != ".toml":
         raise InputError(f"{out}: a robot's file ends in .toml")
-    if not 1e-3 <= scale <= 1e3:
-        raise InputError(f"--scale {scale:g}: 0.001 to 1000")
-    imported = robot_import.import_robot(
-        file,
-        out.stem,
-        servo,
-        scale=scale,
-        reverse=reverse,
-        assumed=Assumptions(assume or ()),
-    )
+    imported = robot_import.import_robot(file, out.stem, servo, choice)
     joints = ", ".join(imported.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]
     comment += [f"- {note}" for note in imported.notes]
-    write_result(out, robot_toml(imported.robot, "\n".join(comment)))
+    write_result(out, plain_toml(imported.robot, "\n".join(comment)))
     facts: dict[str, object] = {
         "robot": str(out),
         "joints": imported.robot.joint_count,
@@ -59,6 +48,7 @@ def import_robot(
         "length_m": round(imported.robot.length_m, 4),
         "mass_kg": round(imported.robot.mass_kg, 4),
         "kinematics_error_m": imported.kinematics_error_m,
+        "facts": texts(imported.facts),
     }
     show(facts | ({"notes": list(imported.notes)} if as_json else {}), as_json)
     for note in () if as_json else imported.notes:

@@ -4,16 +4,18 @@ import re
 from pathlib import Path
 from typing import Final
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.playback import JointRequest
+from snakewalk.config.reading import stated
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
+    TIME_UNITS,
+    UNITS,
     JointMotion,
-    JointRequest,
     joint_motion,
     radians,
-    second,
+    time_unit,
 )
 
 _TIME: Final = re.compile("(?:time|t|timestamp)(?:_(s|ms|us|ns))?|(s)econds")
@@ -44,51 +46,38 @@ class JointTable:
         first, *rows = (row for row in read_rows(path, "CSV") if any(row))
         cells = [cell.strip() for cell in first]
         names = []
-        units = set[str]()
+        units = []
         for cell in cells[1:]:
             matched = _UNIT.match(cell)
             names.append((matched[1] if matched else cell).strip() or cell)
-            units.add("?" if matched is None else matched[2].lower()[:3])
+            units.append("?" if matched is None else matched[2].lower()[:3])
         for line, row in enumerate(rows, start=2):
             if any(row[len(cells) :]):
                 raise InputError(
                     f"{path}: line {line}: {len(row)} cells, the first line names {len(cells)}"
                 )
         values = numbers_of(path, rows, cells, range(2, len(rows) + 2))
-        unit = _unit_of(path, units, request)
-        angles = radians(
-            f"{path}:", values[:, 1:], unit, "or end the names of columns in _rad or _deg"
-        )
-        time_s = values[:, 0] * _time_unit_s(path, cells[0], request, values[:, 0])
-        return joint_motion(path, time_s, names, angles)
-
-
-def _time_unit_s(path: Path, column: str, request: JointRequest, time: Floats) -> float:
-    """Return the size in seconds of the unit that the column of time or the user states."""
-    stated = _TIME.fullmatch(_plain_name(column))
-    unit = None if stated is None else stated[1] or stated[2]
-    if unit is not None and request.time_unit not in (None, unit):
-        raise InputError(
-            f"--time-unit {request.time_unit}: {path} states {unit}; leave the option out"
-        )
-    return second(path, time, column, unit or request.time_unit)
+        kinds = dict.fromkeys(units)
+        if "?" in kinds and len(kinds) > 1:
+            raise InputError(
+                f"{path}: column {cells[1 + units.index('?')]} states no unit of angles, and "
+                "others do; end its name in _rad or _deg"
+            )
+        by_names = None if "?" in kinds else " and ".join(kinds)
+        unit = stated(path, "--unit", by_names, request.unit)
+        if by_names is None or unit is None:
+            hint = "or end the names of columns in _rad or _deg"
+            angles, unit = radians(f"{path}:", values[:, 1:], unit, hint)
+        else:
+            angles = values[:, 1:] * [UNITS[kind] for kind in units]
+        match = _TIME.fullmatch(_plain_name(cells[0]))
+        by_name = None if match is None else match[1] or match[2]
+        time = stated(path, "--time-unit", by_name, request.time_unit)
+        time = time_unit(path, values[:, 0], cells[0], time)
+        time_s = values[:, 0] * TIME_UNITS[time.value]
+        return joint_motion(path, time_s, names, angles, unit=unit, time=time)
 
 
 def _plain_name(name: str) -> str:
     """Return a column's name in lower case, ``time [s]`` as ``time_s``."""
     return re.sub(r"[\s_]*[\[(](\w+)[\])]", r"_\1", name.strip().lower())
-
-
-def _unit_of(path: Path, stated: set[str], request: JointRequest) -> str | None:
-    """Return the unit that all columns state, or that the user gives.
-
-    Raises:
-        InputError: both state one.
-
-    """
-    if len(stated) != 1 or "?" in stated:
-        return request.unit
-    (unit,) = stated
-    if request.unit not in (None, unit):
-        raise InputError(f"--unit {request.unit}: {path} states {unit}; leave the option out")
-    return unit

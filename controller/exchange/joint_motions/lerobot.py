@@ -14,11 +14,12 @@ from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
+from snakewalk.config.playback import JointRequest
+from snakewalk.config.reading import Fact, stated
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     MOST_CELLS,
     JointMotion,
-    JointRequest,
     joint_motion,
     radians,
 )
@@ -57,16 +58,24 @@ class LeRobotEpisode:
             names = [f"{feature}.{k}" for k in range(values.shape[1])]
         if len(names) != values.shape[1]:
             raise InputError(f"{path}: {feature}: {len(names)} names of {values.shape[1]} values")
-        angles = radians(
+        angles, unit = radians(
             f"{path}: {feature}",
             values,
-            request.unit,
+            stated(path, "--unit", None, request.unit),
             "motors normalized to -100..100 are not angles",
         )
         if not np.isfinite(time_s).all():
             time_s = np.arange(len(values)) / rate_hz
         notes = [f"episode {episode} of {episodes}, {feature}, LeRobot {version}"]
-        return joint_motion(path, time_s, names, angles, notes)
+        return joint_motion(
+            path,
+            time_s,
+            names,
+            angles,
+            notes,
+            unit=unit,
+            time=Fact("s", "file", f"timestamp, {rate_hz:g} Hz"),
+        )
 
 
 def _episode(path: Path, request: JointRequest, episodes: int) -> int:

@@ -10,11 +10,12 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
+from snakewalk.config.playback import JointRequest
+from snakewalk.config.reading import Fact
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     MOST_CELLS,
     JointMotion,
-    JointRequest,
     joint_motion,
 )
 from snakewalk.controller.motion.parted_recording import gaps
@@ -139,7 +140,16 @@ def motion_of_rows(path: Path, topic: str, rows: Iterator[Row]) -> JointMotion:
     if others:
         notes.append(f"other messages have {', '.join(others)}: interpolated to these times")
     columns = [_values_at(time, np.array(sorted(angles.items()))) for angles in by_joint.values()]
-    return joint_motion(path, time, list(by_joint), np.stack(columns, axis=1), notes)
+    message = "the definition of its messages"
+    return joint_motion(
+        path,
+        time,
+        list(by_joint),
+        np.stack(columns, axis=1),
+        notes,
+        unit=Fact("rad", "file", message),
+        time=Fact("s", "file", message),
+    )
 
 
 def _values_at(time: Floats, rows: Floats) -> Floats:

@@ -9,16 +9,19 @@ changes no motion.
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import mujoco
 import numpy as np
+from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
+from snakewalk.config.reading import Answers, Fact, Facts, store, with_stored
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_catalogue import servo_model as known_model
+from snakewalk.controller.console.option import Flag
 from snakewalk.controller.exchange.robot_import.body_tree import (
     BodyTree,
     Hinge,
@@ -56,6 +59,23 @@ _RADIUS_M = (0.002, 0.5)
 """Range that a robot file accepts for a link."""
 
 
+class RobotChoice(Answers):
+    """Facts that a model may not state."""
+
+    scale: float = Field(1.0, ge=1e-3, le=1e3, description="factor on lengths")
+    mass_scale: float | None = Field(
+        None,
+        ge=1e-9,
+        le=1e9,
+        description="factor on masses; default: the cube of --scale; 1 for a model in millimetres "
+        "and kilograms",
+    )
+    reverse: bool = Field(False, description="the first body of the model is the tail")
+    assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
+        {}, description="KEY=VALUE: a value that the model does not state; may be repeated"
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class ImportedRobot:
     """A robot that was read from a model of another program."""
@@ -65,6 +85,8 @@ class ImportedRobot:
     """Names of the joints in the model, in the order of the servos' IDs."""
     notes: tuple[str, ...]
     """Parts that were dropped, changed or assumed."""
+    facts: Facts
+    """Quantity, unit and order of the values."""
     kinematics_error_m: float
     """Largest distance of a joint's axis from the model's, in random poses within the ranges."""
 
@@ -73,10 +95,7 @@ def import_robot(
     path: Path,
     name: str,
     servo_model: str,
-    *,
-    scale: float = 1.0,
-    reverse: bool = False,
-    assumed: Assumptions | None = None,
+    choice: RobotChoice | None = None,
 ) -> ImportedRobot:
     """Read a robot; its joints get the IDs 1, 2, 3 ... from the head.
 
@@ -84,19 +103,18 @@ def import_robot(
         path: ``.xml`` (MJCF), ``.urdf``, ``.xacro`` or ``.sdf``.
         name: of the robot.
         servo_model: of all joints; a model knows no servos.
-        scale: lengths are multiplied by it, masses by its third power.
-        reverse: the model's first body is the tail.
-        assumed: values that the model does not state.
+        choice: facts that the model may not state.
 
     Raises:
         InputError: the file is not a model, lacks a necessary value, or contains something that a
             robot's file cannot express.
 
     """
-    assumed = Assumptions() if assumed is None else assumed
+    choice, lines = with_stored(path, RobotChoice() if choice is None else choice)
+    assumed = Assumptions(choice.assume)
     try:
         model, source = load_model(path, assumed)
-        imported = _read(model, source, name, servo_model, scale, reverse, assumed)
+        imported = _read(model, source, name, servo_model, choice, assumed)
         assumed.check_used(
             "keys: LINK.length_m, LINK.mass_kg, MESH.mass_kg, JOINT.limit_rad, radius_m"
         )
@@ -105,7 +123,9 @@ def import_robot(
     except InputError as error:
         named = [f"{path}: {fault.removeprefix(f'{path}: ')}" for fault in error.faults]
         raise InputError(named) from None
-    return imported
+    if choice.remember:
+        store(path, choice)
+    return replace(imported, notes=(*lines, *imported.notes))
 
 
 def _read(
@@ -113,11 +133,12 @@ def _read(
     source: ModelSource,
     name: str,
     servo_model: str,
-    scale: float,
-    reverse: bool,
+    choice: RobotChoice,
     assumed: Assumptions,
 ) -> ImportedRobot:
     """``import_robot`` of a model that is compiled."""
+    scale, reverse = choice.scale, choice.reverse
+    masses = scale**3 if choice.mass_scale is None else choice.mass_scale
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     notes = list(source.notes)
@@ -135,14 +156,38 @@ def _read(
     ]
     legs = leg_pairs(model, data, tree, directions, figures.joints_m, figures.links, notes)
     joints = _joints(model, tree, directions, reverse, notes, assumed)
-    _check_size(figures.links, tree.names, scale)
-    keys = _keys(name, servo_model, scale, figures.links, directions.yaws, joints, legs)
+    links = [
+        replace(
+            link,
+            length_m=scale * link.length_m,
+            mass_kg=masses * link.mass_kg,
+            radius_m=scale * link.radius_m,
+        )
+        for link in figures.links
+    ]
+    _check_size(links, tree.names)
+    keys = _keys(name, servo_model, links, joints, legs)
+    if legs:
+        keys["limbs"] = [_limb_keys(pair, scale, masses) for pair in legs]
+        keys["joint_axes"] = "".join("y" if yaw else "p" for yaw in directions.yaws)
     keys |= _plan_limits(source, {hinge.name for hinge in tree.hinges}, servo_model, notes)
     robot = checked(RobotConfig, keys, name)
     worst_m = _kinematics_error_m(model, robot, tree.hinges, directions, scale, reverse=reverse)
     hinges = [*tree.hinges, *(hinge for pair in legs for hinge in pair.hinges)]
     notes += assumed.lines
-    return ImportedRobot(robot, tuple(hinge.name for hinge in hinges), tuple(notes), worst_m)
+    factors = f"lengths in {scale:g} m, masses in {masses:.4g} kg, angles in rad"
+    is_scaled = scale != 1.0 or choice.mass_scale is not None
+    facts: Facts = {
+        "quantity": Fact("robot model", "file", "its format"),
+        "unit": Fact(factors, "user", "--scale, --mass-scale")
+        if is_scaled
+        else Fact(factors, "file", "its format"),
+        "order": Fact("tail first", "user", "--reverse")
+        if reverse
+        else Fact("head first", "inferred", "its first body; --reverse states the other end"),
+    }
+    names = tuple(hinge.name for hinge in hinges)
+    return ImportedRobot(robot, names, tuple(notes), facts, worst_m)
 
 
 def _reversed_tree(tree: BodyTree) -> BodyTree:
@@ -171,7 +216,7 @@ def _wheel_notes(friction: list[float], tree: BodyTree) -> list[str]:
     ]
 
 
-def _check_size(links: list[LinkFigures], names: list[str], scale: float) -> None:
+def _check_size(links: list[LinkFigures], names: list[str]) -> None:
     """Reject what is not of the size of servos, by the model's own names.
 
     Raises:
@@ -179,34 +224,31 @@ def _check_size(links: list[LinkFigures], names: list[str], scale: float) -> Non
 
     """
     for link, name in zip(links, names, strict=True):
-        length_m = scale * link.length_m
-        mass_kg = scale**3 * link.mass_kg
         for what, value, (low, high), unit in (
-            ("length", length_m, _LENGTH_M, "m"),
-            ("mass", mass_kg, _MASS_KG, "kg"),
-            ("radius", scale * link.radius_m, _RADIUS_M, "m"),
+            ("length", link.length_m, _LENGTH_M, "m"),
+            ("mass", link.mass_kg, _MASS_KG, "kg"),
+            ("radius", link.radius_m, _RADIUS_M, "m"),
         ):
             if value == 0.0 or low < value <= high:
                 continue
             raise InputError(
                 f"link {name}: its {what} is {value:.3g} {unit}, and must be over {low:g} and "
-                f"at most {high:g} {unit}; add --scale for another size than that of servos"
+                f"at most {high:g} {unit}; use --scale, and --mass-scale 1 for a model in "
+                "millimetres"
             )
 
 
 def _keys(
     name: str,
     servo_model: str,
-    scale: float,
     links: list[LinkFigures],
-    yaws: tuple[bool, ...],
     joints: list[dict[str, object]],
     legs: list[LegPair],
 ) -> dict[str, object]:
-    radius_m = max(link.radius_m for link in links)
-    keys: dict[str, object] = {
+    radius_m = round(max(link.radius_m for link in links), 6)
+    return {
         "name": name,
-        "body_radius_m": round(scale * radius_m, 6),
+        "body_radius_m": radius_m,
         "servo": {"model": servo_model},
         "joints": [
             *joints,
@@ -216,37 +258,25 @@ def _keys(
                 for sign, limit in zip(pair.signs, pair.limits_rad, strict=True)
             ),
         ],
-        "links": [_link_keys(link, scale, radius_m) for link in links],
+        "links": [_link_keys(link, radius_m) for link in links],
     }
-    if legs:
-        keys["joint_axes"] = "".join("y" if yaw else "p" for yaw in yaws)
-        keys["limbs"] = [_limb_keys(pair, scale) for pair in legs]
-    return keys
 
 
-def _link_keys(link: LinkFigures, scale: float, radius_m: float) -> dict[str, object]:
+def _link_keys(link: LinkFigures, radius_m: float) -> dict[str, object]:
+    keys: dict[str, object] = {"length_m": round(link.length_m, 12)}
     if not link.mass_kg:
-        return {
-            "length_m": round(scale * link.length_m, 12),
-            "mass_kg": _NEXT_TO_NOTHING_KG,
-            "radius_m": round(scale * radius_m, 6),
-            "shape": "none",
-        }
-    return {
-        "length_m": round(scale * link.length_m, 12),
-        "mass_kg": round(scale**3 * link.mass_kg, 9),
-        "radius_m": round(scale * link.radius_m, 6),
-    }
+        return keys | {"mass_kg": _NEXT_TO_NOTHING_KG, "radius_m": radius_m, "shape": "none"}
+    return keys | {"mass_kg": round(link.mass_kg, 9), "radius_m": round(link.radius_m, 6)}
 
 
-def _limb_keys(pair: LegPair, scale: float) -> dict[str, object]:
+def _limb_keys(pair: LegPair, scale: float, masses: float) -> dict[str, object]:
     table = dict(pair.table)
     for key in ("hip_m", "foot_radius_m"):
         table[key] = round(scale * float(str(table[key])), 12)
     segments = table["segments_m"]
     assert isinstance(segments, list)
     table["segments_m"] = [round(scale * segment_m, 12) for segment_m in segments]
-    table["segment_mass_kg"] = round(scale**3 * float(str(table["segment_mass_kg"])), 9)
+    table["segment_mass_kg"] = round(masses * float(str(table["segment_mass_kg"])), 9)
     return table
 
 

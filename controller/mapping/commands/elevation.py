@@ -3,20 +3,21 @@
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.config.errors import InputError
+from snakewalk.config.reading import texts
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Assume, Force, Json, console, show
+from snakewalk.controller.console.options import Force, Json, console, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
     refuse_to_overwrite,
 )
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
-from snakewalk.controller.mapping.raster_file import RasterUnits
+from snakewalk.controller.mapping.raster_file import LARGEST, SMALLEST, ElevationChoice
 from snakewalk.controller.mapping.world_file import MapWorld, map_beside
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ Fill = Annotated[
 Picture = Annotated[
     Path | None, typer.Option(help="draw the map with heights, holes and safe ground here")
 ]
-_SMALLEST, _LARGEST = 1e-6, 1e6
-"""Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 ElevationFile = Annotated[
     Path,
     typer.Argument(
@@ -45,37 +44,6 @@ Scale = Annotated[float, typer.Option(help="metres in the robot's world per metr
 VerticalScale = Annotated[float | None, typer.Option(help="scale of heights; default: as --scale")]
 CropText = Annotated[
     str | None, typer.Option(help="X0,Y0,X1,Y1: metres of the file from its south-west corner")
-]
-_Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
-Unit = Annotated[
-    Literal[_Length, "deg"] | None,
-    typer.Option(help="unit of the file; default: as it states"),
-]
-HeightUnit = Annotated[
-    _Length | None,
-    typer.Option(
-        help="unit of the file's heights; default: as it states, else as its lengths if metric"
-    ),
-]
-Cell = Annotated[
-    float | None,
-    typer.Option(help="distance between samples of a PNG, CSV or NPZ, in the file's unit"),
-]
-HeightStep = Annotated[
-    float | None, typer.Option(help="height per step of the file's values, in the file's unit")
-]
-NoData = Annotated[float | None, typer.Option(help="value of empty cells, such as -9999 or nan")]
-PointOf = Annotated[
-    Literal["lowest", "median", "highest"] | None,
-    typer.Option(help="point of a cell that counts; default: median"),
-]
-Up = Annotated[
-    Literal["z", "y", "x", "-z", "-y", "-x"] | None,
-    typer.Option(help="axis of a mesh or cloud that points up; default: z"),
-]
-Classes = Annotated[
-    str | None,
-    typer.Option(help="classes of LAS points, such as 2,9; default: ground, else all but noise"),
 ]
 
 
@@ -94,19 +62,12 @@ def elevation(
     vertical_scale: VerticalScale = None,
     spacing: Spacing = None,
     crop: CropText = None,
-    unit: Unit = None,
-    height_unit: HeightUnit = None,
-    cell: Cell = None,
-    height_step: HeightStep = None,
-    no_data: NoData = None,
-    point: PointOf = None,
-    up: Up = None,
-    classes: Classes = None,
-    assume: Assume = None,
     fill: Fill = 0.0,
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: ElevationChoice,
 ) -> None:
     """Make a world for `plan` and `run` from a file of real ground; unknown cells stay unknown."""
     faults = not_positive(
@@ -114,25 +75,18 @@ def elevation(
             "--scale": scale,
             "--vertical-scale": vertical_scale,
             "--spacing": spacing,
-            "--cell": cell,
-            "--height-step": height_step,
         }
     )
     check_fill(fill, faults)
     corners = None if crop is None else _corners(crop, faults)
-    kinds = None if classes is None else _numbers_of(classes, faults)
     if faults:
         raise InputError(faults)
-    assumed = Assumptions(assume or ())
     check_world_files(out, picture, [file], force)
-    units = RasterUnits(unit, cell, height_step, no_data, height_unit)
-    options = MapOptions(units, corners, scale, vertical_scale, spacing, point, up, kinds, assumed)
+    options = MapOptions(choice, corners, scale, vertical_scale, spacing)
     read = read_elevation(file, options)
-    assumed.check_used("keys: lowest_m, highest_m")
     world = MapWorld.of(out, read.elevation.height_field(fill))
-    notes = [*read.notes, *assumed.lines]
-    world.write(_head(file, read, options, crop, world.ground.spacing_m, fill, notes))
-    finish(world, _facts(read, options, notes), picture, as_json=as_json)
+    world.write(_head(file, read, options, crop, world.ground.spacing_m, fill))
+    finish(world, _facts(read, options), picture, as_json=as_json)
 
 
 def _head(
@@ -142,7 +96,6 @@ def _head(
     crop: str | None,
     spacing_m: float,
     fill: float,
-    notes: list[str],
 ) -> list[str]:
     wide, deep = read.size_m
     return [
@@ -152,11 +105,11 @@ def _head(
         f"samples {spacing_m:g} m apart.",
         *([f"Part of the file, from its south-west corner: {crop} m."] if crop else []),
         *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
-        *(f"- {note}" for note in notes),
+        *(f"- {note}" for note in read.notes),
     ]
 
 
-def _facts(read: "FileMap", options: "MapOptions", notes: list[str]) -> dict[str, object]:
+def _facts(read: "FileMap", options: "MapOptions") -> dict[str, object]:
     wide, deep = read.size_m
     return {
         "kind": read.kind,
@@ -164,16 +117,9 @@ def _facts(read: "FileMap", options: "MapOptions", notes: list[str]) -> dict[str
         "file_relief_m": round(read.relief_m, 3),
         "scale": options.scale,
         "vertical_scale": options.rise,
-        "notes": notes,
+        "facts": texts(read.facts),
+        "notes": list(read.notes),
     }
-
-
-def _numbers_of(classes: str, faults: list[str]) -> tuple[int, ...]:
-    words = classes.split(",")
-    if not all(word.strip().isdecimal() and int(word) < 256 for word in words):
-        faults.append(f"--classes {classes}: expected numbers from 0 to 255, such as 2,9")
-        return ()
-    return tuple(int(word) for word in words)
 
 
 def check_world_files(
@@ -201,9 +147,9 @@ def check_world_files(
 def not_positive(options: Mapping[str, float | None]) -> list[str]:
     """Faults of options whose value is not above 0, or beyond all lengths and factors."""
     return [
-        f"{option} {value:g}: must be from {_SMALLEST:g} to {_LARGEST:g}"
+        f"{option} {value:g}: must be from {SMALLEST:g} to {LARGEST:g}"
         for option, value in options.items()
-        if value is not None and not _SMALLEST <= value <= _LARGEST
+        if value is not None and not SMALLEST <= value <= LARGEST
     ]
 
 

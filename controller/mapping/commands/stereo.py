@@ -10,6 +10,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.key_types import DISPARITIES, METRE, Disparities, LengthUnit
+from snakewalk.config.reading import texts
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
 from snakewalk.controller.mapping.commands.elevation import (
@@ -22,7 +23,6 @@ from snakewalk.controller.mapping.commands.elevation import (
     finish,
     not_positive,
 )
-from snakewalk.controller.mapping.length_units import unit_m
 from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def stereo(
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
-    calibrated = stereo_camera.read_calibration(calibration, unit_m(unit))
+    calibrated = stereo_camera.read_calibration(calibration, unit)
     pictures = (colour_picture.read_colours(side) for side in (left, right))
     pair = stereo_camera.rectify(calibrated, *pictures)
     stand = None
@@ -144,7 +144,8 @@ def stereo(
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
     )
-    finish(world, _facts(terrain), picture, as_json=as_json)
+    facts = _facts(terrain) | {"facts": texts(calibrated.facts)}
+    finish(world, facts, picture, as_json=as_json)
 
 
 def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:

@@ -11,7 +11,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
 from snakewalk.controller.mapping.colour_picture import read_colours
-from snakewalk.controller.mapping.length_units import unit_m
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
 from snakewalk.controller.mapping.mosaic.mosaic import mosaic
@@ -65,7 +64,7 @@ def read_walk(
         InputError: a picture or the calibration is unusable, or two positions do not match.
 
     """
-    calibration = read_calibration(file.parent / config.calibration, unit_m(config.unit))
+    calibration = read_calibration(file.parent / config.calibration, config.unit)
     count = len(config.positions)
     total = 2 * count - 1
     models = []

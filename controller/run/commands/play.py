@@ -1,11 +1,13 @@
 """``snakewalk play``: a recording on the robot."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from pydantic import Field
 
-from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.playback import JointRequest, PlaybackConfig
+from snakewalk.config.reading import Answers, store, texts
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.option import Flag
@@ -22,7 +24,7 @@ from snakewalk.controller.run.results import show_result
 from snakewalk.controller.run.run_for_user import run_for_user
 
 
-class PlaybackOptions(PlaybackConfig):
+class PlaybackOptions(PlaybackConfig, Answers):
     """The keys of ``[playback]`` as options."""
 
     joints: Annotated[dict[str, str], Flag(("--joint",), metavar="ROBOT=FILE")] = Field(
@@ -64,8 +66,11 @@ def play(
         robot=robot,
         world=world,
         keys=key_values("--set", set_),
-        **playback.model_dump(),
+        **playback.model_dump(exclude={"remember"}),
     )
+    if playback.remember:
+        answers = playback.model_dump(include={*JointRequest.model_fields})
+        store(Path(track), JointRequest(**answers))
     name = f"play-{prepared.run.name}"
     result = run_for_user(
         prepared, name, options, bar=TimeBar(prepared.run.name, prepared.duration_s)
@@ -77,6 +82,7 @@ def play(
         "speed": round(prepared.speed, 4),
         "scale": playback.scale,
         "clipped": prepared.clipped,
+        "facts": texts(prepared.facts),
         "notes": list(prepared.notes),
         "duration_s": round(result.outcome.duration_s, 2),
         "tripped": result.outcome.tripped,

@@ -1,6 +1,6 @@
 """A run that plays a recording in time on a robot."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -9,12 +9,13 @@ import numpy as np
 from snakewalk.config.archive import read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.playback import PlaybackConfig
+from snakewalk.config.playback import JointRequest, PlaybackConfig
+from snakewalk.config.reading import Facts, with_stored
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround
 from snakewalk.controller.console.plugins import plugins
 from snakewalk.controller.mechanics.thrust import forward_speed_m_s
-from snakewalk.controller.motion.joint_motion import JointReader, JointRequest, onto_robot
+from snakewalk.controller.motion.joint_motion import JointMotion, JointReader, onto_robot
 from snakewalk.controller.motion.parted_recording import PartedRecording, gaps, recording
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import MotionSource
@@ -26,10 +27,8 @@ from snakewalk.controller.track.recorded_joints import recorded_joints
 _HEAD_BYTES = 4096
 
 
-def foreign_joints(
-    track: str, robot: RobotConfig, asked: PlaybackConfig
-) -> tuple[Floats, Floats, tuple[str, ...]] | None:
-    """Times (T,), joint angles (T, J) and lines about the mapping; None for midlines.
+def foreign_joints(track: str, robot: RobotConfig, asked: JointRequest) -> JointMotion | None:
+    """Motion of the joints of a robot; None for midlines.
 
     Raises:
         InputError: a fault of the file, or it needs a choice.
@@ -37,17 +36,19 @@ def foreign_joints(
     """
     path = Path(track)
     reader = _reader(path)
-    names = ("joints", "unit", "topic", "episode")
-    given = [name for name in names if getattr(asked, name) not in (None, {})]
     if reader is None:
+        names = ("joints", "unit", "topic", "episode")
+        given = [name for name in names if getattr(asked, name) not in (None, {})]
         if given:
             option = "--joint" if given[0] == "joints" else f"--{given[0]}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None
-    motion = reader.read(
-        path, JointRequest(asked.unit, asked.time_unit, asked.topic, asked.episode)
+    request, lines = with_stored(
+        path, JointRequest(**asked.model_dump(include={*JointRequest.model_fields}))
     )
-    return onto_robot(motion, robot, asked.joints, track)
+    motion = reader.read(path, request)
+    time_s, joint_rad, notes = onto_robot(motion, robot, request.joints, track)
+    return replace(motion, time_s=time_s, joint_rad=joint_rad, notes=(*lines, *notes))
 
 
 def _reader(path: Path) -> JointReader | None:
@@ -101,7 +102,7 @@ class PlaybackRun(PathlessRun):
     @cached_property
     def _recorded_angles(self) -> tuple[Floats, Floats]:
         if self._foreign is not None:
-            time_s, joints, _ = self._foreign
+            time_s, joints = self._foreign.time_s, self._foreign.joint_rad
         else:
             time_s, joints = recorded_joints(
                 self.run.track, self.robot, self._asked_playback.time_unit
@@ -109,13 +110,18 @@ class PlaybackRun(PathlessRun):
         return time_s, self._asked_playback.scale * joints
 
     @cached_property
-    def _foreign(self) -> tuple[Floats, Floats, tuple[str, ...]] | None:
+    def _foreign(self) -> JointMotion | None:
         return foreign_joints(self.run.track, self.robot, self._asked_playback)
+
+    @property
+    def facts(self) -> Facts:
+        """Facts about the file of joint angles; none of midlines, which are examined by `track`."""
+        return {} if self._foreign is None else self._foreign.facts
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Lines about the mapping of joints, and about omitted or changed parts."""
-        lines = () if self._foreign is None else self._foreign[2]
+        lines = () if self._foreign is None else self._foreign.notes
         time_s = self.joint_track[0]
         cuts = gaps(time_s)
         if not len(cuts):

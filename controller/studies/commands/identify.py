@@ -14,7 +14,7 @@ from snakewalk.config.extras import require_extra
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.config.loader import checked, load_robot, load_world, with_keys
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.template import robot_toml, template
+from snakewalk.config.template import plain_toml, template
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
@@ -356,7 +356,7 @@ def _write_mass(out: Path, robot: RobotConfig, mass: Found, paths: list[Path]) -
         f"Mass found by `snakewalk robot identify` from {', '.join(map(str, paths))}:\n"
         f"{mass.value:.4g} times that of {robot.name}, 95 % of {mass.low:.4g} to {mass.high:.4g}"
     )
-    write_result(out, robot_toml(after, comment))
+    write_result(out, plain_toml(after, comment))
 
 
 def _check_one_servo(logs: Sequence[PendulumLog]) -> None:
@@ -487,5 +487,5 @@ def _print_constants(constants: ServoConstants, reached: dict[str, tuple[float, 
 def _write_robot(file: _RobotFile, constants: ServoConstants, logs: list[Path]) -> RobotConfig:
 
     after = with_keys(robot_with(file.before, constants), {"name": file.out.stem}, str(file.out))
-    write_result(file.out, robot_toml(after, robot_comment(constants, logs)))
+    write_result(file.out, plain_toml(after, robot_comment(constants, logs)))
     return after

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console import completion
@@ -23,6 +22,7 @@ from snakewalk.controller.console.options import (
     Workers,
     console,
     key_values,
+    print_table,
 )
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.progress import show_progress
@@ -137,11 +137,8 @@ def sweep(
 
 def _show(out: Path, rows: list[dict[str, Any]]) -> None:
     console.print(str(out))
-    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    grid.add_column("gait, robot")
-    for key, head in _HEADS.items():
-        grid.add_column(head, justify="left" if key == "pace" else "right", no_wrap=True)
-    for row in rows:
-        named = f"{row['gait']} {row['robot']} {row['keys']}".rstrip()
-        grid.add_row(named, *["" if row[key] is None else str(row[key]) for key in _HEADS])
-    console.print(grid)
+    cells = [
+        [f"{row['gait']} {row['robot']} {row['keys']}".rstrip(), *(row[key] for key in _HEADS)]
+        for row in rows
+    ]
+    print_table(["gait, robot", *_HEADS.values()], cells)

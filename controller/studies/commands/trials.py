@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -27,6 +26,7 @@ from snakewalk.controller.console.options import (
     TrackFile,
     Workers,
     console,
+    print_table,
 )
 from snakewalk.controller.console.parquet import check_parquet, table_to_parquet
 from snakewalk.controller.console.progress import show_progress
@@ -62,7 +62,6 @@ _HEADS = {
     "why": "why",
 }
 """Columns of the table, with units below the names."""
-_TEXT = {"run", "robot", "world", "motion", "compliance", "pose", "why"}
 
 
 Over = Annotated[
@@ -317,17 +316,8 @@ def _print(rows: list[dict[str, Any]], varied: list[str]) -> None:
     poses = {row["pose"] for row in rows}
     if len(poses) == 1 and "pose" in shown:
         shown.remove("pose")
-    grid = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
-    for key in varied:
-        grid.add_column("\n".join(key.split(".")[-2:]), justify="right", no_wrap=True)
-    for key in shown:
-        text = key in _TEXT
-        grid.add_column(
-            _HEADS[key], justify="left" if text else "right", no_wrap=not text, overflow="fold"
-        )
-    for row in rows:
-        values = [row["keys"][key] for key in varied] + [row[key] for key in shown]
-        grid.add_row(*["" if value is None else str(value) for value in values])
-    console.print(grid)
+    heads = ["\n".join(key.split(".")[-2:]) for key in varied] + [_HEADS[key] for key in shown]
+    cells = [[row["keys"][key] for key in varied] + [row[key] for key in shown] for row in rows]
+    print_table(heads, cells)
     if "pose" not in shown and poses != {""}:
         console.print(f"pose: {poses.pop()}")

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import Force, Json, console
+from snakewalk.controller.console.options import Force, Json, print_table
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.shape.walks import RULES, check_rule
@@ -72,48 +71,28 @@ def walk(
     if as_json:
         print(json.dumps([result.to_dict() for result in results]))
         return
-    console.print(_table(results))
+    _print(results)
 
 
-def _table(results: "list[StudyResult]") -> Table:
-    title = f"Steps until all states are seen, over |V|; {results[0].repeats} graphs of each kind"
-    table = Table(
-        title=title, title_justify="left", box=None, collapse_padding=True, pad_edge=False
-    )
-    for name in ("graph", "|V|", "degree", "rule"):
-        table.add_column(
-            name, justify="right" if name in {"|V|", "degree"} else "left", no_wrap=True
-        )
-    for name in (
-        "mean",
-        "95 %",
-        "worst",
-        "seen\nat |V|",
-        "back in\n< |V|/20",
-        "of all\nsteps",
-        "over\n|V|",
-    ):
-        table.add_column(name, justify="right")
-    last = ""
+def _print(results: "list[StudyResult]") -> None:
+    heads = "graph,|V|,degree,rule,mean,95 %,worst,seen at,back in,of all,over |V|"
+    rows = []
     for result in results:
         row = result.to_dict()
-        first = result.graph != last
-        if first and last:
-            table.add_row()
-        last = result.graph
-        table.add_row(
-            *(
-                [result.graph, f"{row['states']:.0f}", f"{row['mean_degree']:.2f}"]
-                if first
-                else ["", "", ""]
-            ),
-            result.rule,
-            "never" if row["cover_mean"] is None else f"{row['cover_mean']:.3f}",
-            "" if row["cover_ci95"] is None else f"±{row['cover_ci95']:.3f}",
-            "" if row["cover_worst"] is None else f"{row['cover_worst']:.2f}",
-            f"{row['seen_at_v']:.0%}",
-            f"{row['short_returns']:.1%}",
-            f"{row['short_steps']:.1%}",
-            f"{row['short_per_state']:.3f}",
+        rows.append(
+            (
+                result.graph,
+                f"{row['states']:.0f}",
+                f"{row['mean_degree']:.2f}",
+                result.rule,
+                "never" if row["cover_mean"] is None else f"{row['cover_mean']:.3f}",
+                None if row["cover_ci95"] is None else f"±{row['cover_ci95']:.3f}",
+                None if row["cover_worst"] is None else f"{row['cover_worst']:.2f}",
+                f"{row['seen_at_v']:.0%}",
+                f"{row['short_returns']:.1%}",
+                f"{row['short_steps']:.1%}",
+                f"{row['short_per_state']:.3f}",
+            )
         )
-    return table
+    title = f"Steps until all states are seen, over |V|; {results[0].repeats} graphs of each kind"
+    print_table(heads.split(","), rows, title)

@@ -63,7 +63,7 @@ def load_bvh(file: Path, choice: Choice) -> Keypoints:
     kept = longest if choice.keypoints is None else list(range(len(joints)))
     notes.append(f"{joints[0].name} is taken as the head; --keypoints gives another order")
     names = [joints[k].name for k in kept]
-    keypoints = projected(file, names, places[:, kept] + 1e-12, "m", 1.0 / step_s, choice)
+    keypoints = projected(file, names, places[:, kept] + 1e-12, "m", 1.0 / step_s, choice, ups="+z")
     return replace(keypoints, scale_m=None, notes=(*notes, *keypoints.notes))
 
 

@@ -11,8 +11,8 @@ KNOWN = (
     "<keypoint>.y), analysis HDF5 or project (.slp), a DeepLabCut CSV or HDF5, "
     "HDF5 of Tierpsy (featuresN, skeletons). Also: a WCON "
     "(JSON), an .npz or MATLAB .mat (points or angles_rad or x and y, with rate_hz; or skeletons), "
-    "an .npy of joint angles (frames, joints). Or markers: QTM's TSV, Vicon's CSV, a TRC or a C3D. "
-    "Or a BVH skeleton"
+    "an .npy of joint angles (frames, joints). Or markers: QTM's TSV, Vicon's or "
+    "Motive's CSV, a TRC or a C3D. Or a BVH skeleton"
 )
 """Supported files of a recording, for faults and help."""
 

@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import Fact
 from snakewalk.controller.track.choice import FEWEST, Choice
 from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -45,6 +46,8 @@ class Keypoints:
     """(T,) frame numbers; None: 0, 1, 2..."""
     scale_m: float | None = None
     """Metres in a unit of the places; None: not known."""
+    plane: Fact | None = None
+    """Plane onto which markers in space were projected."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out or changed."""
 

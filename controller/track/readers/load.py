@@ -9,6 +9,7 @@ from snakewalk.config.archive import read_head, read_text
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load, with_keys
+from snakewalk.config.reading import Fact, store, with_stored
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
@@ -82,9 +83,46 @@ def load_file(
         InputError: no such file, an unknown format, or a fault inside it.
 
     """
-    choice = _with(path, rate_hz, choice)
-    loaded = _loaded_recording(Path(path), choice)
-    return loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
+    file = Path(path)
+    choice, lines = with_stored(file, _with(path, rate_hz, choice))
+    kind = _format(file)
+    loaded = _loaded_recording(file, kind, choice)
+    track = loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
+    if choice.remember:
+        store(file, choice)
+    facts = _facts(track, choice, kind, has_names=isinstance(loaded, Keypoints))
+    if isinstance(loaded, Keypoints) and loaded.plane is not None:
+        facts["plane"] = loaded.plane
+    return replace(track, notes=(*lines, *track.notes), facts=facts)
+
+
+def _facts(track: Track, choice: Choice, kind: Format, *, has_names: bool) -> dict[str, Fact]:
+    """Facts about a recording: by the user, by its format, or inferred."""
+    its_format = f"its format, {kind}"
+    unit = (
+        Fact("body lengths", "inferred", "the file states no length")
+        if track.length_m is None
+        else Fact("m", "file", its_format)
+    )
+    order = (
+        Fact("head first", "user", "--keypoints")
+        if choice.keypoints
+        else Fact("head first", "inferred", "the order of its names, which lie along a body")
+        if has_names
+        else Fact("head first", "file", its_format)
+    )
+    rate = f"{track.rate_hz:g} Hz"
+    time = (
+        Fact(rate, "user", "--rate" if choice.rate else "--time-unit")
+        if choice.rate or choice.time_unit
+        else Fact(rate, "inferred", "the default of its format; --rate states another")
+        if track.rate_assumed
+        else Fact(rate, "inferred", "only seconds are possible; --time-unit states another unit")
+        if kind == "csv" and not has_names
+        else Fact(rate, "file", its_format)
+    )
+    quantity = Fact("bodies of an animal", "file", its_format)
+    return {"quantity": quantity, "unit": unit, "order": order, "time": time}
 
 
 def load_keypoints(path: str | Path, choice: Choice = ALL) -> Keypoints:
@@ -94,25 +132,28 @@ def load_keypoints(path: str | Path, choice: Choice = ALL) -> Keypoints:
         InputError: as ``load_file``, or the file holds midlines.
 
     """
-    loaded = _loaded_recording(Path(path), choice)
+    file = Path(path)
+    choice, lines = with_stored(file, choice)
+    loaded = _loaded_recording(file, _format(file), choice)
     if not isinstance(loaded, Keypoints):
         raise InputError(
             f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
             "or C3D"
         )
-    return loaded
+    if choice.remember:
+        store(file, choice)
+    return replace(loaded, notes=(*lines, *loaded.notes))
 
 
-def _loaded_recording(file: Path, choice: Choice) -> Track | Keypoints:
-    loaded = _read(file, choice)
+def _loaded_recording(file: Path, kind: Format, choice: Choice) -> Track | Keypoints:
+    loaded = _read(file, kind, choice)
     if isinstance(loaded, Track):
         return loaded
     least_score = loaded.least_score if choice.min_score is None else choice.min_score
     return replace(loaded, rate_hz=choice.rate or loaded.rate_hz, least_score=least_score)
 
 
-def _read(file: Path, choice: Choice) -> Track | Keypoints:
-    kind = _format(file)
+def _read(file: Path, kind: Format, choice: Choice) -> Track | Keypoints:
     if kind in _MARKERS:
         return _MARKERS[kind](file, choice)
     match kind:

@@ -1,11 +1,14 @@
-"""Marker trajectories as tables: Vicon's CSV and OpenSim's TRC.
+"""Marker trajectories as tables: Vicon's CSV, OptiTrack's CSV (Motive) and OpenSim's TRC.
 
 Vicon Nexus writes blocks. The marker block begins with ``Trajectories`` and the frame rate. Marker
 names, column names (Frame, Sub Frame, X, Y, Z, ...), units and rows follow, up to an empty line. A
 TRC has two lines of names and values (``DataRate``, ``Units``, ...), lines of marker and column
-names, then rows of frame, time and places.
+names, then rows of frame, time and places. A file of Motive begins with a
+line of names and values (``Export Frame Rate``, ``Length Units``, ...). Rows of types, names and
+other properties of its objects follow, then column names and rows of values.
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -13,7 +16,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Ints
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.markers import (
@@ -25,6 +28,10 @@ from snakewalk.controller.track.readers.markers import (
 from snakewalk.controller.track.track import frame_numbers
 
 VICON_HEAD: Final = "Trajectories"
+_MOTIVE_KINDS: Final = ("Marker", "Rigid Body", "Bone")
+"""Types of objects whose measured places are used, in this order of preference."""
+_SAME_RATE: Final = 0.01
+"""Share by which the rate of Motive's rounded times may differ from the stated one (ours)."""
 _MOST_COLUMNS: Final = 30_000
 
 
@@ -62,11 +69,68 @@ def load_vicon(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
         if row[0].strip() in {"Model Outputs", "Devices", "Segments", "Joints", VICON_HEAD}:
             break
         data.append((line, row))
-    short = [name.rsplit(":", 1)[-1] for name in names]
-    names = short if len(set(short)) == len(short) else names
+    names = _short(names)
     frame = _frames(file, data)
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=block[4][0])
     return projected(file, names, places, units.pop(), stated, choice, frame)
+
+
+def is_motive(rows: list[list[str]]) -> bool:
+    """Whether a CSV is an export of OptiTrack's Motive."""
+    return bool(rows and rows[0]) and rows[0][0].strip() == "Format Version"
+
+
+def load_motive(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
+    """Load Motive's CSV; see ``load.load_file``."""
+    about = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
+    begin = next((k for k, row in enumerate(rows) if row and row[0].strip() == "Frame"), len(rows))
+    heads = [row for row in rows[1 : begin + 1] if any(cell.strip() for cell in row)]
+    if len(heads) < 4:
+        raise InputError(f"{file}: expected rows of types, names and columns; export it again")
+    if about.get("Coordinate Space", "Global") != "Global":
+        raise InputError(f"{file}: its places are those in a parent's frame; export it in Global")
+    kinds, names, *_, parts, axes = (
+        [cell.strip() for cell in row + [""] * len(heads[-1])] for row in heads
+    )
+    starts: dict[str, list[int]] = {}
+    for k in range(2, len(axes) - 2):
+        if parts[k] == "Position" and axes[k : k + 3] == ["X", "Y", "Z"]:
+            starts.setdefault(kinds[k], []).append(k)
+    kind = next((kind for kind in _MOTIVE_KINDS if kind in starts), None)
+    if kind is None:
+        raise InputError(f"{file}: has no positions of markers; export them with it")
+    data = [(line, row) for line, row in enumerate(rows[begin + 1 :], begin + 2) if any(row)]
+    frame = _frames(file, data)
+    cells = [[part for k in starts[kind] for part in row[k : k + 3]] for _, row in data]
+    places = marker_places(file, cells, len(starts[kind]), first_line=begin + 2)
+    times = numbers_of(file, [row[1:2] for _, row in data], ["Time"], (line for line, _ in data))
+    rate_hz = float(np.median(np.diff(frame) / np.diff(times[:, 0])))
+    stated = [number_or_none(about.get(f"{k} Frame Rate", "")) for k in ("Export", "Capture")]
+    rates = [rate for rate in stated if rate]
+    if choice.rate is None and not any(abs(rate / rate_hz - 1.0) < _SAME_RATE for rate in rates):
+        listed = " and ".join(f"{rate:g}" for rate in rates) or "no"
+        raise InputError(
+            f"{file}: states {listed} frames a second, and its times {rate_hz:.4g}; give --rate"
+        )
+    keypoints = projected(
+        file,
+        _short([names[k] for k in starts[kind]]),
+        places,
+        about.get("Length Units", ""),
+        rate_hz,
+        choice,
+        frame,
+        ups="yz",
+    )
+    others = [f"{len(starts[other])} of type {other}" for other in starts if other != kind]
+    notes = (f"left out: places {', '.join(others)}",) if others else ()
+    return replace(keypoints, notes=(*notes, *keypoints.notes))
+
+
+def _short(names: list[str]) -> list[str]:
+    """Names without their subject, if they still differ."""
+    short = [name.rsplit(":", 1)[-1] for name in names]
+    return short if len(set(short)) == len(short) else names
 
 
 def load_trc(file: Path, choice: Choice) -> Keypoints:
@@ -90,7 +154,7 @@ def load_trc(file: Path, choice: Choice) -> Keypoints:
     places = marker_places(file, [row[2:] for _, row in data], len(names), first_line=first)
     if not stated and choice.rate is None:
         raise InputError(f"{file}: states no DataRate; give --rate in frames per second")
-    keypoints = projected(file, names, places, unit, stated, choice, frame)
+    keypoints = projected(file, names, places, unit, stated, choice, frame, ups="yz")
     _check_count(file, "NumFrames", about, len(data))
     return keypoints
 

@@ -15,11 +15,21 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
+from snakewalk.config.reading import Fact
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.track.choice import FEWEST, PLANES, Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 
-UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0} | {
+    "millimeters": 1e-3,
+    "centimeters": 1e-2,
+    "meters": 1.0,
+}
+_ACROSS = {"x": "yz", "y": "xz", "z": "xy"}
+"""Plane across each axis."""
+_FLAT_SHARE = 0.5
+"""Least spread of markers over the next larger one, above which no axis is likely to point up
+(ours)."""
 _UNLABELLED_NAME = re.compile(
     r"\*\d*|uname\*?\d+|unlabell?ed[ _-]?\d*|unknown[ _-]?\d*|unnamed[ _-]?\d*|new \d{4}",
 )
@@ -40,7 +50,8 @@ def is_qtm(head: bytes) -> bool:
 
 def load_qtm(file: Path, choice: Choice) -> Keypoints:
     """Load QTM's TSV; see ``load.load_file``."""
-    lines = [row for row in read_rows(file, "TSV", "\t") if any(row)]
+    # a row of empty cells is a frame in which no marker was seen
+    lines = [row for row in read_rows(file, "TSV", "\t") if len(row) > 1 or any(row)]
     about: dict[str, list[str]] = {}
     while lines and lines[0][0].isupper() and not number_or_none(lines[0][0]):
         row = lines.pop(0)
@@ -72,10 +83,13 @@ def load_c3d(file: Path, choice: Choice) -> Keypoints:
         names = [str(name) for name in about["LABELS"]["value"]]
         unit = str((about["UNITS"]["value"] or ["mm"])[0]).strip()
         stated = float(about["RATE"]["value"][0])
+        screen = (about.get("Y_SCREEN", {}).get("value") or [""])[0]
+        stated_up = str(screen).strip().lower()
+        up = stated_up if stated_up in ("+x", "+y", "+z") else "z"
         places = np.asarray(c3d["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
     except Exception as error:
         raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
-    return projected(file, names[: places.shape[1]], places, unit, stated or None, choice)
+    return projected(file, names[: places.shape[1]], places, unit, stated or None, choice, ups=up)
 
 
 def marker_places(
@@ -102,11 +116,14 @@ def projected(
     rate_hz: float | None,
     choice: Choice,
     frame: Ints | None = None,
+    ups: str = "z",
 ) -> Keypoints:
     """Markers (T, K, 3) projected onto a plane.
 
+    ``ups`` is the axis that the file states to point up, ``+z``, or the usual ones of the format.
     Without chosen keypoints, unlabelled and static markers are left out, and named in the notes.
     """
+    unit = unit.lower()
     if unit not in UNITS:
         raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
@@ -120,15 +137,41 @@ def projected(
             )
         names = [names[k] for k in kept]
         places = places[:, kept]
+    plane = _plane(file, places, choice, ups)
     return Keypoints(
         file,
         names,
-        places[..., list(PLANES[choice.plane or "xy"])],
+        places[..., list(PLANES[plane.value])] * [1.0, -1.0 if plane.value == "xz" else 1.0],
         None,
         rate_hz=rate_hz,
         frame=frame,
         scale_m=UNITS[unit],
+        plane=plane,
         notes=tuple(notes),
+    )
+
+
+def _plane(file: Path, places: Floats, choice: Choice, ups: str) -> Fact:
+    """Plane of a body: by the user, by the axis that the file states as up, or by the spread.
+
+    Raises:
+        InputError: the file states no axis, and the spread of the markers is not that of a body
+            on the ground.
+
+    """
+    if choice.plane is not None:
+        return Fact(choice.plane, "user", "--plane")
+    if ups.startswith("+"):
+        return Fact(_ACROSS[ups[1]], "file", f"its axis {ups} points up")
+    spread = np.nan_to_num(np.nanstd(places, axis=(0, 1)))
+    order = np.argsort(spread, kind="stable")
+    flat = "xyz"[order[0]]
+    if flat in ups and spread[order[0]] <= _FLAT_SHARE * spread[order[1]]:
+        return Fact(_ACROSS[flat], "inferred", f"no axis is stated to point up; flat along {flat}")
+    listed = ", ".join(f"{size:.3g} along {axis}" for axis, size in zip("xyz", spread, strict=True))
+    raise InputError(
+        f"{file}: does not state which axis points up, and its markers spread by {listed}; give "
+        "--plane xy if z points up, xz if y does, yz if x does"
     )
 
 

@@ -7,14 +7,20 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import stated
 from snakewalk.config.text_table import numbers_of, read_rows
-from snakewalk.controller.motion.joint_motion import second
+from snakewalk.controller.motion.joint_motion import TIME_UNITS, time_unit
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
 from snakewalk.controller.track.readers.formats import KNOWN
 from snakewalk.controller.track.readers.keypoints import Keypoints
-from snakewalk.controller.track.readers.marker_tables import is_vicon, load_vicon
+from snakewalk.controller.track.readers.marker_tables import (
+    is_motive,
+    is_vicon,
+    load_motive,
+    load_vicon,
+)
 from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
@@ -33,6 +39,8 @@ def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
     every = read_rows(file, f"recording (known: {KNOWN})")
     if is_vicon(every):
         return load_vicon(file, every, choice)
+    if is_motive(every):
+        return load_motive(file, every, choice)
     rows = [row for row in every if row]
     if len(rows) < 2:
         raise InputError(f"{file}: expected a line of column names, then rows of numbers")
@@ -154,7 +162,8 @@ def _midline(
                 f"{file}: t must increase from frame to frame, in seconds; it does not in "
                 f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
             )
-        unit_s = second(file, np.cumsum(step), "t", choice.time_unit)
+        given = stated(file, "--time-unit", None, choice.time_unit)
+        unit_s = TIME_UNITS[time_unit(file, np.cumsum(step), "t", given).value]
         rate_hz = float(1.0 / np.median(unit_s * step))
         time_s = unit_s * table[first, 0]
     return track_from_points(

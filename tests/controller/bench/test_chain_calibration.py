@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import JointConfig, RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.bench.calibration.chain_calibration import (
     ChainCalibration,
     calibrate,
@@ -164,7 +164,7 @@ def test_a_chain_is_found_out_completely_and_then_walks(
     assert np.abs(bench.line.bank["Goal Current"]).max() <= round(0.3 / 2.69e-3)
 
     file = tmp_path / "found.toml"
-    file.write_text(robot_toml(robot))
+    file.write_text(plain_toml(robot))
     assert load_robot(str(file)) == robot
     # the same servos, mounted as they are, under a run with the file that was found
     monkeypatch.setattr(Mounting, "of", staticmethod(lambda _: Mounting(*mounted(truth))))
@@ -184,7 +184,7 @@ def test_a_chain_that_was_found_out_walks_the_square(
     rng = np.random.default_rng(SEED)
     bench = Bench.of(planted(rng), rng)
     file = tmp_path / "found.toml"
-    file.write_text(robot_toml(bench.calibrate().robot))
+    file.write_text(plain_toml(bench.calibrate().robot))
     monkeypatch.setattr(Mounting, "of", staticmethod(lambda _: Mounting(*mounted(bench.truth))))
     finished = run_robot(RunRequest(prepare_walk("flat-square", robot=str(file)), tmp_path / "run"))
     assert (finished.outcome.reached, finished.outcome.missed) == (4, 0)

@@ -10,7 +10,7 @@ import pytest
 from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_catalogue import servo_model
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.drivers.protocol.registers import baud_code
 from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.line.clock import SimClock
@@ -42,7 +42,7 @@ class TwoMakes:
             {"name": "six", "servo": servo, "joints": joints, "ports": ports}
         )
         file = folder / "six.toml"
-        file.write_text(robot_toml(robot), encoding="utf-8")
+        file.write_text(plain_toml(robot), encoding="utf-8")
         return file
 
 

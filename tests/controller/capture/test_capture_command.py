@@ -329,4 +329,4 @@ def test_a_head_that_is_not_sure_is_a_warning(
     assert facts.warning is not None
     assert facts.warning in caplog.text
     assert "head and tail may be exchanged" in facts.warning
-    assert examine(str(track)).facts.head_sure == 0.19
+    assert examine(str(track)).facts["head_sure"] == 0.19

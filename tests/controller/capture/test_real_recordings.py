@@ -38,7 +38,7 @@ def seen(shared_data: Path) -> dict[str, ExaminedRecording]:
 def test_every_recording_loads_whole_and_is_used(
     seen: dict[str, ExaminedRecording], name: str, frames: int, dropped: int, rate_hz: float
 ) -> None:
-    facts = seen[name].facts.to_dict()
+    facts = seen[name].facts
     assert (facts["frames"], facts["frames_left_out"]) == (frames, dropped)
     assert facts["rate_hz"] == pytest.approx(rate_hz)
     assert facts["head_and_tail_swapped"] == 0
@@ -50,7 +50,7 @@ def test_every_recording_loads_whole_and_is_used(
 def test_the_lamprey_swims_as_published_and_must_be_slowed(
     seen: dict[str, ExaminedRecording],
 ) -> None:
-    facts = seen[LAMPREY].facts.to_dict()
+    facts = seen[LAMPREY].facts
     assert 1 / facts["waves_on_body"] == pytest.approx(0.57, rel=0.15)  # wavelength, body lengths
     assert facts["wave_hz"] == pytest.approx(3.85, rel=0.02)
     assert facts["time_towards_head"] == 0.0
@@ -62,15 +62,15 @@ def test_the_lamprey_swims_as_published_and_must_be_slowed(
 def test_the_slow_fish_shakes_in_its_keypoints_more_than_it_moves(
     seen: dict[str, ExaminedRecording],
 ) -> None:
-    facts = seen[FISH].facts.to_dict()
+    facts = seen[FISH].facts
     assert facts["joint_speed_unsmoothed_rad_s"] > 20.0
     assert facts["joint_speed_rad_s"] < 3.0
 
 
 def test_the_worms_reversals_are_seen(seen: dict[str, ExaminedRecording]) -> None:
     # read off the angle maps: the wave runs headwards from 6.3 to 10.6 s of 18.8
-    assert seen[OMEGA].facts.to_dict()["time_towards_head"] == pytest.approx(4.3 / 18.75, abs=0.03)
-    assert 0.1 < seen[DELTA].facts.to_dict()["time_towards_head"] < 0.4
+    assert seen[OMEGA].facts["time_towards_head"] == pytest.approx(4.3 / 18.75, abs=0.03)
+    assert 0.1 < seen[DELTA].facts["time_towards_head"] < 0.4
 
 
 @pytest.mark.parametrize("name", [LAMPREY, DELTA, WORM])

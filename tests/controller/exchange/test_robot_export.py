@@ -14,7 +14,7 @@ from benchmarks.exported_body import exported_speeds
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world, shipped
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import CONTACT_NOTES, mjcf_text, urdf_text
 from snakewalk.controller.kinematics.links import body_in_world
@@ -122,7 +122,7 @@ def test_show_knows_every_joint_of_every_shipped_robot(robot: RobotConfig) -> No
 
 def test_show_tells_each_link_where_links_differ(tmp_path: Path) -> None:
     file = tmp_path / "uneven.toml"
-    file.write_text(robot_toml(UNEVEN))
+    file.write_text(plain_toml(UNEVEN))
     words = ["robot", "show", str(file)]
     shown = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
     assert [link["length_m"] for link in shown["each_link"]] == list(UNEVEN.link_lengths_m)

@@ -14,7 +14,7 @@ from rasterio.transform import from_origin
 from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
 from snakewalk.controller.mapping.point_cloud import read_pcd
-from snakewalk.controller.mapping.raster_file import RasterUnits
+from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 ROWS, COLUMNS = 30, 41
 X, Y = np.meshgrid(np.arange(COLUMNS) * 0.1, np.arange(ROWS) * 0.1)
@@ -51,18 +51,18 @@ def pcd(points, data: str, fields="x y z", total=None, pad="") -> bytes:
 
 
 def write(folder: Path, kind: str) -> tuple[Path, MapOptions]:
-    file, told = folder / f"hill.{kind.split('-', maxsplit=1)[0]}", RasterUnits(cell=0.1)
+    file, told = folder / f"hill.{kind.split('-', maxsplit=1)[0]}", ElevationChoice(cell=0.1)
     north = HILL[::-1]
     if kind == "tif":
         geotiff(file, north.astype("float32"), crs="EPSG:32632")
-        told = RasterUnits()
+        told = ElevationChoice()
     elif kind == "asc":
         head = f"ncols {COLUMNS}\nnrows {ROWS}\nxllcorner 5\nyllcorner 7\ncellsize 0.1\n"
         file.write_text(head + "\n".join(" ".join(map(str, row)) for row in north))
-        told = RasterUnits()
+        told = ElevationChoice()
     elif kind == "png":
         cv2.imwrite(str(file), np.rint(1000 * north).astype(np.uint16))
-        told = RasterUnits(cell=0.1, height_step=0.001)
+        told = ElevationChoice(cell=0.1, height_step=0.001)
     elif kind == "csv":
         file.write_text("\n".join(";".join(map(str, row)) for row in north))
     elif kind == "csv-points":
@@ -80,7 +80,8 @@ def write(folder: Path, kind: str) -> tuple[Path, MapOptions]:
         a, b = cell[:-1, :-1].ravel(), cell[:-1, 1:].ravel()
         c, d = cell[1:, 1:].ravel(), cell[1:, :-1].ravel()
         faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
-        trimesh.Trimesh(POINTS, faces, process=False).export(file)
+        points = POINTS[:, [0, 2, 1]] * [1, 1, -1] if kind == "glb" else POINTS  # y up
+        trimesh.Trimesh(points, faces, process=False).export(file)
     return file, MapOptions(told, spacing_m=0.1)
 
 
@@ -126,11 +127,11 @@ def test_units_of_rasters(tmp_path: Path) -> None:
     geotiff(file, HILL[::-1].astype("float32"), crs="EPSG:2263")  # US survey feet
     with pytest.raises(InputError, match=r"cells are in us-ft, .* add --height-unit us-ft"):
         read_elevation(file, MapOptions(scale=10.0))
-    read = read_elevation(file, MapOptions(RasterUnits(height_unit="us-ft"), scale=10.0))
+    read = read_elevation(file, MapOptions(ElevationChoice(height_unit="us-ft"), scale=10.0))
     assert read.size_m[0] == pytest.approx(4.0 * 1200 / 3937)
     assert read.relief_m == pytest.approx(np.ptp(HILL) * 1200 / 3937, rel=1e-6)
     geotiff(file, HILL[::-1].astype("float32"))
-    said = read_elevation(file, MapOptions(RasterUnits("cm"), scale=100.0))
+    said = read_elevation(file, MapOptions(ElevationChoice(unit="cm"), scale=100.0))
     assert said.size_m == pytest.approx((0.04, 0.029))
 
 
@@ -141,7 +142,7 @@ def test_cells_without_data_are_holes(tmp_path: Path) -> None:
     tiles = {"tiled": True, "blockxsize": 16, "blockysize": 16}
     geotiff(tmp_path / "a.tif", values, nodata=-9999, compress="lzw", **tiles)
     np.savez(tmp_path / "a.npz", elevation=values)
-    told = MapOptions(RasterUnits(cell=0.1, no_data=-9999.0))
+    told = MapOptions(ElevationChoice(cell=0.1, no_data=-9999.0))
     for file, options in (("a.tif", MapOptions()), ("a.npz", told)):
         found = read_elevation(tmp_path / file, options).elevation
         np.testing.assert_array_equal(found.known, ~hole)
@@ -163,7 +164,7 @@ def test_a_mesh_whose_y_is_up_is_turned(tmp_path: Path) -> None:
     file = tmp_path / "a.xyz"
     turned = POINTS[:, [0, 2, 1]] * [1, 1, -1]  # x, up, south
     np.savetxt(file, turned)
-    found = read_elevation(file, MapOptions(spacing_m=0.1, up="y")).elevation
+    found = read_elevation(file, MapOptions(ElevationChoice(up="y"), spacing_m=0.1)).elevation
     np.testing.assert_allclose(found.z_m, HILL, atol=1e-9)
 
 
@@ -221,7 +222,7 @@ FAULTS = {
 def test_what_cannot_be_read_is_said_in_a_line(name: str, tmp_path: Path) -> None:
     data, expected = FAULTS[name]
     (tmp_path / name).write_bytes(data)
-    told = MapOptions(RasterUnits(cell=0.1, height_step=0.001), spacing_m=0.1)
+    told = MapOptions(ElevationChoice(cell=0.1, height_step=0.001), spacing_m=0.1)
     with pytest.raises(InputError, match=expected) as caught:
         read_elevation(tmp_path / name, told)
     assert name in str(caught.value)
@@ -282,13 +283,13 @@ def test_points_that_may_be_degrees_are_asked_about_with_both_readings(
     np.savetxt(file, DEGREES, fmt="%.9f", delimiter="," if ending == "csv" else " ")
     with pytest.raises(InputError, match=r"--unit deg.*3\.0\d* m by 3\.2\d* m.*--unit m"):
         read_elevation(file, MapOptions())
-    found = read_elevation(file, MapOptions(RasterUnits(unit="deg")))
+    found = read_elevation(file, MapOptions(ElevationChoice(unit="deg")))
     np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
     assert found.relief_m == pytest.approx(10.0 * np.ptp(HILL), rel=0.1)
     far = POINTS + np.array([500.0, 0.0, 0.0])
     np.savetxt(file, far, delimiter="," if ending == "csv" else " ")
     with pytest.raises(InputError, match="longitude, latitude and height"):
-        read_elevation(file, MapOptions(RasterUnits(unit="deg")))
+        read_elevation(file, MapOptions(ElevationChoice(unit="deg")))
 
 
 @pytest.mark.parametrize("names", ["lon,lat,z", "longitude,latitude,elevation"])

@@ -23,7 +23,7 @@ from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.mapping import las_file
 from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions, read_elevation
 from snakewalk.controller.mapping.las_file import child
-from snakewalk.controller.mapping.raster_file import RasterUnits
+from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 COUNT = 6000
 
@@ -64,8 +64,8 @@ def write(
 
 
 def read(file: Path, spacing_m: float = 1.0, **units: Any) -> FileMap:
-    more = {key: units.pop(key) for key in ("classes", "crop", "height") if key in units}
-    return read_elevation(file, MapOptions(RasterUnits(**units), spacing_m=spacing_m, **more))
+    crop = units.pop("crop", None)
+    return read_elevation(file, MapOptions(ElevationChoice(**units), crop, spacing_m=spacing_m))
 
 
 def noted(found: FileMap, words: str) -> bool:
@@ -94,7 +94,7 @@ def test_the_points_of_the_ground_are_used_and_the_others_counted(
     assert noted(found, "3960 points of 6000 are used: those of the ground")
     assert noted(found, "60 of class 7 (low noise)")
     assert noted(found, "1980 of class 5 (high vegetation)")
-    everything = read(file, classes=(2, 5, 7), height="highest")
+    everything = read(file, classes=(2, 5, 7), point="highest")
     assert everything.relief_m > 290.0
 
 
@@ -102,7 +102,7 @@ def test_the_points_of_the_ground_are_used_and_the_others_counted(
 def test_without_a_class_of_ground_all_but_noise_counts(tmp_path: Path) -> None:
     points, kinds = cloud()
     kinds = np.where(kinds == 2, 1, kinds)
-    found = read(write(tmp_path / "a.las", points, kinds, wkt=UTM), height="lowest")
+    found = read(write(tmp_path / "a.las", points, kinds, wkt=UTM), point="lowest")
     assert noted(found, "5940 points of 6000 are used: no class is ground")
     assert noted(found, "left out: 60 of class 7 (low noise); --classes chooses")
 
@@ -113,7 +113,7 @@ def test_withheld_points_are_left_out(tmp_path: Path) -> None:
     held_back = np.zeros(COUNT, bool)
     held_back[:50] = True
     file = write(tmp_path / "a.las", points, np.full(COUNT, 2), wkt=UTM, withheld=held_back)
-    assert noted(read(file, classes=(2,), height="lowest"), "50 withheld points are left out")
+    assert noted(read(file, classes=(2,), point="lowest"), "50 withheld points are left out")
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -205,7 +205,7 @@ def test_the_command_reads_it_and_notes_what_it_left_out(tmp_path: Path) -> None
     assert json.loads(ran.stdout)["notes"][0].startswith("3960 points of 6000 are used")
     assert "left out: 1980 of class 5" in out.read_text()
     wrong = CliRunner().invoke(app, [*words, "--force", "--classes", "2;9"])
-    assert "--classes 2;9: expected numbers from 0 to 255" in str(wrong.exception)
+    assert "--classes 2;9: must be a whole number" in str(wrong.exception)
 
 
 def limited_child(words: str, memory_bytes: str) -> str:

@@ -13,14 +13,14 @@ from rasterio.crs import CRS
 from rasterio.transform import from_origin
 from typer.testing import CliRunner
 
-from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions, read_elevation
 from snakewalk.controller.mapping.length_units import UNITS_M, named_unit, vertical_unit
 from snakewalk.controller.mapping.number_table import read_numbers
-from snakewalk.controller.mapping.raster_file import RasterUnits
+from snakewalk.controller.mapping.raster_file import ElevationChoice
 from snakewalk.controller.terrain.relief import Relief, elevation_variance_m2
 
 ROWS, COLUMNS = 30, 40
@@ -56,11 +56,8 @@ def geotiff(
 def read(file: Path, **units: Any) -> FileMap:
     scale = units.pop("scale", 1.0)
     spacing = units.pop("spacing_m", None)
-    options = {key: units.pop(key) for key in ("crop", "up", "height", "classes") if key in units}
-    assumed = Assumptions(units.pop("assume", ()))
-    told = MapOptions(
-        RasterUnits(**units), scale=scale, spacing_m=spacing, assumed=assumed, **options
-    )
+    crop = units.pop("crop", None)
+    told = MapOptions(ElevationChoice(**units), crop=crop, scale=scale, spacing_m=spacing)
     return read_elevation(file, told)
 
 
@@ -219,7 +216,7 @@ def test_untagged_values_for_missing_cells_are_asked_about(tmp_path: Path) -> No
         assert found.relief_m == pytest.approx(np.ptp(HILL), abs=1e-3)
         assert found.elevation.known.mean() == 1 - 15 / 1200
         assert noted(found, "15 cells hold no height")
-        found = read(file, assume=["lowest_m=-10000"])
+        found = read(file, assume={"lowest_m": "-10000"})
         assert found.relief_m == pytest.approx(9999 + HILL.max(), rel=1e-6)
     tagged = geotiff(tmp_path / "b.tif", values, nodata=-9999.0)
     assert read(tagged).elevation.known.mean() == 1 - 15 / 1200
@@ -239,7 +236,7 @@ def test_a_value_far_below_all_others_is_asked_about(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="heights of 0 m in 160 cells: 500 m below all others"):
         read(geotiff(tmp_path / "a.tif", values))
     assert read(geotiff(tmp_path / "a.tif", values), no_data=0.0).relief_m < 40.0
-    assert read(geotiff(tmp_path / "a.tif", values), assume=["lowest_m=0"]).relief_m > 500.0
+    assert read(geotiff(tmp_path / "a.tif", values), assume={"lowest_m": "0"}).relief_m > 500.0
     sea = np.maximum(HILL - 120.0, 0.0)  # a shore of the relief of the land
     assert read(geotiff(tmp_path / "b.tif", sea)).relief_m == pytest.approx(np.ptp(sea))
 
@@ -348,7 +345,7 @@ def test_points_of_a_depth_camera_are_no_terrain_as_they_are(tmp_path: Path) -> 
     loose = pcd(tmp_path / "b.pcd", room(), 120 * 120, 1)
     with pytest.raises(InputError, match=r"is not ground seen from above: \d+ % .* --up AXIS"):
         read(loose, spacing_m=0.1)
-    turned = read(file, up="-y", spacing_m=0.1, height="highest")
+    turned = read(file, up="-y", spacing_m=0.1, point="highest")
     assert turned.relief_m == pytest.approx(3.0, abs=0.1)  # the wall, up from the floor
     flat = turned.elevation.z_m
     assert np.nanmedian(np.abs(flat - np.nanmin(flat))) < 0.02  # most of it is floor
@@ -463,8 +460,8 @@ def test_a_few_points_far_from_all_others_are_asked_about(tmp_path: Path, sign: 
     said = rf"60 points \(2 %\) lie 29\d.* m {side} all others; .*{key}=\S+ to leave them out"
     with pytest.raises(InputError, match=said):
         read(tmp_path / "a.xyz", unit="m")
-    made = read(tmp_path / "a.xyz", unit="m", assume=(f"{key}={3.0 * sign:g}",))
+    made = read(tmp_path / "a.xyz", unit="m", assume={key: f"{3.0 * sign:g}"})
     assert made.relief_m < 4.1
     assert "60 points beyond the stated heights are left out" in made.notes
-    kept = read(tmp_path / "a.xyz", unit="m", assume=(f"{key}={307.0 * sign:g}",))
+    kept = read(tmp_path / "a.xyz", unit="m", assume={key: f"{307.0 * sign:g}"})
     assert kept.relief_m > 290.0

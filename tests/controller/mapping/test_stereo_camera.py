@@ -42,7 +42,7 @@ def test_calibrations_are_read_by_the_names_people_use(ending: str, tmp_path: Pa
         file.write_text(json.dumps(lists | {"camera": "bench", "rms": 0.4}))
     else:
         opencv_file(file, names, 1000 * T_M)
-    found = read_calibration(file, 0.001)
+    found = read_calibration(file, "mm")
     np.testing.assert_allclose(found.k_left, K)
     np.testing.assert_allclose(found.distortion_left, D)
     np.testing.assert_allclose(found.rotation, TURN)
@@ -53,7 +53,7 @@ def test_points_come_back_through_distortion_and_rectification() -> None:
     """World points projected into both cameras; their rectified disparity gives them back."""
     rng = np.random.default_rng(4)
     points = rng.uniform([-0.3, -0.2, 1.0], [0.3, 0.2, 2.0], (40, 3))
-    c = StereoCalibration(K, D, K, D, TURN, T_M)
+    c = StereoCalibration(K, D, K, D, TURN, T_M, {})
     blank = np.zeros((240, 320), np.uint8)
     pair = rectify(c, blank, blank)
     assert pair.baseline_m == pytest.approx(np.linalg.norm(T_M))

@@ -10,7 +10,7 @@ import pytest
 from snakewalk.config.arrays import Floats
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load_robot, with_keys
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.controller.run import backend
 from snakewalk.controller.run.external import simulated_backend
 from snakewalk.controller.run.factory import prepare_walk
@@ -95,7 +95,7 @@ def test_a_port_that_vanishes_in_a_run_is_told_by_name(bench: Bench, tmp_path: P
         for path, ids in zip(bench.paths, (range(1, 9), range(9, 17)), strict=True)
     ]
     file, name = tmp_path / "mine.toml", bench.paths[1]
-    file.write_text(robot_toml(with_keys(robot, {"ports": ports}, "mine")), encoding="utf-8")
+    file.write_text(plain_toml(with_keys(robot, {"ports": ports}, "mine")), encoding="utf-8")
     done = bench.run(tmp_path / "run", "robot", "--robot", str(file))
     assert done.returncode == 1, done.stderr
     assert f"snakewalk: {name}: " in done.stderr

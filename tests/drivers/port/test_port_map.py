@@ -5,7 +5,7 @@ import pytest
 from snakewalk.config.errors import ConfigError, InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.robot import RobotConfig
-from snakewalk.config.template import robot_toml
+from snakewalk.config.template import plain_toml
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text, ports_in
 
 TWO = [{"port": "/dev/ttyUSB0", "ids": [1, 2]}, {"port": "socket://host:5000", "ids": [3, 4]}]
@@ -55,7 +55,7 @@ def a_robot(ports: list) -> RobotConfig:
 def test_a_file_says_it_and_messages_name_the_port() -> None:
     robot = a_robot(TWO)
     assert robot.joint_label(2) == "joint yaw_03 (ID 3 on socket://host:5000)"
-    assert '[[ports]]\nport = "/dev/ttyUSB0"\nids = [1, 2]\n' in robot_toml(robot)
+    assert '[[ports]]\nport = "/dev/ttyUSB0"\nids = [1, 2]\n' in plain_toml(robot)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
+from snakewalk.config.reading import Fact
 from snakewalk.controller.console.plugins import names
 from snakewalk.controller.exchange.joint_motions.ros_joints import motion_of_rows
 from snakewalk.controller.motion.joint_motion import joint_motion, onto_robot
@@ -20,6 +21,7 @@ NAMES = ROBOT.joint_names
 RATE_HZ, ROWS = 20.0, 60
 TIME_S = np.arange(ROWS) / RATE_HZ
 ANGLES = 0.3 * np.sin(2.0 * np.pi * (0.5 * TIME_S[:, None] - np.arange(len(NAMES)) / 10.0))
+STATED = {"unit": Fact("rad", "file", "a"), "time": Fact("s", "file", "a")}
 
 
 def table(path: Path, header: list[str], values: np.ndarray = ANGLES, separator: str = ",") -> None:
@@ -188,7 +190,7 @@ def test_an_episode_of_a_lerobot_dataset(version: str, tmp_path: Path) -> None:
 
 def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
     motion = joint_motion(Path("a"), TIME_S, [f"m{k}" for k in range(17)],
-                          np.column_stack([ANGLES, TIME_S]))  # fmt: skip
+                          np.column_stack([ANGLES, TIME_S]), **STATED)  # fmt: skip
     with pytest.raises(
         InputError, match=f"a: the file has no joint for {NAMES[0]},.*but .*--joint {NAMES[0]}=NAME"
     ):
@@ -208,7 +210,7 @@ def test_gaps_and_rows_without_a_value_are_counted() -> None:
     kept = np.setdiff1d(np.arange(ROWS), np.arange(20, 29))
     angles = ANGLES[kept].copy()
     angles[5, 2] = np.nan
-    motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles)
+    motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles, **STATED)
     time_s, joints, (_, *notes) = onto_robot(motion, ROBOT, {}, "a")
     assert len(time_s) == len(joints) == 50
     assert notes == [
@@ -271,7 +273,7 @@ def test_names_of_one_stem_are_mapped_by_their_numbers(tmp_path: Path) -> None:
 
 def mapping(names: list[str], robot: str) -> str:
     """Return how joints of a file, one of which moves, are mapped onto a robot."""
-    motion = joint_motion(Path("a.csv"), TIME_S, names, ANGLES)
+    motion = joint_motion(Path("a.csv"), TIME_S, names, ANGLES, **STATED)
     return onto_robot(motion, load_robot(robot), {}, "a.csv")[2][0]
 
 

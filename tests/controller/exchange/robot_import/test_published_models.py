@@ -11,12 +11,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from snakewalk.config.errors import Assumptions, InputError
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.exchange.robot_import import model_compiler
-from snakewalk.controller.exchange.robot_import.robot_import import ImportedRobot, import_robot
+from snakewalk.controller.exchange.robot_import.robot_import import (
+    ImportedRobot,
+    RobotChoice,
+    import_robot,
+)
 from tests.helpers.foreign_robots import (
     CLASSES,
     arm_of_threes,
@@ -33,7 +37,8 @@ COMPILE = model_compiler.compile_model
 def imported(tmp_path: Path, text: str, suffix: str = ".urdf", *assumed: str) -> ImportedRobot:
     file = tmp_path / f"model{suffix}"
     file.write_text(text)
-    return import_robot(file, "model", "XM430-W350", assumed=Assumptions(assumed))
+    answers = dict(words.split("=") for words in assumed)
+    return import_robot(file, "model", "XM430-W350", RobotChoice(assume=answers))
 
 
 def noted(made: ImportedRobot, words: str) -> bool:

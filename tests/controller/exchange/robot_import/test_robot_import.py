@@ -14,7 +14,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.exchange.robot_import import model_compiler
-from snakewalk.controller.exchange.robot_import.robot_import import ImportedRobot, import_robot
+from snakewalk.controller.exchange.robot_import.robot_import import (
+    ImportedRobot,
+    RobotChoice,
+    import_robot,
+)
 from tests.helpers.uneven import UNEVEN
 
 SWIMMER = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "swimmer.xml"
@@ -65,12 +69,13 @@ def yaw(name: str, rest: str = "") -> str:
 def imported(tmp_path: Path, text: str, **options: float) -> ImportedRobot:
     file = tmp_path / "model.xml"
     file.write_text(text)
-    return import_robot(file, "model", "XM430-W350", **options)
+    return import_robot(file, "model", "XM430-W350", RobotChoice(**options))
 
 
 def test_the_swimmer_of_gymnasium_is_a_chain_of_three_links() -> None:
     for reverse in (False, True):
-        made = import_robot(SWIMMER, "swimmer", "XL330-M288", scale=0.1, reverse=reverse)
+        choice = RobotChoice(scale=0.1, reverse=reverse)
+        made = import_robot(SWIMMER, "swimmer", "XL330-M288", choice)
         assert made.robot.joint_axes == "yy"
         assert made.robot.link_lengths_m == pytest.approx((0.1, 0.1, 0.1))
         sphere, rod = 4 / 3 * np.pi * 0.1**3, np.pi * 0.1**2
@@ -267,3 +272,15 @@ def test_a_compiler_that_crashes_or_never_ends_is_told(
 def test_more_parts_than_a_chain_has_are_not_compiled(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds 1003 bodies and joints; a chain has at most 1000"):
         imported(tmp_path, chain(*(yaw(f"j{k}") for k in range(501))))
+
+
+def test_a_model_in_millimetres_keeps_its_masses(tmp_path: Path) -> None:
+    from tests.foreign.robots import LENGTH_M, MASS_KG, urdf
+
+    file = urdf(size=1000.0)(tmp_path)
+    with pytest.raises(InputError, match=r"--mass-scale 1"):
+        import_robot(file, "m", "XM430-W350")
+    made = import_robot(file, "m", "XM430-W350", RobotChoice(scale=0.001, mass_scale=1.0))
+    assert made.robot.length_m == pytest.approx(6 * LENGTH_M)
+    assert made.robot.mass_kg == pytest.approx(6 * MASS_KG)
+    assert made.facts["unit"].source == "user"

@@ -96,8 +96,8 @@ def project(
 
 
 def qtm(path: Path, *, titles: bool) -> None:
-    """Markers in the xz plane of a tank that stands on its side, mm, from (0, 0, 0) away."""
-    place = np.stack([BODY[..., 0], np.full(BODY.shape[:2], 5.0), BODY[..., 1]], axis=2)
+    """Markers in the xz plane of a tank on its side, mm, seen from the end of y; away from 0."""
+    place = np.stack([BODY[..., 0], np.full(BODY.shape[:2], 5.0), -BODY[..., 1]], axis=2)
     place[4, 3] = 0.0
     head = [f"NO_OF_FRAMES\t{FRAMES}", f"NO_OF_MARKERS\t{len(NODES)}", f"FREQUENCY\t{RATE_HZ:g}"]
     head += ["DATA_INCLUDED\t3D", "\t".join(["MARKER_NAMES", *NODES])]

@@ -1,5 +1,6 @@
 """Markers of motion capture: tables with NA, unlabelled and stationary markers, Vicon and TRC."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,7 +53,35 @@ def trc(path: Path, names: list[str], places: np.ndarray, missing: str = "") -> 
     path.write_text("\n".join(rows) + "\n")
 
 
-WRITERS = {"m.tsv": qtm, "v.csv": vicon, "t.trc": trc}
+def motive(path: Path, names: list[str], places: np.ndarray, missing: str = "") -> None:
+    """Write a take as Motive 3 does: a rigid body before the markers, and its expected markers."""
+    about = {
+        "Format Version": "1.24",
+        "Take Name": "eel",
+        "Capture Frame Rate": f"{4 * RATE_HZ:.6f}",
+        "Export Frame Rate": f"{RATE_HZ:.6f}",
+        "Rotation Type": "Quaternion",
+        "Length Units": "Millimeters",
+        "Coordinate Space": "Global",
+    }
+    body, expected, markers = 7, 3, 3 * len(names)
+    kinds = ["Rigid Body"] * body + ["Rigid Body Marker"] * expected + ["Marker"] * markers
+    titles = ["box"] * body + ["box:1"] * expected + [f"Eel:{n}" for n in names for _ in "xyz"]
+    parts = ["Rotation"] * 4 + ["Position"] * (body - 4 + expected + markers)
+    axes = [*"XYZW", *("XYZ" * (2 + len(names)))]
+    rows = [",".join(word for pair in about.items() for word in pair), ""]
+    heads = (("Type", kinds), ("Name", titles), ("ID", kinds), ("", parts))
+    rows += [",".join(["", label, *cells]) for label, cells in heads]
+    rows.append(",".join(["Frame", "Time (Seconds)", *axes]))
+    fixed = ["0", "0", "0", "1", "1", "2", "3", "4", "5", "6"]
+    rows += [
+        ",".join([str(k), f"{k / RATE_HZ:.6f}", *fixed, *row])
+        for k, row in enumerate(cells(places, missing))
+    ]
+    path.write_text("\n".join(rows) + "\n")
+
+
+WRITERS = {"m.tsv": qtm, "v.csv": vicon, "t.trc": trc, "o.csv": motive}
 
 
 def same(track: Track) -> Track:
@@ -83,12 +112,12 @@ def test_markers_without_a_label_or_motion_are_left_out_and_named(
     names = ["floor", *NODES, "*17", "Unlabeled 4"]
     WRITERS[name](tmp_path / name, names, np.concatenate([floor, BODY, strange], axis=1))
     notes = same(load_file(tmp_path / name)).notes
-    assert notes == (
+    assert notes[-2:] == (
         "2 markers without a label are left out: *17, Unlabeled 4; --keypoints uses them",
         "1 markers that do not move are left out: floor; --keypoints uses them",
     )
     chosen = load_file(tmp_path / name, choice=Choice(keypoints=tuple(NODES)))
-    assert same(chosen).notes == ()
+    assert same(chosen).notes == notes[:-2]
 
 
 def test_a_head_that_is_held_in_one_place_is_part_of_the_body(tmp_path: Path) -> None:
@@ -108,7 +137,7 @@ def test_names_that_people_give_are_labels(name: str) -> None:
 
 
 def test_frame_numbers_of_vicon_and_trc_count_missing_frames(tmp_path: Path) -> None:
-    for name in ("v.csv", "t.trc"):
+    for name in ("v.csv", "t.trc", "o.csv"):
         WRITERS[name](tmp_path / name, NODES, BODY)
         lines = (tmp_path / name).read_text().splitlines()
         begin = next(k for k, line in enumerate(lines) if line.startswith(("21,", "21\t")))
@@ -127,6 +156,16 @@ def test_frame_numbers_of_vicon_and_trc_count_missing_frames(tmp_path: Path) -> 
         ("t.trc", lambda text: text.replace("\n20\t20", "\n0\t20"), "states no DataRate"),
         ("t.trc", lambda text: text[: len(text) // 2], "states NumFrames 60"),
         ("t.trc", lambda text: "\n".join(text.splitlines()[:5]), "five head lines"),
+        ("o.csv", lambda text: text.replace("Millimeters", "Inches"), "its unit is 'inches'"),
+        ("o.csv", lambda text: text.replace("Global", "Local"), "export it in Global"),
+        ("o.csv", lambda text: text.replace("Position", "Velocity"), "has no positions of markers"),
+        (
+            "o.csv",
+            lambda text: text.replace("Frame Rate,", "Frame Rate,7"),
+            "frames a second, and its times .*; give --rate",
+        ),
+        ("o.csv", lambda text: text[: text.index(",ID")], "expected rows of types, names"),
+        ("o.csv", lambda text: text.replace("\n5,0.", "\nx,0."), "expected a frame number"),
         (
             "m.tsv",
             lambda text: text.replace("207.", "left", 1),
@@ -157,3 +196,50 @@ def test_c3d_with_markers_without_a_label_and_without_motion(tmp_path: Path) -> 
     file["data"]["points"] = data
     file.write(str(tmp_path / "m.c3d"))
     assert len(same(load_file(tmp_path / "m.c3d")).notes) == 2
+
+
+def test_a_take_of_motive_names_what_it_leaves_out_and_counts_every_nth_frame(
+    tmp_path: Path,
+) -> None:
+    motive(tmp_path / "o.csv", NODES, BODY)
+    track = same(load_file(tmp_path / "o.csv"))
+    left = "left out: places 1 of type Rigid Body, 1 of type Rigid Body Marker"
+    assert track.notes == (left,)
+    text = (tmp_path / "o.csv").read_text().replace(f"{RATE_HZ:.6f}", f"{8 * RATE_HZ:.6f}")
+    text = re.sub(r"^(\d+),", lambda found: f"{4 * int(found[1])},", text, flags=re.MULTILINE)
+    (tmp_path / "o.csv").write_text(text)
+    assert same(load_file(tmp_path / "o.csv")).every == 4, "frames of the camera, at 120 Hz"
+
+
+@pytest.mark.parametrize(("axis", "plane"), [("z", "xy"), ("y", "xz"), ("x", "yz")])
+def test_the_axis_that_points_up_is_inferred_or_asked_for(
+    axis: str, plane: str, tmp_path: Path
+) -> None:
+    turned = {"z": (0, 1, 2), "y": (0, 2, 1), "x": (2, 0, 1)}[axis]
+    signs = {"z": (1, 1, 1), "y": (1, 1, -1), "x": (1, 1, 1)}[axis]
+    for name, usual in (("m.tsv", "z"), ("v.csv", "z"), ("t.trc", "yz"), ("o.csv", "yz")):
+        WRITERS[name](tmp_path / name, NODES, BODY)
+        given = np.array([*BODY.reshape(-1, 2).T, np.full(BODY[..., 0].size, 7.0)])
+        space = (given[list(turned)] * np.array(signs)[:, None]).T.reshape(FRAMES, -1, 3)
+        write_in_space(tmp_path / name, space)
+        if axis not in usual:
+            with pytest.raises(InputError, match=r"does not state which axis points up.*--plane"):
+                load_file(tmp_path / name)
+        else:
+            found = same(load_file(tmp_path / name)).facts["plane"]
+            assert (found.value, found.source) == (plane, "inferred")
+        chosen = same(load_file(tmp_path / name, choice=Choice(plane=plane)))
+        assert chosen.facts["plane"].source == "user"
+
+
+def write_in_space(path: Path, space: np.ndarray) -> None:
+    """Replace the places of a file that one of ``WRITERS`` has written."""
+    separator = "," if path.suffix == ".csv" else "\t"
+    lines = path.read_text().splitlines()
+    rows = [k for k, line in enumerate(lines) if line.count(".") >= 20 and "7.0000" in line]
+    assert len(rows) == len(space)
+    for k, places in zip(rows, space.reshape(len(space), -1), strict=True):
+        cells = lines[k].split(separator)
+        kept = len(cells) - places.size
+        lines[k] = separator.join([*cells[:kept], *(f"{value:.4f}" for value in places)])
+    path.write_text("\n".join(lines) + "\n")

@@ -1,0 +1,1 @@
+"""Generated files of other programs, each with the correct answer."""

@@ -1,0 +1,12 @@
+"""All generated files."""
+
+from collections.abc import Iterator
+
+from tests.foreign import grounds, motions, robots, tracks
+from tests.foreign.case import Case
+
+
+def every_case() -> Iterator[Case]:
+    """Yield the cases of all kinds."""
+    for module in (motions, tracks, grounds, robots):
+        yield from module.cases()
