@@ -39,7 +39,7 @@ PAGE = "bus-faults"
 WRONG_RAD = 0.1
 """A joint this much farther from its goal than before the fault is wrong (ours)."""
 _DETECTORS = {
-    "all the time, though": "motion sensors",
+    "constantly, though": "motion sensors",
     "not continued": "recheck after the pause",
     "come and gone": "alert without an error",
     "not believed": "impossible motion",

@@ -33,7 +33,7 @@ def test_a_zero_is_in_radians_whatever_the_direction(unit_rad: float) -> None:
 def test_a_drive_mode_reverses_by_its_lowest_bit(before: int, now: int, *, reverses: bool) -> None:
     text = register_change("Drive Mode", before, now, UNIT_RAD)
     assert text.startswith(f"Drive Mode is {now}, was {before}")
-    assert ("turns the other way round" in text) == reverses
+    assert ("its direction is reversed" in text) == reverses
 
 
 def test_another_register_has_its_values_only() -> None:

@@ -72,7 +72,7 @@ def test_a_current_that_stays_the_same_while_the_joint_turns_back_is_reported_on
 ) -> None:
     ((k, line),) = swing(hold(0, amps, joint), 300)
     name = ROBOT.joint_label(joint)
-    assert line.startswith(f"{name}: current reads {amps:.2f} A all the time")
+    assert line.startswith(f"{name}: current reads {amps:.2f} A constantly")
     assert CURRENT_READS <= k < 100
 
 
@@ -98,7 +98,7 @@ def test_a_velocity_that_stays_the_same_is_reported_if_the_position_differs(
 
 def test_a_position_that_stays_the_same_is_reported_if_the_velocity_is_not_zero() -> None:
     ((_, line),) = swing(hold(2, 0.1))
-    assert "joint yaw_01 (ID 1): position reads 0.10 rad all the time" in line
+    assert "joint yaw_01 (ID 1): position reads 0.10 rad constantly" in line
 
 
 def test_a_frozen_servo_is_reported_once() -> None:
@@ -106,7 +106,7 @@ def test_a_frozen_servo_is_reported_once() -> None:
         motion[:, 0] = 0.1, -0.3, 0.2
 
     ((_, line),) = swing(frozen)
-    assert "position reads 0.20 rad all the time" in line
+    assert "position reads 0.20 rad constantly" in line
 
 
 def test_a_joint_at_rest_is_not_reported() -> None:

@@ -31,7 +31,7 @@ def test_a_run_reports_a_dead_current_sensor() -> None:
         link.read()
         link.write(JointCommand(line.clock.now_s(), np.full(2, 0.3 * np.sin(2.5 * k * STEP_S))))
     (event,) = events
-    assert event.startswith("joint yaw_01 (ID 1): current reads 0.08 A all the time")
+    assert event.startswith("joint yaw_01 (ID 1): current reads 0.08 A constantly")
 
 
 @pytest.mark.parametrize(("latency_s", "is_late"), [(0.001, False), (0.016, True)])

@@ -537,7 +537,7 @@ def test_a_joint_that_is_read_elsewhere_than_it_was_set_to_hold_is_not_gone_on_w
 
     chain._cycle.read = read_another  # type: ignore[method-assign]
     with pytest.raises(
-        ChainError, match=r"joint pitch_02 \(ID 2\): read \+0.20 rad from where it was"
+        ChainError, match=r"joint pitch_02 \(ID 2\): read \+0.20 rad from its position just before"
     ):
         chain.resume(found)
     assert line.bank["Torque Enable"].tolist() == [0] * 4

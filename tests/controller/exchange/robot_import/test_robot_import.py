@@ -89,7 +89,7 @@ def test_the_swimmer_of_gymnasium_is_a_chain_of_three_links() -> None:
 
 def test_a_model_that_is_too_large_for_servos_is_told_how_to_shrink() -> None:
     with pytest.raises(
-        InputError, match=r"its mass is .* kg, and must be over .* at most 20 kg; add --scale"
+        InputError, match=r"its mass is .* kg, and must be over .* at most 20 kg; use --scale"
     ):
         import_robot(SWIMMER, "swimmer", "XL330-M288")
 
