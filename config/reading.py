@@ -6,11 +6,10 @@ A reader returns ``Facts`` with its values. Answers to its questions may be stor
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final, Literal, NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BaseModel
 
-from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.strict_toml import read_toml
@@ -55,21 +54,6 @@ def stated(data: Path, option: str, by_file: str | None, by_user: str | None) ->
     if by_file is not None:
         return Fact(by_file, "file", "the names of its columns")
     return None if by_user is None else Fact(by_user, "user", option)
-
-
-class Answers(Strict):
-    """Facts that a file may not state: options of commands, and keys of ``FILE.reading.toml``."""
-
-    remember: bool = Field(
-        False,
-        description="store these answers in FILE.reading.toml for later commands",
-    )
-
-
-LISTED: Final = BeforeValidator(
-    lambda given: [part.strip() for part in given.split(",")] if isinstance(given, str) else given
-)
-"""Rule that reads a list from words: A,B,C."""
 
 
 def with_stored(data: Path, answers: M) -> tuple[M, tuple[str, ...]]:

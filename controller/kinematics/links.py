@@ -211,11 +211,11 @@ def _forward(
     centres[links, 2] = sum_z / total_weight
 
 
-def pose_at(position_m: Floats, heading_rad: float) -> BodyPose:
+def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
     """Return the pose of a level head link."""
     c, s = np.cos(heading_rad), np.sin(heading_rad)
     rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return BodyPose(0.0, np.append(position_m[:2], 0.0), rotation)
+    return BodyPose(time_s, np.append(position_m[:2], 0.0), rotation)
 
 
 def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:

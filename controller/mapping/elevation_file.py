@@ -13,6 +13,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.reading import Fact, Facts, store, with_stored
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.geo_raster import read_geo_raster
 from snakewalk.controller.mapping.las_file import in_metres, read_las
 from snakewalk.controller.mapping.length_units import (
@@ -28,7 +29,6 @@ from snakewalk.controller.mapping.raster_file import (
     GEO_RASTERS,
     RASTERS,
     Crop,
-    ElevationChoice,
     Raster,
     read_plain_raster,
 )

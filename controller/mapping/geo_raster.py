@@ -17,6 +17,7 @@ from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.heightfield import MOST_SAMPLES
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
     UNSTATED_HEIGHTS,
@@ -30,7 +31,6 @@ from snakewalk.controller.mapping.length_units import (
 )
 from snakewalk.controller.mapping.raster_file import (
     Crop,
-    ElevationChoice,
     Raster,
     raster_window,
 )

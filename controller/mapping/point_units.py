@@ -9,13 +9,13 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import (
     DEGREE,
     UNSTATED_UNIT,
     degree_cell_m,
     unit_m,
 )
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 _LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
 _LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)

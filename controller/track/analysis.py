@@ -132,9 +132,6 @@ class Analysis:
         u = pulse.points_per_frame
         is_known = np.isfinite(u)
         scale = track.rate_hz / track.angles_rad.shape[1]
-        spread = (
-            np.percentile(u[is_known], [25.0, 75.0]) * scale if is_known.any() else [np.nan] * 2
-        )
         angle = self.undulation.angle_rad
         lateral = self.undulation.lateral
         point_indices = [0, 25, 50, 75, 99]
@@ -170,7 +167,9 @@ class Analysis:
             "wave_not_told": no_wave,
             "time_towards_head": of_wave(wave.headward),
             "pulse_body_lengths_s": of_pulse(self.pulse_body_lengths_s, 4),
-            "pulse_quartiles_body_lengths_s": [of_pulse(float(q), 4) for q in spread],
+            "pulse_quartiles_body_lengths_s": None
+            if no_pulse
+            else [round(float(q) * scale, 4) for q in np.percentile(u[is_known], [25.0, 75.0])],
             "pulse_points_per_frame": of_pulse(pulse.typical, 3),
             "pulse_not_told": no_pulse,
             "pulse_frames_compared": pulse.step,

@@ -6,8 +6,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import Field
 
+from snakewalk.config.answers import LISTED, Answers
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import LISTED, Answers
 
 FEWEST: Final = 4
 """Points for a curve."""

@@ -39,7 +39,7 @@ Serve = Callable[..., Any]
 
 
 class Insert(Protocol):
-    """A script of snakewalk in the page, and the socket that it opens."""
+    """A script of this program in the page, and the socket that it opens."""
 
     path: str
     """Path of the socket."""

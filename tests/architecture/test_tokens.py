@@ -7,7 +7,7 @@ from tests.architecture.layout import ORDER
 from tests.architecture.tokens import by_package, sizes, tokens
 
 DECISIONS: Final = Path(__file__).resolve().parents[2] / "docs/decisions"
-MOST: Final = 472_150
+MOST: Final = 472_210
 """Tokens of all packages."""
 LIMITS: Final = {
     "config": 19550,
@@ -74,7 +74,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (9_960, "0266-the-page-says-how-old-it-is.md"),
     "controller.run": (22_150, "0261-what-agreement-cannot-show-is-inaccuracy.md"),
-    "controller.exchange": (18_350, "0267-facts-of-a-file-have-sources.md"),
+    "controller.exchange": (18_370, "0267-facts-of-a-file-have-sources.md"),
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),
     "controller.metrics": (6_320, "0252-columns-of-a-long-log-in-files.md"),
     "controller.cli": (2_800, "0254-faults-of-the-system.md"),

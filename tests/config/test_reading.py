@@ -13,9 +13,10 @@ import pytest
 from snakewalk.config.archive import FREE_BYTES, read_bytes
 from snakewalk.config.errors import InputError
 from snakewalk.config.reading import Fact, stated
-from snakewalk.controller.exchange.robot_import.robot_import import RobotChoice, import_robot
+from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
+from snakewalk.controller.exchange.robot_import.robot_import import import_robot
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 from snakewalk.controller.run.factory import prepare_playback
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.load import load_file

@@ -12,8 +12,8 @@ from rasterio.crs import CRS
 from rasterio.transform import Affine, from_origin
 
 from snakewalk.config.reading import Facts
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 from tests.controller.mapping.test_las_file import write as las
 from tests.foreign.case import Case, Values
 

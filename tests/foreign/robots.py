@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from snakewalk.config.reading import Facts
-from snakewalk.controller.exchange.robot_import.robot_import import RobotChoice, import_robot
+from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
+from snakewalk.controller.exchange.robot_import.robot_import import import_robot
 from snakewalk.controller.mapping.stereo_camera import read_calibration
 from tests.controller.exchange.robot_import.test_sdf import sdf
 from tests.foreign.case import Case, Values

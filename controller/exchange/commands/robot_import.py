@@ -12,6 +12,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console, show
 from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.exchange.robot_import import robot_import
+from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 
 
 @command(
@@ -31,7 +32,7 @@ def import_robot(
     force: Force = False,
     as_json: Json = False,
     *,
-    choice: robot_import.RobotChoice,
+    choice: RobotChoice,
 ) -> None:
     """Make a robot's file from a URDF, SDF or MuJoCo model; report dropped and changed parts."""
     if out.suffix != ".toml":

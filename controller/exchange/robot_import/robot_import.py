@@ -9,19 +9,17 @@ changes no motion.
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Final
 
 import mujoco
 import numpy as np
-from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
-from snakewalk.config.reading import Answers, Fact, Facts, store, with_stored
+from snakewalk.config.reading import Fact, Facts, store, with_stored
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_catalogue import servo_model as known_model
-from snakewalk.controller.console.option import Flag
 from snakewalk.controller.exchange.robot_import.body_tree import (
     BodyTree,
     Hinge,
@@ -40,6 +38,7 @@ from snakewalk.controller.exchange.robot_import.link_figures import (
 )
 from snakewalk.controller.exchange.robot_import.model_compiler import load_model
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
+from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
 
@@ -57,23 +56,6 @@ _LENGTH_M = (0.0, 1.0)
 _MASS_KG = (0.0001, 20.0)
 _RADIUS_M = (0.002, 0.5)
 """Range that a robot file accepts for a link."""
-
-
-class RobotChoice(Answers):
-    """Facts that a model may not state."""
-
-    scale: float = Field(1.0, ge=1e-3, le=1e3, description="factor on lengths")
-    mass_scale: float | None = Field(
-        None,
-        ge=1e-9,
-        le=1e9,
-        description="factor on masses; default: the cube of --scale; 1 for a model in millimetres "
-        "and kilograms",
-    )
-    reverse: bool = Field(False, description="the first body of the model is the tail")
-    assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
-        {}, description="KEY=VALUE: a value that the model does not state; may be repeated"
-    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ from snakewalk.controller.console.result_files import (
     check_picture,
     refuse_to_overwrite,
 )
+from snakewalk.controller.mapping.elevation_choice import LARGEST, SMALLEST, ElevationChoice
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
-from snakewalk.controller.mapping.raster_file import LARGEST, SMALLEST, ElevationChoice
 from snakewalk.controller.mapping.world_file import MapWorld, map_beside
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from typing import Annotated
 import typer
 from pydantic import Field
 
+from snakewalk.config.answers import Answers
 from snakewalk.config.playback import JointRequest, PlaybackConfig
-from snakewalk.config.reading import Answers, store, texts
+from snakewalk.config.reading import store, texts
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.option import Flag

@@ -235,7 +235,12 @@ FURTHER = [
         "min voltage limit",
         "Min Voltage Limit 60, factory 95",
     ),
-    Kind("a joint that is moved meanwhile", turning, "motion", "joint yaw_03 (ID 3) moves while"),
+    Kind(
+        "a joint that is moved meanwhile",
+        turning,
+        "motion",
+        "joint yaw_03 (ID 3) moves during the check",
+    ),
     Kind(
         "a current sensor that is off",
         reads_as("Present Current", 120),

@@ -159,7 +159,7 @@ ROWS = [
     ("animal synthesise flat-square -o x --set run.time_limit_s=1e12", "are over 300000 frames"),
     ("gait repertoire run list.json", "list.json: not a plan (no JSON object)"),
     ("gait repertoire run object.json", "object.json: not a plan ('format' is missing)"),
-    ("world from cells.csv -o w.toml --cell 1e-300", "--cell 1e-300: must be from 1e-06 to"),
+    ("world from cells.csv -o w.toml --cell 1e-300", "--cell: must be at least 1e-06"),
     ("world from heights.csv -o w.toml --cell 1e6", "a map of 1e+06 m at a scale of 1; the most"),
     ("robot import loop.urdf -o r.toml", "on which all hang: each hangs on another"),
     ("gait policy run wave-cma --seconds 1e12", "--seconds: must be at most "),

@@ -12,9 +12,9 @@ import trimesh
 from rasterio.transform import from_origin
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import MapOptions, read_elevation
 from snakewalk.controller.mapping.point_cloud import read_pcd
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 ROWS, COLUMNS = 30, 41
 X, Y = np.meshgrid(np.arange(COLUMNS) * 0.1, np.arange(ROWS) * 0.1)

@@ -21,9 +21,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.mapping import las_file
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions, read_elevation
 from snakewalk.controller.mapping.las_file import child
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 
 COUNT = 6000
 

@@ -17,10 +17,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions, read_elevation
 from snakewalk.controller.mapping.length_units import UNITS_M, named_unit, vertical_unit
 from snakewalk.controller.mapping.number_table import read_numbers
-from snakewalk.controller.mapping.raster_file import ElevationChoice
 from snakewalk.controller.terrain.relief import Relief, elevation_variance_m2
 
 ROWS, COLUMNS = 30, 40

@@ -237,7 +237,7 @@ def test_a_run_is_told_commanded_and_stopped(graph: Graph, client: Client, tmp_p
             "joint goals: yaw_04: 9.00 rad; its limit is 1.50",
             "joint goals: no positions; velocities and efforts alone are not accepted",
             r"joint goals: stamped \d+.\d s ago; at most 1 s is taken, and 0 for now",
-            "trajectory: 501 points; 1 to 500 are taken",
+            "trajectory: 501 points; 1 to 500 are accepted",
             "trajectory: its points have different numbers of values",
             "trajectory: its points have no positions",
             "gait rolling needs pitch joints; robot yaw16 has none.*",

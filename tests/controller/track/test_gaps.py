@@ -131,10 +131,8 @@ def test_missing_frames_and_notes_are_in_the_result_of_both_commands(tmp_path: P
     (facts,) = json.loads(snakewalk("animal", "track", str(tmp_path / "gaps.csv"), "--json").stdout)
     assert facts["frames_missing"] == 148
     for name in ("track", "analyse"):
-        assert (
-            "148 missing in the file"
-            in snakewalk("animal", name, str(tmp_path / "gaps.csv")).stdout
-        )
+        words = snakewalk("animal", name, str(tmp_path / "gaps.csv")).stdout.split()
+        assert "frames missing 148" in " ".join(words)
 
 
 def test_notes_stay_in_the_file_that_is_written(tmp_path: Path) -> None:

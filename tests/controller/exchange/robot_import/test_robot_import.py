@@ -14,9 +14,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.exchange.robot_import import model_compiler
+from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 from snakewalk.controller.exchange.robot_import.robot_import import (
     ImportedRobot,
-    RobotChoice,
     import_robot,
 )
 from tests.helpers.uneven import UNEVEN

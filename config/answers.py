@@ -1,0 +1,22 @@
+"""Answers of the user about a file: options of the commands that read it."""
+
+from typing import Final
+
+from pydantic import BeforeValidator, Field
+
+from snakewalk.config.base import Strict
+
+
+class Answers(Strict):
+    """Facts that a file may not state: options of commands, and keys of ``FILE.reading.toml``."""
+
+    remember: bool = Field(
+        False,
+        description="store these answers in FILE.reading.toml for later commands",
+    )
+
+
+LISTED: Final = BeforeValidator(
+    lambda given: [part.strip() for part in given.split(",")] if isinstance(given, str) else given
+)
+"""Rule that reads a list from words: A,B,C."""
