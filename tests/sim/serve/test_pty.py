@@ -1,5 +1,6 @@
 """The servos behind a pseudo-terminal: by hand with a simulated clock, and in real time."""
 
+import math
 import os
 import select
 import termios
@@ -13,7 +14,7 @@ import pytest
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.line.clock import SimClock
-from snakewalk.sim.serve.pty import PtyServer
+from snakewalk.sim.serve.pty import PACE_MAX, PtyServer
 from tests.helpers.bus import a_line, send_to, serve_for, take, write
 
 PING = bytes.fromhex("FF FF FD 00 01 03 00 01 19 4E")
@@ -71,6 +72,48 @@ def test_a_flush_after_the_last_look_is_counted() -> None:
         termios.tcflush(client, termios.TCOFLUSH)
     os.close(client)
     assert server.output_flushes == 1
+
+
+def test_a_client_that_discards_its_input_has_flushed_no_output() -> None:
+    with PtyServer(a_line(1), SimClock()) as server:
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
+        termios.tcflush(client, termios.TCIFLUSH)
+        server.step(0.0)
+        os.close(client)
+    assert server.output_flushes == 0
+
+
+@pytest.mark.parametrize(
+    ("pace", "fault"),
+    [
+        (0.0, "must be above 0"),
+        (-1.0, "must be above 0"),
+        (math.nan, "must be above 0"),
+        (math.inf, f"must be at most {PACE_MAX:g}"),
+        (1.001 * PACE_MAX, f"must be at most {PACE_MAX:g}"),
+    ],
+)
+def test_a_pace_is_positive_and_bounded(pace: float, fault: str) -> None:
+    with PtyServer(a_line(1), SimClock(), pace=PACE_MAX) as server:
+        with pytest.raises(InputError, match=fault):
+            server.set_pace(pace)
+        server.set_pace(0.5)
+        assert server.real_time_s(1.5) - server.real_time_s(1.0) == pytest.approx(1.0)
+
+
+def test_a_device_that_was_unplugged_comes_back_with_the_line() -> None:
+    line = a_line(1)
+    with PtyServer(line, SimClock()) as server:
+        line.disconnect()
+        server.step(0.0)
+        assert server.path == ""
+        server.step(0.0)
+        assert server.path == ""
+        line.reconnect()
+        server.step(0.0)
+        assert os.path.exists(server.path)
+        client = os.open(server.path, os.O_RDWR | os.O_NOCTTY)
+        os.close(client)
 
 
 class CountingClock(SimClock):
@@ -192,3 +235,18 @@ def test_a_link_that_another_program_changes_is_reported_when_it_happens(
         f"{link}: leads to /dev/null now; the servos are at {path}",
     ]
     assert os.readlink(link) == "/dev/null"  # another's is left alone
+
+
+def test_a_link_that_a_file_replaces_is_reported_and_the_file_stays(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    link, clock = tmp_path / "tty", SimClock()
+    with PtyServer(a_line(), clock, link=link) as server:
+        link.unlink()
+        link.write_text("mine")
+        clock.advance(1.5)
+        server.step(0.0)
+        path = server.path
+    (record,) = caplog.records
+    assert record.getMessage() == f"{link}: leads to a file now; the servos are at {path}"
+    assert link.read_text() == "mine"
