@@ -187,6 +187,7 @@ def test_the_quartiles_are_of_all_known_pulses() -> None:
     quartiles = (24.75 * RATE_HZ / POINTS, 74.25 * RATE_HZ / POINTS)
     assert facts["pulse_quartiles_body_lengths_s"] == pytest.approx(quartiles)
     assert facts["pulse_measured_share"] == 0.333
+    assert planted(pulse=4.00049).facts()["pulse_points_per_frame"] == 4.0
 
 
 def test_facts_without_a_wave_or_a_pulse_are_none_and_state_the_reason() -> None:

@@ -9,6 +9,7 @@ import pytest
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
+from snakewalk.config.robot.links import LinkConfig
 from snakewalk.sim.rendering.looks import (
     AHEAD,
     BACK,
@@ -471,3 +472,23 @@ def test_a_floor_without_marks_has_no_lines_a_metre() -> None:
     texture = model.tex("ground")
     pixels = model.tex_data[int(texture.adr[0]) :][: int(texture.width[0]) ** 2 * 3]
     np.testing.assert_allclose(pixels.reshape(-1, 3).mean(axis=0), GRASS, atol=4.0)
+
+
+def test_the_head_is_as_thick_as_the_first_link() -> None:
+    links = [LinkConfig(radius_m=0.02 + 0.001 * k) for k in range(ROBOT.link_count)]
+    robot = ROBOT.model_copy(update={"links": links})
+    model = drawn(robot)
+    (head,) = of_colours(model, int(mujoco.mjtGeom.mjGEOM_ELLIPSOID), HEAD)
+    assert model.geom_size[head, 1] == pytest.approx(1.02 * 0.02)
+
+
+def test_bright_spots_are_of_rock() -> None:
+    """Half a slope of rock everywhere: the spots alone decide between grass and rock."""
+    east_m = np.linspace(0.0, 4.0, 81)
+    ground = HeightField(np.broadcast_to(0.5 * east_m, (81, 81)), 0.05, 0.0, 0.0)
+    model = dressed_model(Scene(ROBOT, load_world("flat"), ground), None)
+    texture = model.tex("ground")
+    size = int(texture.height[0])
+    pixels = model.tex_data[int(texture.adr[0]) :][: size * size * 3].reshape(-1, 3).astype(float)
+    redness = pixels[:, 0] / pixels[:, 1]
+    assert np.corrcoef(redness, pixels[:, 1])[0, 1] > 0.5
