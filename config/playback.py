@@ -51,3 +51,8 @@ class PlaybackConfig(JointRequest):
     clip: bool = Field(
         False, description="hold joints at their limits where the recording bends further"
     )
+
+    @property
+    def request(self) -> JointRequest:
+        """The answers about a file of joint angles alone."""
+        return JointRequest(**self.model_dump(include={*JointRequest.model_fields}))

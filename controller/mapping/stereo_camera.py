@@ -116,9 +116,11 @@ def read_calibration(file: Path, unit: str = "m") -> StereoCalibration:
             )
             raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
         matrices[key] = np.zeros(5) if name is None else storage[name]
-    default = unit == "m"
-    source = Fact(unit, "inferred" if default else "user", f"{'default of ' * default}--unit")
-    return _checked_calibration(file, matrices, source)
+    is_default = unit == "m"
+    fact = (
+        Fact(unit, "inferred", "default of --unit") if is_default else Fact(unit, "user", "--unit")
+    )
+    return _checked_calibration(file, matrices, fact)
 
 
 def _storage(file: Path) -> dict[str, Any]:

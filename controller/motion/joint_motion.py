@@ -196,17 +196,17 @@ def _by_number(names: Sequence[str], joint_names: Sequence[str], where: str) -> 
             a mapping.
 
     """
-    file_name, joint_name = _by_stem(names), _by_stem(joint_names)
-    if len(file_name) == 1:
-        return dict(zip(joint_names, *file_name.values(), strict=True))
+    by_file_stem, by_joint_stem = _by_stem(names), _by_stem(joint_names)
+    if len(by_file_stem) == 1:
+        return dict(zip(joint_names, *by_file_stem.values(), strict=True))
     pairs = {
         joint: name
-        for stem, joints in joint_name.items()
-        for other, file_names in file_name.items()
+        for stem, joints in by_joint_stem.items()
+        for other, file_names in by_file_stem.items()
         if len(joints) == len(file_names) and _words(stem) & _words(other)
         for joint, name in zip(joints, file_names, strict=True)
     }
-    if len(file_name) == len(joint_name) and sorted(pairs.values()) == sorted(names):
+    if len(by_file_stem) == len(by_joint_stem) and sorted(pairs.values()) == sorted(names):
         return pairs
     options = " ".join(
         f"--joint {joint_name}={file_name}"

@@ -36,7 +36,7 @@ LOWLAND, HIGHLAND = (np.array(rgb(colour), float) for colour in (colours.LOWLAND
 SHALLOW = [0.30, 0.56, 0.66], [0.26, 0.51, 0.62]
 SURFACE: Rgba = (0.55, 0.80, 0.92, 0.13)
 CONTOURS = 12
-GRASS, ROCK = (np.array(rgb, float) for rgb in ((122, 128, 78), (142, 124, 100)))
+GRASS, ROCK = (np.array(colour, float) for colour in ((122, 128, 78), (142, 124, 100)))
 """Colours of ground without marks, level and steep (ours)."""
 ROCK_SLOPE = 0.5
 """Slope at which ground without marks is half rock (ours)."""

@@ -28,13 +28,13 @@ from tests.mutation.mutants import Mutant, mutants
 from tests.mutation.packages import (
     FILES,
     FURTHER_FILES,
+    PAGE,
     drawn_modules,
     nearest_tests,
     sample,
 )
 from tests.mutation.trial import ROOT, STUCK_S, WORDS, path_of, try_mutants
 
-DOC = ROOT / "docs" / "mutation.md"
 EVERY, PACKAGES = "mutation", "packages"
 SHARE = 0.8
 """Least share of noticed mutants in a package."""
@@ -182,7 +182,7 @@ def try_packages(names: list[str], count: int) -> Iterator[tuple[str, str, bool]
 
 def lines_between(marker: str) -> list[str]:
     """Return the lines of the page that a marker encloses."""
-    text = DOC.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     return (
         text.split(f"<!-- {marker} begins -->\n")[1]
         .split(f"<!-- {marker} ends -->")[0]
@@ -193,9 +193,9 @@ def lines_between(marker: str) -> list[str]:
 def write_between(marker: str, lines: list[str]) -> None:
     """Replace the lines of the page that a marker encloses."""
     begin, end = f"<!-- {marker} begins -->", f"<!-- {marker} ends -->"
-    text = DOC.read_text(encoding="utf-8")
+    text = PAGE.read_text(encoding="utf-8")
     shown = "\n".join(lines)
-    DOC.write_text(
+    PAGE.write_text(
         f"{text.split(begin)[0]}{begin}\n{shown}\n{end}{text.split(end)[-1]}", encoding="utf-8"
     )
 

@@ -388,9 +388,8 @@ def _kinematics_error_m(
         points = chain_points_m(robot, body)[1:-1]
         fixed = 0 if not reverse else len(points) - 1
         model_origin, model_turn = points[fixed], body.rotation[0 if not reverse else -1]
-        model_points = (
-            points - model_origin
-        ) @ model_turn  # seen from the link that the model holds
+        # seen from the link that the model holds
+        model_points = (points - model_origin) @ model_turn
         anchors = np.array([data.xanchor[hinge.joint] for hinge in hinges])
         axes = np.array([data.xaxis[hinge.joint] for hinge in hinges])
         origin = _on_line_m(hinges, directions, fixed)

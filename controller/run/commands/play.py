@@ -7,7 +7,7 @@ import typer
 from pydantic import Field
 
 from snakewalk.config.answers import Answers
-from snakewalk.config.playback import JointRequest, PlaybackConfig
+from snakewalk.config.playback import PlaybackConfig
 from snakewalk.config.reading import store, texts
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
@@ -70,8 +70,7 @@ def play(
         **playback.model_dump(exclude={"remember"}),
     )
     if playback.remember:
-        answers = playback.model_dump(include={*JointRequest.model_fields})
-        store(Path(track), JointRequest(**answers))
+        store(Path(track), playback.request)
     name = f"play-{prepared.run.name}"
     result = run_for_user(
         prepared, name, options, bar=TimeBar(prepared.run.name, prepared.duration_s)

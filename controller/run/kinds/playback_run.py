@@ -43,9 +43,7 @@ def foreign_joints(track: str, robot: RobotConfig, asked: JointRequest) -> Joint
             option = "--joint" if given[0] == "joints" else f"--{given[0]}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None
-    request, lines = with_stored(
-        path, JointRequest(**asked.model_dump(include={*JointRequest.model_fields}))
-    )
+    request, lines = with_stored(path, asked)
     motion = reader.read(path, request)
     time_s, joint_rad, notes = onto_robot(motion, robot, request.joints, track)
     return replace(motion, time_s=time_s, joint_rad=joint_rad, notes=(*lines, *notes))
@@ -111,7 +109,7 @@ class PlaybackRun(PathlessRun):
 
     @cached_property
     def _foreign(self) -> JointMotion | None:
-        return foreign_joints(self.run.track, self.robot, self._asked_playback)
+        return foreign_joints(self.run.track, self.robot, self._asked_playback.request)
 
     @property
     def facts(self) -> Facts:
