@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.soak --simulated-h 24 --real-min 30`` runs in-process simulated servos in
 simulated time, then servos that another process serves on a pseudo-terminal in real time. With
-``--write`` it replaces the tables of ``docs/benchmarks/soak.md``. Both parts are bounded by their
+``--robot-min 20`` another process serves a robot of 16 joints on its ground instead. With
+``--write`` it replaces the tables of ``docs/benchmarks/soak.md``. The parts are bounded by their
 options; 0 leaves a part out.
 """
 
@@ -47,6 +48,9 @@ FAULT_EVERY_S = 20.0
 """Mean time between two faults of the simulated part."""
 NOISE = 'seed = 1\n[[fault]]\nkind = "drop"\nchance = 0.0005\n'
 """Faults of the served part."""
+SERVOS = ("--servos", f"1-{JOINTS}")
+ROBOT = "yaw16"
+"""Shipped robot of 16 joints."""
 
 
 @dataclass(frozen=True)
@@ -168,12 +172,12 @@ def simulated(hours: float, seed: int = 1) -> list[Window]:
 
 
 @contextmanager
-def served(folder: Path) -> Iterator[tuple[str, int]]:
+def served(folder: Path, *what: str) -> Iterator[tuple[str, int]]:
     """Serve simulated servos by another process; its device and process ID."""
     (folder / "noise.toml").write_text(NOISE, encoding="utf-8")
     command = [
         *(sys.executable, "-u", "-c", PROGRAM),
-        *("bus", "serve", "--servos", f"1-{JOINTS}", "--faults", str(folder / "noise.toml")),
+        *("bus", "serve", *what, "--faults", str(folder / "noise.toml")),
     ]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
@@ -185,11 +189,11 @@ def served(folder: Path) -> Iterator[tuple[str, int]]:
             bus.terminate()
 
 
-def real(minutes: float) -> list[Window]:
-    """Soak a chain on a pseudo-terminal in real time."""
+def real(minutes: float, *what: str) -> list[Window]:
+    """Soak a chain on a pseudo-terminal in real time; ``what`` are the options of the server."""
     robot = RobotConfig(name="soak", joint_axes="y" * JOINTS)
     safety = SafetyConfig(stale_limit_s=0.3, watchdog_s=0.5)
-    with tempfile.TemporaryDirectory() as folder, served(Path(folder)) as (device, process):
+    with tempfile.TemporaryDirectory() as folder, served(Path(folder), *what) as (device, process):
         port = SerialPort(device, 1_000_000)
         bus = DynamixelBus(port, robot.models_by_id)
         chain = ServoChain(bus, robot, watchdog_s=safety.watchdog_s)
@@ -239,17 +243,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=__doc__)
     parser.add_argument("--simulated-h", type=float, default=24.0, help="simulated time, hours")
     parser.add_argument("--real-min", type=float, default=30.0, help="real time, minutes")
+    parser.add_argument("--robot-min", type=float, default=20.0, help="of a robot, minutes")
     parser.add_argument("--write", action="store_true", help="replace the tables of the page")
     given = parser.parse_args()
     command = f"python -m benchmarks.soak {' '.join(sys.argv[1:])}"
     parts = (
         ("simulated", given.simulated_h, simulated, 3600.0, "h"),
-        ("real time", given.real_min, real, 60.0, "min"),
+        ("real time", given.real_min, lambda length: real(length, *SERVOS), 60.0, "min"),
+        ("robot", given.robot_min, lambda length: real(length, "--robot", ROBOT), 60.0, "min"),
     )
     for name, length, run, unit_s, unit in parts:
         if length <= 0.0:
             continue
-        text = table(run(length), unit_s, unit, is_real=name == "real time")
+        text = table(run(length), unit_s, unit, is_real=name != "simulated")
         text = f"{provenance(command)}\n\n{text}"
         print(f"{name}\n{text}\n")
         if given.write:
