@@ -52,6 +52,8 @@ _DETECTORS = {
     "Limit is": "fingerprint",
     "Drive Mode is": "fingerprint",
     "another program write": "settings read-back",
+    "changed its mode": "settings read-back",
+    "Operating Mode is": "settings read-back",
     "exchanged": "identity read-back",
     "torque is off": "torque read-back",
     "it has rebooted": "settings read-back",
