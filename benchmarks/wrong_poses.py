@@ -18,6 +18,7 @@ from rich.table import Table
 from snakewalk.config.arrays import Floats
 from snakewalk.config.pose import TrackerConfig
 from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, quaternion_of, rotation_of
+from snakewalk.controller.pose.udp_feed import SimulatedDatagrams
 from snakewalk.controller.rehearsal import rehearsal
 from snakewalk.drivers.attitude import rotation_by
 
@@ -254,12 +255,12 @@ class WrongSource:
 def rehearsed(kind: str, run: str, seed: int, has_errors: bool) -> dict[str, Any]:
     """Rehearse a run with a kind of wrong poses."""
     source = WrongSource(KINDS[kind]())
-    true = rehearsal.SimulatedDatagrams.arrived
+    true = SimulatedDatagrams.arrived
 
-    def arrived(self: rehearsal.SimulatedDatagrams, now_s: float) -> Sequence[ArrivedPose]:
+    def arrived(self: SimulatedDatagrams, now_s: float) -> Sequence[ArrivedPose]:
         return [source(each) for each in true(self, now_s)]
 
-    with patch.object(rehearsal.SimulatedDatagrams, "arrived", arrived):
+    with patch.object(SimulatedDatagrams, "arrived", arrived):
         return rehearsal.rehearse(rehearsal.RehearsalCase(run, seed, has_errors, TRACKER))
 
 

@@ -6,18 +6,18 @@ Pflimlin, "Nonlinear complementary filters on the special orthogonal group", IEE
 Automatic Control 53, 2008, without its bias estimate.
 """
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 
-CORRECTION_1_S: Final = 0.5
+CORRECTION_1_S = 0.5
 """Rate of the correction of the up direction (ours): an error falls to a third in two seconds."""
-_REST_TOLERANCE: Final = 0.15
+_REST_TOLERANCE = 0.15
 """Largest relative difference from gravity of a force that shows the direction up (ours)."""
-_LONGEST_PAUSE_S: Final = 0.2
+_LONGEST_PAUSE_S = 0.2
 """Longest pause between readings that a correction counts, s (ours)."""
 
 

@@ -13,9 +13,9 @@ The environment variable ``SNAKEWALK_FALLBACK`` forces fallbacks: names, separat
 
 import logging
 import os
-from typing import Final, Literal
+from typing import Literal
 
-ENVIRONMENT: Final = "SNAKEWALK_FALLBACK"
+ENVIRONMENT = "SNAKEWALK_FALLBACK"
 Interface = Literal["numba", "cache", "mujoco"]
 
 _reported_fallbacks: dict[Interface, str] = {}

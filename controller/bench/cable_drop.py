@@ -7,7 +7,7 @@ of another lead.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +19,24 @@ from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V
 from snakewalk.sim.servo.motor import motors_of
 from snakewalk.sim.servo.supply import SOURCE_OHM, Cabling
 
-CHECK: Final = "cables"
-CONTACT_LIMIT_A: Final = 3.0
+CHECK = "cables"
+CONTACT_LIMIT_A = 3.0
 """Limit of a contact of the JST EH connector of the X series with AWG 22 (JST's data sheet)."""
-DROP_SHARE: Final = 0.04
+DROP_SHARE = 0.04
 """Share of the supply that may drop along the chain (ours): 0.5 V of 12 V."""
-_BLOCKS: Final = 8
+_BLOCKS = 8
 """Parts of a measurement whose scatter is the error of the whole."""
-_SIDES: Final = 2.4
+_SIDES = 2.4
 """Half an interval in standard errors: Student's t for 8 blocks, 95 %."""
-_BAD_TIMES: Final = 3.0
+_BAD_TIMES = 3.0
 """A cable is bad if its resistance is this multiple of the others' and of a new one's (ours)."""
-_BAD_DROP_V: Final = 0.1
+_BAD_DROP_V = 0.1
 """... and if its drop exceeds theirs by this: two servos may measure differently by less (ours)."""
-_BAD_ERRORS: Final = 3.0
+_BAD_ERRORS = 3.0
 """Difference of a bad cable's drop in standard errors (ours)."""
-_LINE: Final = 5
+_LINE = 5
 """Cables between two leads from which on it is asked how those share the current (ours)."""
-_LEAST_CABLE_CURRENT_A: Final = 1e-3
+_LEAST_CABLE_CURRENT_A = 1e-3
 """A smaller current does not allow an estimate of a cable."""
 
 

@@ -36,8 +36,7 @@ from snakewalk.drivers.chain.joint_codec import JointUnits
 from snakewalk.drivers.chain.start_up import ServoReport, inspect
 from snakewalk.drivers.errors import BusError, ChainError, FaultCause, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.port.network_port import NetworkPort
-from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.port.line_port import LinePort
 from snakewalk.drivers.protocol.registers import BAUDS, FACTORY_BAUD, ServoUnits
 from snakewalk.drivers.types import ImuState
 
@@ -288,7 +287,7 @@ def _show_step(on_progress: OnStep, port: str, step: str) -> None:
 
 
 def examine_segments(
-    segments: Sequence[tuple[SerialPort | NetworkPort, Sequence[int]]],
+    segments: Sequence[tuple[LinePort, Sequence[int]]],
     robot: RobotConfig,
     run: RunConfig,
     *,

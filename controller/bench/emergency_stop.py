@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Literal
+from typing import Literal
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.plain_text import plain
@@ -30,12 +30,12 @@ from snakewalk.drivers.safety.stop_button import (
 )
 
 How = Literal["latched", "terminated", "killed", "torque off", "not stopped", "port in use"]
-LATCH_S: Final = 1.0
+LATCH_S = 1.0
 """Longest time of a run until it latches (ours): a cycle lasts some 10 ms, the set-up longer."""
-END_S: Final = 3.0
+END_S = 3.0
 """Longest time of a terminated run until torque is off: it asks for 2 s (ours)."""
-_TORQUE_OFF: Final = "snakewalk.controller.bench.torque_off"
-_POLL_S: Final = 1e-3
+_TORQUE_OFF = "snakewalk.controller.bench.torque_off"
+_POLL_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)

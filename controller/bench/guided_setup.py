@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 import typer
 
@@ -14,10 +13,10 @@ from snakewalk.config.archive import read_json_object
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.result_files import write_result
 
-_GAIT: Final = "lateral-undulation"
-_GENTLE: Final = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
+_GAIT = "lateral-undulation"
+_GENTLE = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
 """Options of the first motion: slow, and with little torque (ours)."""
-_DEAD_RECKONED: Final = 3
+_DEAD_RECKONED = 3
 """Exit code of a successful run without a measured pose."""
 
 
@@ -94,7 +93,7 @@ def _move(files: RobotFiles) -> list[str]:
     return [*files.on_port(*_motion(files, "first-motion")), *page]
 
 
-STEPS: Final = (
+STEPS = (
     SetupStep("find", "Find the servos: models, IDs, baud rates. Changes nothing.", _find),
     SetupStep("examine", "Examine adapter, bus and servos. Changes nothing.", _examine),
     SetupStep(

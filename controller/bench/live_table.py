@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Final
 
 from rich.console import Group
 from rich.live import Live
@@ -24,9 +23,9 @@ from snakewalk.sim.serve.live_table import Packet, Rows
 from snakewalk.sim.sniff.decode import DecodedPacket
 
 MakeDecoder = Callable[[], AnyDecoder]
-_LISTED_PACKETS: Final = 8
+_LISTED_PACKETS = 8
 """Packets in words below the table."""
-_END_S: Final = 2.0
+_END_S = 2.0
 """Longest time until the drawing process ends."""
 
 

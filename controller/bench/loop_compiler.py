@@ -10,7 +10,7 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Final
+from typing import IO
 
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.child_process import start_module
@@ -19,9 +19,9 @@ from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.fallbacks import fallbacks_in_use
 
-ALL: Final = (("drivers", "sim"), ("controller",))
+ALL = (("drivers", "sim"), ("controller",))
 """Packages of each child for all loops: they compile about equally long, and no loop of both."""
-FOR_RUNS: Final = (
+FOR_RUNS = (
     ("drivers", "sim"),
     tuple(
         f"controller.{name}"
@@ -32,7 +32,7 @@ FOR_RUNS: Final = (
     ),
 )
 """Packages of each child whose loops a run in the simulator needs: about half of the work."""
-_COMPILING_MODULE: Final = "snakewalk.drivers.compiling"
+_COMPILING_MODULE = "snakewalk.drivers.compiling"
 """A module with a loop imports its decorator from here."""
 
 

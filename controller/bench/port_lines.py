@@ -11,10 +11,10 @@ from snakewalk.controller.bench.servo_settings import open_servo
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.port import network_port
+from snakewalk.drivers.port.line_port import LinePort
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map
-from snakewalk.drivers.port.serial_port import SerialPort
 
-Line = SerialPort | network_port.NetworkPort
+Line = LinePort
 
 
 @dataclass(frozen=True, slots=True)

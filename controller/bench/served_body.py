@@ -1,7 +1,6 @@
 """The simulated robot that ``bus serve`` serves: its place, its tracker, and its truth."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +10,7 @@ from snakewalk.config.pose import TrackerConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.options import key_values
-from snakewalk.controller.pose.tracker import SimulatedTracker
-from snakewalk.controller.pose.udp_feed import UdpSender, parse_address
+from snakewalk.controller.pose.udp_feed import parse_address
 from snakewalk.controller.run.external.served_robot import Place, ServedRobot, Serving, place_of
 from snakewalk.controller.run.factory import prepare_job
 
@@ -101,26 +99,3 @@ class ServedBody:
         if not all(map(math.isfinite, (x_m, y_m, heading_deg))):
             raise InputError(f"--at {self.at}: expected finite numbers")
         return Place((x_m, y_m), math.radians(heading_deg), default.joint_rad)
-
-
-class PosePublisher:
-    """Sends the poses of a tracker when they are due; call it often."""
-
-    def __init__(
-        self, tracker: SimulatedTracker, line_s: Callable[[], float], address: tuple[str, int]
-    ) -> None:
-        self._tracker = tracker
-        self._line_s = line_s
-        self._sender = UdpSender(*address)
-        self.sent = 0
-        """Number of datagrams that were sent so far."""
-
-    def __call__(self) -> None:
-        """Send the datagrams that are due."""
-        for sent_pose in self._tracker.due(self._line_s()):
-            self._sender.send(sent_pose.data)
-            self.sent += 1
-
-    def close(self) -> None:
-        """Close the socket."""
-        self._sender.close()

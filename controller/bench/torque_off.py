@@ -3,34 +3,34 @@
 import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.controller.bench.emergency_stop import StopOutcome
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.errors import BusError, ControlTableError, PortBusyError
-from snakewalk.drivers.port.network_port import NetworkPort, open_port
+from snakewalk.drivers.port.line_port import LinePort
+from snakewalk.drivers.port.network_port import open_port
 from snakewalk.drivers.port.port_holders import holders_of
-from snakewalk.drivers.port.serial_port import SerialPort
 
-_LIKELY: Final = (1_000_000, 57_600)
+_LIKELY = (1_000_000, 57_600)
 """Sent before anything slow is imported: the usual rate, and that of new servos."""
-_USB_S: Final = 5e-3
+_USB_S = 5e-3
 """Longest time for which an adapter keeps bytes before it sends them (ours)."""
-_COPIES: Final = 3
+_COPIES = 3
 """Number of times that torque off is sent: noise may hit one (ours)."""
-_TRIES: Final = 8
+_TRIES = 8
 """Number of times that a servo is asked whether its torque is off (ours)."""
-_BITS_PER_BYTE: Final = 10
-_REPETITIONS: Final = 20
+_BITS_PER_BYTE = 10
+_REPETITIONS = 20
 """Number of times that torque off is sent past another program (ours): its packets hit some."""
-_PAST_EVERY_S: Final = 7e-3
+_PAST_EVERY_S = 7e-3
 """Time between these; no divisor of a usual period of control (ours)."""
-DYNAMIXEL_OFF: Final = bytes.fromhex("fffffd00fe0600034000002e16")
+DYNAMIXEL_OFF = bytes.fromhex("fffffd00fe0600034000002e16")
 """Write 0 to Torque Enable(64) of all X and MX(2.0) servos; ``encode_instruction`` is slow to
 import."""
-FEETECH_OFF: Final = bytes.fromhex("fffffe04032800d2")
+FEETECH_OFF = bytes.fromhex("fffffe04032800d2")
 """Write 0 to Torque Enable(40) of all Feetech servos."""
-_PACKETS: Final = (DYNAMIXEL_OFF + FEETECH_OFF) * _COPIES
+_PACKETS = (DYNAMIXEL_OFF + FEETECH_OFF) * _COPIES
 
 
 def torque_off(
@@ -104,7 +104,7 @@ def _scan_module() -> Any:
     return scan
 
 
-def _send(port: SerialPort | NetworkPort, rates: Iterable[int]) -> int:
+def _send(port: LinePort, rates: Iterable[int]) -> int:
     """Send torque off at baud rates; return the number of rates that the port accepts."""
     sent = 0
     for rate in rates:
@@ -141,7 +141,7 @@ def _send_past(device: str) -> str:
     return f"{text}; end that program, on the host by: sudo snakewalk stop --port {device}"
 
 
-def _confirm(port: SerialPort | NetworkPort, servo_id: int, model: str) -> str | None:
+def _confirm(port: LinePort, servo_id: int, model: str) -> str | None:
     """Read a servo's torque, switch it off again if it is on; returns the fault, if any."""
     from snakewalk.drivers.bus.feetech_bus import servo_bus  # noqa: PLC0415  slow to import
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from functools import partial, wraps
 from types import ModuleType
-from typing import Any, Final
+from typing import Any
 
 import typer
 from typer.core import TyperCommand
@@ -27,7 +27,7 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.plugins import take_problems
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 
-_KINDS: Final = {"bool": "", "str": "text", "int": "integer", "float": "number", "dir": "folder"}
+_KINDS = {"bool": "", "str": "text", "int": "integer", "float": "number", "dir": "folder"}
 """Kinds of values as the help shows them; a switch has none."""
 
 

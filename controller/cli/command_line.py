@@ -17,11 +17,11 @@ from snakewalk.controller.console.command import CommandInfo, command_info, decl
 from snakewalk.controller.console.plugins import Plugin, plugins
 from snakewalk.drivers.errors import notes_of
 
-EVERY_DAY: Final = "Every day"
-SUBJECTS: Final = "By subject"
-OTHERS: Final = "Other packages"
+EVERY_DAY = "Every day"
+SUBJECTS = "By subject"
+OTHERS = "Other packages"
 """Groups of ``snakewalk --help``; a command of another package may name its own."""
-VERBS: Final = (
+VERBS = (
     "demo",
     "setup",
     "init",
@@ -35,7 +35,7 @@ VERBS: Final = (
     "trials",
 )
 """First words of the group ``EVERY_DAY``, in their order."""
-FAMILIES: Final = {
+FAMILIES = {
     "trials": "Many runs",
     "gait": "Gaits",
     "gait policy": "Learnt policies",
@@ -51,7 +51,7 @@ FAMILIES: Final = {
     "tools": "Tools",
 }
 """Subject of commands that begin with the same words; ``ros`` is one command."""
-FORMER: Final = {
+FORMER = {
     "trials": "trials run",
     "rehearse": "trials rehearse",
     "tasks": "trials tasks",
@@ -129,11 +129,11 @@ def _is_argument(rest: Sequence[str], kinds: Sequence[str]) -> bool:
     )
 
 
-_FIRST_WORDS: Final = (*VERBS, *(words for words in FAMILIES if " " not in words))
+_FIRST_WORDS = (*VERBS, *(words for words in FAMILIES if " " not in words))
 """First words in the order of ``--help``; those of other packages follow by name."""
-_COMMON: Final = ("robot", "world", "run", "motion", "port", "seconds")
+_COMMON = ("robot", "world", "run", "motion", "port", "seconds")
 """Options that come first in the help of a command; the others follow as declared."""
-_PANELS: Final = {
+_PANELS = {
     "Display": ("view", "view_at", "ros", "observe"),
     "Results": (
         "out",
@@ -154,7 +154,7 @@ _PANELS: Final = {
     ),
 }
 """Options by their group in the help of a command; the others are in its first group."""
-_USAGE: Final = "COMMAND ... | --version | --install-completion | --help (-h)"
+_USAGE = "COMMAND ... | --version | --install-completion | --help (-h)"
 _CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
 
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import FrameType
-from typing import IO, Any, Final
+from typing import IO, Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
@@ -23,7 +23,7 @@ from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError, notes_of
 
-_FAILING: Final = {"strict", "surrogateescape"}
+_FAILING = {"strict", "surrogateescape"}
 """Error handlers that raise for a character which the encoding lacks."""
 
 

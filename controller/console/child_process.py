@@ -18,13 +18,13 @@ from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.controller.console.safe_path import module_folders
 
-_CONTEXT: Final = get_context("spawn")
+_CONTEXT = get_context("spawn")
 """A forked child would inherit the threads of MuJoCo and numba in an unknown state."""
-_LOCK: Final = threading.RLock()
+_LOCK = threading.RLock()
 """Lock of the environment, which belongs to the whole process."""
 
 

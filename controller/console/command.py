@@ -12,12 +12,12 @@ import importlib.util
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., object])
 T = TypeVar("T")
 
-_ATTRIBUTE: Final = "snakewalk_command"
+_ATTRIBUTE = "snakewalk_command"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ def plugin(kind: str, name: str) -> Callable[[T], T]:
     return lambda target: target
 
 
-_COMMANDS: Final = ".commands."
+_COMMANDS = ".commands."
 """Part of the name of each module that holds a command, or options of several commands."""
 
 

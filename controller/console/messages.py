@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.plain_text import plain
@@ -24,13 +24,13 @@ from snakewalk.drivers.fallbacks import fallbacks_in_use
 if TYPE_CHECKING:
     from rich.console import Console
 
-LOGGER: Final = logging.getLogger("snakewalk")
+LOGGER = logging.getLogger("snakewalk")
 LOGGER.addHandler(logging.NullHandler())
 # it reports a home folder that is not writable, in two lines of its own
 logging.getLogger("matplotlib").setLevel(logging.ERROR)
-_KEPT_LINES: Final = 10_000
+_KEPT_LINES = 10_000
 """Messages that are kept to restore a deleted file (ours)."""
-FAULT: Final = "fault"
+FAULT = "fault"
 """Attribute of a record whose text is printed by the caller that ends the command."""
 
 

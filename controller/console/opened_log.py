@@ -1,14 +1,13 @@
 """Opens logs for commands: with progress, and a warning about missing parts."""
 
 from pathlib import Path
-from typing import Final
 
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 
-_LONG_BYTES: Final = 10_000_000
+_LONG_BYTES = 10_000_000
 """Size of a log from which a bar is shown (ours): 6 minutes of 16 servos."""
 
 

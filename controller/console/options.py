@@ -7,7 +7,7 @@ import stat
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.table import Table
@@ -27,7 +27,7 @@ except ImportError:  # Windows: opening a port reports the remedy
 
 _NO_DEVICES = ("sim", "robot")
 """Names for simulated servos, and for the ports in the robot's file."""
-_IDS: Final = re.compile(r"\s*\d[\d\s-]*=")
+_IDS = re.compile(r"\s*\d[\d\s-]*=")
 _PSEUDO_TERMINALS = range(136, 144)
 """Major numbers of Linux's pseudo-terminals, which have no entry below ``/sys/dev/char``."""
 
@@ -80,7 +80,7 @@ def _is_terminal(device: int) -> bool:
     return not subsystem.exists() or subsystem.resolve().name == "tty"
 
 
-_PIPE_COLUMNS: Final = 200
+_PIPE_COLUMNS = 200
 """Columns of a pipe or a file, which break no line."""
 console = PlainConsole(
     highlight=False,
@@ -218,7 +218,7 @@ Set = Annotated[
         autocompletion=completion.keys,
     ),
 ]
-_MESSAGES: Final = "Messages"
+_MESSAGES = "Messages"
 """Group of options in ``--help``."""
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="print every step", rich_help_panel=_MESSAGES)
@@ -313,7 +313,7 @@ def key_values(option: str, given: list[str] | None, form: str = "KEY=VALUE") ->
     return values
 
 
-_DIGITS: Final = 4
+_DIGITS = 4
 """Significant digits of a number in a table (ours); JSON has all of them."""
 
 
@@ -332,7 +332,7 @@ def show(result: Mapping[str, object], as_json: bool) -> None:
     console.print(table)
 
 
-_NUMBER: Final = re.compile(r"[-+]?\d|-?$")
+_NUMBER = re.compile(r"[-+]?\d|-?$")
 
 
 def print_table(

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Literal
+from typing import Literal
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.result_files import atomic_write
 
 Kind = Literal["text", "integer", "number", "truth"]
-BLOCK_BYTES: Final = 1 << 22
+BLOCK_BYTES = 1 << 22
 """Bytes of the CSV that are in memory at a time (ours)."""
 
 

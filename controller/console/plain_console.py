@@ -1,7 +1,7 @@
 """A console whose texts cannot control the terminal and whose tables fit its width."""
 
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.measure import Measurement
@@ -11,11 +11,11 @@ from rich.text import Text
 
 from snakewalk.config.plain_text import plain
 
-_UNLIMITED_COLUMNS: Final = 10_000
+_UNLIMITED_COLUMNS = 10_000
 """Width at which no table breaks a line."""
-_HEAD: Final = 12
+_HEAD = 12
 """Fewest characters of a heading in a column that may break words (ours)."""
-_SENTENCE: Final = (20, 12)
+_SENTENCE = (20, 12)
 """Fewest characters of a column of sentences, and of one in a crowded table (ours)."""
 
 

@@ -16,7 +16,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.config.errors import InputError
 
@@ -42,9 +42,9 @@ def without_collections() -> Iterator[None]:
         gc.enable()
 
 
-ENTRY_POINTS: Final = "snakewalk.plugins"
+ENTRY_POINTS = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
-KINDS: Final = (
+KINDS = (
     "command",
     "run",
     "motion",
@@ -58,7 +58,7 @@ KINDS: Final = (
     "backend",
 )
 """Kinds of plug-ins."""
-OWN: Final = "snakewalk"
+OWN = "snakewalk"
 
 
 class PluginError(InputError):

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -17,13 +16,13 @@ except ImportError:  # Windows deletes no file that a program has open
     fcntl = None  # type: ignore[assignment]
 
 _HAS_LOCKS: bool = fcntl is not None
-LOG: Final = "log.mcap"
-FILM: Final = "film.mp4"
-REPORT: Final = "report.html"
-SUMMARY: Final = "summary.json"
-MAP: Final = "map.npz"
+LOG = "log.mcap"
+FILM = "film.mp4"
+REPORT = "report.html"
+SUMMARY = "summary.json"
+MAP = "map.npz"
 """Map of a run that maps its ground; a world of kind ``map`` accepts it."""
-RUN_FILES: Final = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY, MAP)
+RUN_FILES = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY, MAP)
 """Files of a run in its folder, which holds the files of one run only."""
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 

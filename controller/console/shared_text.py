@@ -2,17 +2,17 @@
 
 import re
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.config.plain_text import plain
 
-_FOLDERS: Final = re.compile(
+_FOLDERS = re.compile(
     r"""(?<![\w.:/\\~-])             # not within a relative path, a URL or a unit
     (?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)
     (?:[^/\\'"<>|;:,\s]*[/\\])+""",
     re.VERBOSE,
 )
-_PATH: Final = re.compile(r"(?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)(?:[^\n]*[/\\])?([^/\\\n]+)[/\\]?")
+_PATH = re.compile(r"(?:~[\w.-]*|[A-Za-z]:)?[/\\](?!dev/)(?:[^\n]*[/\\])?([^/\\\n]+)[/\\]?")
 
 
 def without_folders(text: str) -> str:

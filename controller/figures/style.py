@@ -22,17 +22,17 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import GREEN, GREY, INK
 from snakewalk.controller.console.result_files import atomic_write
 
-GROUND: Final = LinearSegmentedColormap.from_list("ground", ["#93a07c", "#c3bd98", "#f2ead6"])
+GROUND = LinearSegmentedColormap.from_list("ground", ["#93a07c", "#c3bd98", "#f2ead6"])
 """Heights, lighter the higher: the tones of the film, paler, so that lines on them are seen."""
-ANGLES: Final = "RdBu_r"
+ANGLES = "RdBu_r"
 """Values about zero, which is white."""
-TIMES: Final = "viridis_r"
+TIMES = "viridis_r"
 """Times, later ones darker."""
-SPEEDS: Final = "viridis"
+SPEEDS = "viridis"
 """Values of one sign."""
-WIDTH_IN: Final = 8.0
+WIDTH_IN = 8.0
 """Width of a figure: at 600 px, text of 8.5 points is 9 px high."""
-_POINTS: Final = 900  # across a figure: more cannot be seen
+_POINTS = 900  # across a figure: more cannot be seen
 _RC: Final[dict[Any, Any]] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.5,

@@ -12,7 +12,7 @@ from snakewalk.controller import gaits
 from snakewalk.controller.gaits.gait import Gait
 from snakewalk.controller.gaits.spine import SpineGait, heading_loop
 
-_FIRST_MODULES: Final = (
+_FIRST_MODULES = (
     "lateral_undulation",
     "sidewinding",
     "rolling",
@@ -26,9 +26,9 @@ _FIRST_MODULES: Final = (
     "erect",
 )
 """Modules whose gaits come first in lists; the other modules follow by name."""
-_WITHOUT_GAITS: Final = ("registry", "backbone", "spine_heading")
+_WITHOUT_GAITS = ("registry", "backbone", "spine_heading")
 """Modules that define no gait; two of them are slow to import."""
-ENTRY_POINTS: Final = "snakewalk.gaits"
+ENTRY_POINTS = "snakewalk.gaits"
 """Group of the entry points of other packages, each of which names a gait."""
 BROKEN: Final[dict[str, str]] = {}
 """Why a gait of another package cannot be used, by the name of its entry point."""
@@ -74,7 +74,7 @@ def _gaits() -> Iterator[type[Gait]]:
                 yield value
 
 
-GAITS: Final = gaits_by_name()
+GAITS = gaits_by_name()
 
 SPINE_GAITS: tuple[str, ...] = tuple(
     name for name, gait in GAITS.items() if issubclass(gait, SpineGait)

@@ -7,37 +7,36 @@ JPEG", Journal of VLSI Signal Processing 27, 2001).
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 
-_BLOCK_PX: Final = 8  # of JPEG and of MJPEG
-_BLOCKS: Final = 1.3  # steps between blocks over those within: more is compression (ours)
-_STEP: Final = 4  # grey levels: a larger step is an edge of the scene (ours)
-_BLOCK_EXCESS: Final = 3.0  # times the single steps at other columns: more is compression (ours)
-_LUMA: Final = np.array([
+_BLOCK_PX = 8  # of JPEG and of MJPEG
+_BLOCKS = 1.3  # steps between blocks over those within: more is compression (ours)
+_STEP = 4  # grey levels: a larger step is an edge of the scene (ours)
+_BLOCK_EXCESS = 3.0  # times the single steps at other columns: more is compression (ours)
+_LUMA = np.array([
     [16, 11, 10, 16, 24, 40, 51, 61], [12, 12, 14, 19, 26, 58, 60, 55],
     [14, 13, 16, 24, 40, 57, 69, 56], [14, 17, 22, 29, 51, 87, 80, 62],
     [18, 22, 37, 56, 68, 109, 103, 77], [24, 35, 55, 64, 81, 104, 113, 92],
     [49, 64, 78, 87, 103, 121, 120, 101], [72, 92, 95, 98, 112, 100, 103, 99],
 ])  # fmt: skip
 """Steps at quality 50: ITU-T T.81, table K.1; scaled as in libjpeg."""
-_QUALITIES: Final = range(3, 61)
-_MOST_BLOCKS: Final = 800  # that are looked at for the quality
-_FEWEST: Final = 30  # coefficients that show a quality
-_NOT_ZERO: Final = 0.7  # of a step: a larger coefficient is not stored as 0
-_REGULAR: Final = 0.8  # mean cosine of the coefficients over the steps: they are multiples (ours)
-_SHIFTS: Final = tuple((k, (7 * k + off) % 16) for k in range(16) for off in (0, 8))
+_QUALITIES = range(3, 61)
+_MOST_BLOCKS = 800  # that are looked at for the quality
+_FEWEST = 30  # coefficients that show a quality
+_NOT_ZERO = 0.7  # of a step: a larger coefficient is not stored as 0
+_REGULAR = 0.8  # mean cosine of the coefficients over the steps: they are multiples (ours)
+_SHIFTS = tuple((k, (7 * k + off) % 16) for k in range(16) for off in (0, 8))
 """Offsets x, y of the shifted grids: even over the 16 px of a block of colour."""
-_CLEAN: Final = 16.0  # quality below which poses are less accurate than the sections show (ours)
-_LEAST_QUALITY: Final = 18  # quality below which no pose is used (ours)
-_USUAL_QUALITY: Final = 20  # quality from which most poses are used (ours)
+_CLEAN = 16.0  # quality below which poses are less accurate than the sections show (ours)
+_LEAST_QUALITY = 18  # quality below which no pose is used (ours)
+_USUAL_QUALITY = 20  # quality from which most poses are used (ours)
 _SIGMA = 0.22
 _SIGMA_BELOW = 0.15  # radii: largest standard deviation from it on, below it (ours)
-_SIGMA_UNKNOWN: Final = 0.25  # radii: the same if the quality is not known (ours)
+_SIGMA_UNKNOWN = 0.25  # radii: the same if the quality is not known (ours)
 
 
 @dataclass(frozen=True, slots=True)

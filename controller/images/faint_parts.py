@@ -1,7 +1,5 @@
 """Parts of a body that are much fainter than the rest: a pale tail, light bands."""
 
-from typing import Final
-
 import cv2
 import numpy as np
 
@@ -18,7 +16,7 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _AWAY_WIDTHS = 1.2  # widths from the silhouette: blur and shadow stay nearer
 _NOTABLE_AREA = 0.06  # of the silhouette's area: fewer faint pixels are not a part of the body
-FAINTEST: Final = 0.07
+FAINTEST = 0.07
 """Least contrast of a part, relative to that of the body: fainter areas are stains or trails."""
 _MARGIN_PX = 20  # of the cut-out, where the body fades out
 _BLUR_PX = 4  # around the silhouette: a larger area is not its blur

@@ -4,7 +4,7 @@ import io
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -17,13 +17,13 @@ from snakewalk.controller.images.mesh import Mesh
 
 SKIN_RGB = (0.66, 0.48, 0.20)
 """Colour of a body without a picture."""
-MOST_PIXELS: Final = 8192**2
+MOST_PIXELS = 8192**2
 """Limit of a mesh's pictures (ours)."""
-_ITEM_BYTES: Final = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
-_WIDTH: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_ITEM_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 """Sizes of glTF's kinds of numbers (bytes) and of items (numbers)."""
-MESH_ENDINGS: Final = (".obj", ".glb")
-_AXES: Final = {
+MESH_ENDINGS = (".obj", ".glb")
+_AXES = {
     f"{sign}{axis}": (k, factor)
     for sign, factor in (("", 1.0), ("+", 1.0), ("-", -1.0))
     for k, axis in enumerate("xyz")

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.studies.sweep_measure import varied
 
-HEADING_SPREAD_RAD: Final = 0.2
+HEADING_SPREAD_RAD = 0.2
 """Largest difference of the start's heading from x (that of the environment's episodes)."""
 
 

@@ -8,7 +8,6 @@ like friction.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 
@@ -22,21 +21,21 @@ from snakewalk.controller.mechanics.friction_filter import (
 )
 from snakewalk.controller.mechanics.rigid_motion import planar_slide
 
-BIN_S: Final = 0.25
+BIN_S = 0.25
 """Time within which poses are averaged (ours)."""
-NOISE_S: Final = 0.1
+NOISE_S = 0.1
 """Time after which the noise of a source is taken as independent (ours): averages of more poses
 count no more."""
-STRIDE: Final = 5
+STRIDE = 5
 """Cycles in a step of the balance."""
-MODEL_M2_S: Final = 1e-4
-MODEL_RAD2_S: Final = 1e-3
+MODEL_M2_S = 1e-4
+MODEL_RAD2_S = 1e-3
 """Growth of the variances of the model's place and heading (ours): 10 mm and 1.8 degrees in a
 second. With true poses the residuals of `flat-slalom` are about a quarter of that."""
-START_M: Final = 1.0
-START_RAD: Final = 0.5
+START_M = 1.0
+START_RAD = 0.5
 """Standard deviations of the body's start (ours): practically unknown."""
-FEWEST: Final = 6
+FEWEST = 6
 """Least number of bins that contain a pose (ours)."""
 
 

@@ -6,7 +6,7 @@ next goal. The current between them follows from goals and angles
 """
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,9 @@ from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
 EnergySource = Literal["integrated", "sampled", "unknown"]
-PARTS: Final = 3
+PARTS = 3
 """Steps in which the current is computed before and after the goals of a cycle arrive."""
-WRITTEN_SHARE: Final = 0.25
+WRITTEN_SHARE = 0.25
 """Part of a cycle before its goals arrive, if its time on the wire is not known (ours)."""
 
 

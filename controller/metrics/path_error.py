@@ -1,7 +1,5 @@
 """Path error: waypoints reached in order, and distance of the body from its path."""
 
-from typing import Final
-
 import numpy as np
 import scipy  # its modules load when they are first used
 
@@ -9,11 +7,11 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable
 
-_WINDOW_M: Final = 0.5  # around the place reached, so that a crossing branch is not the nearest
-_ROUNDING_M: Final = 2e-6  # of the log
-_ROWS: Final = 2000
-_TRACK_S: Final = 0.2
-_SMOOTH_S: Final = 2.0
+_WINDOW_M = 0.5  # around the place reached, so that a crossing branch is not the nearest
+_ROUNDING_M = 2e-6  # of the log
+_ROWS = 2000
+_TRACK_S = 0.2
+_SMOOTH_S = 2.0
 
 
 def waypoint_times_s(pose: PoseTable, plan: PlanSummary) -> Floats:

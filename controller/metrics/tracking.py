@@ -1,15 +1,13 @@
 """How well the servos follow: error and lag between sent goals and measured positions."""
 
-from typing import Final
-
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.topics import CycleTable
 
-_LONGEST_LAG_S: Final = 0.6
-_CYCLES: Final = 50_000
+_LONGEST_LAG_S = 0.6
+_CYCLES = 50_000
 """Cycles at the end of a run from which the lag is computed (ours): 17 minutes at 50 Hz."""
 
 

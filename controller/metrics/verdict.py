@@ -8,11 +8,11 @@ from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import RunRecord
 
-NOT_MEASURED: Final = 3
+NOT_MEASURED = 3
 """Exit code of a run that ended as planned, but whose arrival nothing measured."""
-_EXIT_MISSED: Final = 1
+_EXIT_MISSED = 1
 """Exit code of a run that safety stopped, or that missed a waypoint."""
-_SIMULATED_BACKEND: Final = "sim"
+_SIMULATED_BACKEND = "sim"
 _ADVICE: Final[dict[Cause, str]] = {
     "safety": "snakewalk log report {log}",
     "roll": "snakewalk plan {run}",

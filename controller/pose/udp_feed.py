@@ -3,8 +3,9 @@
 import socket
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Final
 
 from snakewalk.config.errors import InputError
@@ -16,6 +17,8 @@ LOCAL: Final = "127.0.0.1"
 MOST_WAITING: Final = 2000
 """Poses that wait to be read; older ones are dropped (ours)."""
 _POLL_S: Final = 0.2
+SENDER: Final = "127.0.0.1:40000"
+"""Address that a simulated tracker has in messages."""
 
 
 def parse_address(text: str, option: str = "--pose udp") -> tuple[str, int]:
@@ -37,6 +40,18 @@ def decoded(data: bytes, sender: str, arrival_s: float) -> ArrivedPose:
         return ArrivedPose(arrival_s, sender, decode_pose(data))
     except UnusablePoseError as fault:
         return ArrivedPose(arrival_s, sender, fault)
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedDatagrams:
+    """The datagrams of a simulated tracker; a ``PoseFeed``."""
+
+    due: Callable[[float], Sequence[tuple[float, bytes]]]
+    """Returns time and bytes of the datagrams that are due."""
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived since the last call."""
+        return [decoded(data, SENDER, due_s) for due_s, data in self.due(now_s)]
 
 
 class PoseQueue:

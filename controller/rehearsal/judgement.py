@@ -1,7 +1,7 @@
 """Judgement of a run on a served robot by the truth of the server."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
 
-LEAST_SD_M: Final = 0.01
+LEAST_SD_M = 0.01
 """Accuracy of a pose that states none (ours)."""
-SD: Final = 2.0
+SD = 2.0
 """Standard deviations by which a waypoint may be farther than its radius."""
 
 

@@ -1,11 +1,11 @@
 """Rehearsals of runs in simulated time: a served robot with errors, a tracker, and a judgement."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -17,8 +17,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import SpineLinks
 from snakewalk.controller.metrics.summary import RunSummary, summary
-from snakewalk.controller.pose.sample import ArrivedPose
-from snakewalk.controller.pose.udp_feed import decoded
+from snakewalk.controller.pose.udp_feed import SimulatedDatagrams
 from snakewalk.controller.rehearsal.judgement import clock_offset_s, judge
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
@@ -33,7 +32,7 @@ from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.types import BodyPose
 
-_SMOOTHING_S: Final = 0.5
+_SMOOTHING_S = 0.5
 """Time constant of the smoothing of the forward speed, as in the loop."""
 
 
@@ -155,23 +154,6 @@ def slip_alarms(record: RunRecord, displacement_m: Floats) -> int:
     return sum(monitor.update(*step) for step in zip(steps_m, displacement_m, strict=True))
 
 
-SENDER: Final = "127.0.0.1:40000"
-"""Address that the simulated tracker has in messages."""
-
-
-@dataclass(frozen=True, slots=True)
-class SimulatedDatagrams:
-    """The datagrams of a served robot's tracker; a ``PoseFeed``."""
-
-    served: ServedRobot
-
-    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
-        """Return the poses that have arrived since the last call."""
-        self.served.line.settle()
-        due = self.served.tracker.due(now_s)
-        return [decoded(sent.data, SENDER, sent.due_s) for sent in due]
-
-
 @dataclass(frozen=True, slots=True)
 class SimulatedPort:
     """A served robot as a port of a request; a ``RehearsedPort``."""
@@ -195,11 +177,11 @@ class SimulatedPort:
             None,
             None,
             lambda: line.busy_s,
-            poses=SimulatedDatagrams(self.served),
+            poses=SimulatedDatagrams(self.served.due),
         )
 
 
-RUNS: Final = (
+RUNS = (
     "jacksboro-traverse",
     "jacksboro-around",
     "random-10",
@@ -208,10 +190,10 @@ RUNS: Final = (
     "flat-slalom",
 )
 """Runs that are rehearsed by default."""
-START_SD_M: Final = 0.05
-START_SD_DEG: Final = 5.0
+START_SD_M = 0.05
+START_SD_DEG = 5.0
 """Standard deviation of the robot's place at the start (ours)."""
-LATE_S: Final = 0.04
+LATE_S = 0.04
 """Delay of the goals, in addition to ``Deviation.drawn`` (ours)."""
 
 

@@ -5,7 +5,7 @@ is the share that the simulated body truly reached.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -27,15 +27,15 @@ from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.record import RunRecord
 
-CONTROLLERS: Final = ("walk", "serpenoid", "gait", "cpg", "wave-cma", "wave-ppo")
+CONTROLLERS = ("walk", "serpenoid", "gait", "cpg", "wave-cma", "wave-ppo")
 """Controllers of the tasks: the walk; the serpenoid with line of sight; a gait, without steering or
 along waypoints where the run says so; the same by the pattern generator; the shipped policies."""
-OPEN_LOOP: Final = ("gait", "cpg")
-START_SD_M: Final = 0.02
+OPEN_LOOP = ("gait", "cpg")
+START_SD_M = 0.02
 """Standard deviation of the robot's place before a task with waypoints (ours)."""
-TRACKER: Final = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
+TRACKER = TrackerConfig(noise_m=0.01, noise_deg=3.0, delay_s=0.1)
 """Pose noise (1 s.d.) and delay in the rehearsal."""
-_LENGTH_S: Final = 0.5
+_LENGTH_S = 0.5
 """Time at each end of a run over which a place is averaged (ours)."""
 
 
@@ -67,7 +67,7 @@ class ControllerTask:
         return run, load_robot(run.robot), load_world(run.world)
 
 
-TASKS: Final = (
+TASKS = (
     ControllerTask("slalom", "flat-slalom", "lateral-undulation", 90.0),
     ControllerTask("ramp-along", "ramp-10-along", "lateral-undulation", 90.0),
     ControllerTask("ramp-up", "ramp-15-up", "lateral-undulation", 90.0),

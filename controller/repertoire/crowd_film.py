@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -20,8 +19,8 @@ from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 HIDDEN, FAR, MIDDLE, NEAR = range(4)
 """Levels: body frame alone, three segments, every second link, all links on the ground."""
-NEAR_PX: Final = 110.0
-MIDDLE_PX: Final = 45.0
+NEAR_PX = 110.0
+MIDDLE_PX = 45.0
 """Least apparent length of a body at these levels (ours)."""
 
 
@@ -90,11 +89,11 @@ class DetailedCrowd:
         return detailed_chains
 
 
-FPS: Final = 20
-SIZE_PX: Final = (960, 540)
-SIZES: Final = (0.22, 0.42)
+FPS = 20
+SIZE_PX = (960, 540)
+SIZES = (0.22, 0.42)
 """Lengths of the animals over the recorded robot's (ours): the world is a model of 9 m."""
-FLIGHT_S: Final = 40.0
+FLIGHT_S = 40.0
 """Time in which the camera circles the field."""
 
 

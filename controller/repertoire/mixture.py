@@ -1,21 +1,20 @@
 """Mixtures: numbers of cycles of several actions, whose mean speed and turn meet a request."""
 
 from itertools import combinations, product
-from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 
-CYCLES: Final = 10
+CYCLES = 10
 """Cycles over which the mean of a mixture is taken (ours)."""
-_MOST_ACTIONS: Final = 3
+_MOST_ACTIONS = 3
 """Actions of a mixture: three corners enclose every pair of a speed and a turn."""
-_TOLERANCE: Final = 0.1
+_TOLERANCE = 0.1
 """Largest error of a mean, as a share of the request (ours)."""
-_LEAST_TURN_RAD_S: Final = 0.4
+_LEAST_TURN_RAD_S = 0.4
 """A smaller request has the tolerance of this one (ours): about the gentlest recorded turn."""
-_COST_OF_ACTION: Final = 0.1
+_COST_OF_ACTION = 0.1
 """Share of the tolerance that an action more in the mixture has to gain (ours)."""
 
 

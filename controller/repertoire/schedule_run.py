@@ -5,7 +5,6 @@ import io
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -27,9 +26,9 @@ from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 
-COLUMNS: Final = ("time_s", "speed_m_s", "turn_rad_s")
-_SAMPLE_S: Final = 0.1
-_LASTING_S: Final = 1.0
+COLUMNS = ("time_s", "speed_m_s", "turn_rad_s")
+_SAMPLE_S = 0.1
+_LASTING_S = 1.0
 """A request that lasts less is a transition to another one (ours)."""
 
 

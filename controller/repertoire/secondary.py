@@ -1,7 +1,6 @@
 """The secondary controller ([YT] 5.1): from a requested speed and turn to a segment."""
 
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.repertoire.mixture import CYCLES, Mixtures
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
-_ALIKE: Final = 0.1
+_ALIKE = 0.1
 """Turns that differ by less than this share of the largest one count as equal (ours)."""
 
 

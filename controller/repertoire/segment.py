@@ -14,7 +14,7 @@ Kind = Literal[
 ]
 SIDES: Final[dict[str, int]] = {"left": 1, "right": -1, "reverse-left": 1, "reverse-right": -1}
 """Side to which the heading turns: 1 is left."""
-REVERSE: Final = ("reverse", "reverse-left", "reverse-right")
+REVERSE = ("reverse", "reverse-left", "reverse-right")
 """[YT] 3.2: forward and turns; retreating and braking, which the paper makes from forward; and
 rest, the state after a brake. All but a brake are one settled cycle."""
 

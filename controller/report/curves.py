@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from functools import cache
 from html import escape
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from plotly.offline import get_plotlyjs
@@ -20,15 +20,15 @@ from snakewalk.controller.runlog.column import Panel
 from snakewalk.controller.runlog.panels import panel_curves
 from snakewalk.controller.runlog.record import RunRecord
 
-_ROWS: Final = 4000
+_ROWS = 4000
 """Most rows of a curve: of a longer run every second, third ... row is on the page (ours)."""
-_BLOCK: Final = 400
+_BLOCK = 400
 """Crossings of the middle of a curve from which a panel would show a block (ours): about one for
 two pixels."""
-_BAND_POINTS: Final = 100
+_BAND_POINTS = 100
 """Places of the band that is drawn instead."""
-_PANEL_PX: Final = 160
-_GAP_PX: Final = 34
+_PANEL_PX = 160
+_GAP_PX = 34
 """Gap between two panels for the title and the legend of the lower one."""
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,9 +23,9 @@ FPS = 15
 FINE_FPS = 25
 SIZE = (800, 450)
 FINE_SIZE = (1280, 720)
-_LONGEST_FILM_S: Final = 27.0
+_LONGEST_FILM_S = 27.0
 """Longest film: a longer run is shown faster."""
-_ROWS: Final = 20_000
+_ROWS = 20_000
 """Least rows that are left of a longer run (ours): 30 for each frame of a film."""
 
 

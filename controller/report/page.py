@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from snakewalk.config.errors import InputError
@@ -22,8 +22,8 @@ from snakewalk.controller.report.trip import trip_of
 from snakewalk.controller.runlog.record import Event, RunRecord
 
 _EVENTS_SHOWN = 300
-INLINE_BYTES: Final = 8_000_000
-_TYPES: Final = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
+INLINE_BYTES = 8_000_000
+_TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
 
 
 @dataclass(frozen=True, slots=True)

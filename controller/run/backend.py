@@ -7,8 +7,7 @@ import os
 from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -16,6 +15,7 @@ from snakewalk.config.loader import with_keys
 from snakewalk.config.robot import SIMULATED, RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.pose.sample import PoseFeed
+from snakewalk.controller.pose.udp_feed import SimulatedDatagrams
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.controller.walk.twin import Twin
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -26,12 +26,13 @@ from snakewalk.drivers.chain.fingerprint_file import FingerprintFile, user_file
 from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.port.network_port import NetworkPort, open_port
+from snakewalk.drivers.port.line_port import LinePort
+from snakewalk.drivers.port.network_port import open_port
 from snakewalk.drivers.port.port_map import is_port_map, parse_port_map, port_map_text
-from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.port.served_line import SCHEME, ServedLine
 from snakewalk.drivers.types import BodyPose
 
-FILE_PORTS: Final = "robot"
+FILE_PORTS = "robot"
 """Value of ``--port`` for a robot whose file names the ports of its segments."""
 
 
@@ -57,7 +58,7 @@ class Backend:
     open_supply: Callable[[], None] | None = None
     """Opens the supply of all servos; None if some are real."""
     poses: PoseFeed | None = None
-    """Poses of a rehearsal in simulated time, instead of datagrams."""
+    """Poses of a port in simulated time, instead of datagrams; None in real time."""
 
 
 class RehearsedPort(Protocol):
@@ -105,10 +106,14 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         PortError: a port is missing, held, or not permitted.
 
     """
+    poses = None
     if robot.ports:
         bus: ChainBus = bus_on_ports(robot, WallClock())
     else:
-        bus = _bus_on(robot, open_port(port, robot.servo.baud))
+        line = open_port(port, robot.servo.baud)
+        bus = _bus_on(robot, line)
+        if isinstance(line, ServedLine):
+            poses = SimulatedDatagrams(line.due)
     chain = ServoChain(
         bus,
         robot,
@@ -118,7 +123,7 @@ def metal(run: RunConfig, robot: RobotConfig, port: str) -> Backend:
         can_hold=run.safety.on_trip == "hold",
     )
     name = port_map_text((segment.port, segment.ids) for segment in robot.ports) or port
-    return Backend(name, chain, chain.clock, None, None, lambda: float("nan"))
+    return Backend(name, chain, chain.clock, None, None, lambda: float("nan"), poses=poses)
 
 
 def _fingerprint_file(run: RunConfig) -> FingerprintFile | None:
@@ -136,9 +141,7 @@ def real_ports(robot: RobotConfig) -> list[str]:
     return [segment.port for segment in robot.ports if segment.port != SIMULATED]
 
 
-def _bus_on(
-    robot: RobotConfig, line: SerialPort | NetworkPort, ids: Collection[int] | None = None
-) -> DynamixelBus:
+def _bus_on(robot: RobotConfig, line: LinePort, ids: Collection[int] | None = None) -> DynamixelBus:
     return servo_bus(line, robot.models_on(ids), latency_s=line.latency_s)
 
 
@@ -161,7 +164,9 @@ def bus_on_ports(
 
 
 def is_pseudo_terminal(ports: Sequence[str] | None) -> bool | None:
-    """Return whether all ports are pseudo-terminals of served simulations; None without a port."""
+    """Return whether all ports lead to served simulations; None without a port."""
     if not ports:
         return None
-    return all(Path(os.path.realpath(port)).parts[:3] == ("/", "dev", "pts") for port in ports)
+    return all(
+        port.startswith(SCHEME) or os.path.realpath(port).startswith("/dev/pts/") for port in ports
+    )

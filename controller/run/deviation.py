@@ -1,7 +1,6 @@
 """Differences of a robot from its file and world: ground, loads, servos, horns."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.plant import Mounting
 
-FRICTION: Final = 1.25
-MASS: Final = 1.15
-WEAK: Final = 0.7
-HORN_DEG: Final = 2.0
+FRICTION = 1.25
+MASS = 1.15
+WEAK = 0.7
+HORN_DEG = 2.0
 """Sizes of drawn errors: factor on friction and mass or its inverse, torque of one servo, and
 standard deviation of the horns (ours)."""
 
@@ -104,4 +103,4 @@ class Deviation:
         )
 
 
-NO_DEVIATION: Final = Deviation()
+NO_DEVIATION = Deviation()

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Final, Self, cast
+from typing import Self, cast
 
 from rich.columns import Columns
 
@@ -211,7 +211,7 @@ class Keyboard:
         return names(text.decode(errors="ignore"))
 
 
-_ENDS: Final = ("q", "t")
+_ENDS = ("q", "t")
 """Keys that are never too late."""
 
 

@@ -4,16 +4,16 @@ import json
 import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Self
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.child_process import start
 from snakewalk.controller.runlog.row_line import BUTTON, RunEnd
 
-_START_S: Final = 60.0
+_START_S = 60.0
 """Longest time until it starts; a busy machine imports slowly (ours)."""
-_END_S: Final = 2.0
+_END_S = 2.0
 
 
 class ObserverProcess:

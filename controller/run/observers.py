@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
@@ -19,7 +19,7 @@ SHADOW = "shadow"
 """Observers that have an option of their own."""
 GOALS = "goals"
 """Argument of the ROS node of a live run, which accepts goal poses."""
-ADVICE: Final = "to go on in this case: --set run.safety.lost_observer=warn"
+ADVICE = "to go on in this case: --set run.safety.lost_observer=warn"
 
 
 class RunObserver(Protocol):

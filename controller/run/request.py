@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.result_files import LOG
@@ -24,8 +23,8 @@ from snakewalk.controller.runtime.drive import OnEvent, OnProgress, Outcome
 from snakewalk.drivers.errors import DriverError, notes_of
 from snakewalk.drivers.safety.safe_link import TORQUE_IS_OFF, SafeLink
 
-NOT_SWITCHED_ON: Final = "torque was not switched on"
-MAY_BE_ON: Final = "torque may be on: switch the supply off"
+NOT_SWITCHED_ON = "torque was not switched on"
+MAY_BE_ON = "torque may be on: switch the supply off"
 
 
 class RunEnding:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from snakewalk.config.constants import LOOK
 from snakewalk.controller.console.messages import LOGGER
@@ -24,9 +24,9 @@ from snakewalk.controller.runlog.record import Header, RunRecord
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.looks import SkinLook
 
-ANIMAL: Final = "animal"
+ANIMAL = "animal"
 """Name of the look of the animal in the run's recording."""
-_BODY: Final = "body"
+_BODY = "body"
 """Plug-in of all other looks: names and files of bodies."""
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Final, TypeVar
+from typing import TypeVar
 
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.errors import InputError
@@ -21,18 +21,16 @@ _FIELDS = {
 """Keys and tables at the top of each file."""
 
 
-_OWN_MOTION: Final = {"run.robot": "--robot", "run.motion": "the command"}
-OF_A_SOURCE: Final = _OWN_MOTION | {"run.time_limit_s": "--seconds"}
-OF_A_GAIT: Final = _OWN_MOTION | {
+_OWN_MOTION = {"run.robot": "--robot", "run.motion": "the command"}
+OF_A_SOURCE = _OWN_MOTION | {"run.time_limit_s": "--seconds"}
+OF_A_GAIT = _OWN_MOTION | {
     "run.gait.name": "the command",
     "run.gait.parameters": "--param",
     "run.gait.duration_s": "--seconds",
     "run.gait.then": "--then",
 }
-OF_A_SCHEDULE: Final = _OWN_MOTION | {
-    "run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"
-}
-OF_A_RECORDING: Final = _OWN_MOTION | {
+OF_A_SCHEDULE = _OWN_MOTION | {"run.repertoire": "FILE, --speed, --turn, --schedule, --seconds"}
+OF_A_RECORDING = _OWN_MOTION | {
     "run.track": "TRACK",
     "run.playback": "--speed, --scale, --clip",
 }

@@ -402,7 +402,7 @@ def _use_second_body(
 
     friction = second_body.second_body(prepared, source, backend, pose)
     if checked.port is not None and pose_evidence(prepared, backend).is_measured:
-        now_s = None if checked.rehearsed is None else backend.clock.now_s
+        now_s = None if backend.poses is None else backend.clock.now_s
         second_body.use_worker(prepared, source, now_s, workers)
     return friction
 

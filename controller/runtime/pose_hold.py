@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal
+from typing import Any, Literal
 
-CAUTIOUS: Final = 0.5
+CAUTIOUS = 0.5
 """Rate of the motion before a source has agreed with the joints (ours)."""
-SLOW_S: Final = 0.5
+SLOW_S = 0.5
 """Time in which the motion comes to rest, and starts again (ours)."""
 
 

@@ -2,9 +2,8 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
-NOISE_SD: Final = 3.0
+NOISE_SD = 3.0
 """Standard deviations of its noise by which a displacement must be too small (ours)."""
 
 

@@ -7,7 +7,7 @@ points are therefore joined by safe ground if and only if edges of cells join th
 between opposite corners of a cell.
 """
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -17,9 +17,9 @@ from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
 
-SAFE_RISK: Final = 1.0 - 1e-9
+SAFE_RISK = 1.0 - 1e-9
 """Risk of nodes and saddles; the reserve covers the rounding of interpolated values."""
-_CHUNK: Final = 200_000
+_CHUNK = 200_000
 
 
 def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats) -> Floats | None:

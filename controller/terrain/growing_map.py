@@ -5,7 +5,6 @@ error counts.
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt, map_coordinates
@@ -14,18 +13,18 @@ from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.terrain.elevation_map import filled, opened
 
-_LEAST_ERROR_M: Final = 0.002
+_LEAST_ERROR_M = 0.002
 """Least error of a sample, however often it was seen (ours): errors of the pose are common to its
 points."""
-_CONTRADICTS: Final = 3.0
+_CONTRADICTS = 3.0
 """Standard errors between two heights that are not of the same ground (ours)."""
-_LEAST_POINTS: Final = 2
+_LEAST_POINTS = 2
 """Least points of a picture in a sample's square, to count."""
-_SMALL_HOLE_M: Final = 0.12
+_SMALL_HOLE_M = 0.12
 """Width of a hole that counts as known (ours): less than twice a body."""
-_SMOOTH_M: Final = 0.4
+_SMOOTH_M = 0.4
 """Distance from the seen places within which the filled surface is as fine as the map."""
-_COARSE: Final = 5
+_COARSE = 5
 """Samples, along a side, of the map for one of the surface that is filled in farther off."""
 
 

@@ -7,7 +7,6 @@ next to a place that cannot be climbed. The body follows only the known and safe
 """
 
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,18 +21,18 @@ from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.safe_graph import SafeGraph
 
-_REACH_M: Final = 0.6
+_REACH_M = 0.6
 """Longest distance from the head to the first node (ours): a mast's cameras do not see the ground
 at its foot."""
-_SHORTEST_PATH_M: Final = 0.4
+_SHORTEST_PATH_M = 0.4
 """Shortest path worth walking, where there is a longer one (ours)."""
-_PATH_DISTANCES_M: Final = (np.inf, 1.2, 0.7)
+_PATH_DISTANCES_M = (np.inf, 1.2, 0.7)
 """Distances that a path may lead; the nearer ones where no smooth path leads farther (ours)."""
-_SURELY_UNSAFE: Final = 1.15
+_SURELY_UNSAFE = 1.15
 """Largest risk of ground on a path in force: the next picture may show planned ground to be a
 little worse."""
-_TIES: Final = 0.01
-_UNSEEN: Final = 1.5
+_TIES = 0.01
+_UNSEEN = 1.5
 """Metres of level path that a straight metre is taken for where no path is found at all."""
 
 

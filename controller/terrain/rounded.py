@@ -6,17 +6,16 @@ and stays inside their triangle.
 
 import itertools
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.terrain.path import SplinePath
 
-_STEP_M: Final = 0.01
-_LONGEST_SIDE_M: Final = 1.0
+_STEP_M = 0.01
+_LONGEST_SIDE_M = 1.0
 """Longest part of a side that a bend uses (ours)."""
-_HALVINGS: Final = 10
+_HALVINGS = 10
 
 
 def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> SplinePath:

@@ -1,17 +1,15 @@
 """Advice for points that no safe path joins: the planner setting that would join them."""
 
-from typing import Final
-
 import numpy as np
 from scipy.ndimage import label
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.terrain.relief import Relief
 
-_MOST_FACTOR: Final = 4.0
+_MOST_FACTOR = 4.0
 """Factor of a limit that is still proposed (ours); more is other ground, not another limit."""
-_STEPS: Final = 14
-_MOST_SLOPE_RAD: Final = 1.49
+_STEPS = 14
+_MOST_SLOPE_RAD = 1.49
 
 
 def route_advice(relief: Relief, points_m: Floats) -> str:

@@ -1,7 +1,7 @@
 """The animal's motion in numbers: wave, pulse speed, sliding, amplitudes, energy in the state."""
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ TARGET_SHIFT = 4.0
 COEFFICIENTS = 7
 LEAST_TRAVEL = 0.2
 """Share of the pulse speed: recorded animals that go somewhere lie at 0.7 or more."""
-_SLIPS: Final = "w_d below 0: the body slips; the wave runs back faster than the head advances"
+_SLIPS = "w_d below 0: the body slips; the wave runs back faster than the head advances"
 
 
 @dataclass(frozen=True, slots=True)

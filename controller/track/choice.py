@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from snakewalk.config.answers import LISTED, Answers
 from snakewalk.config.errors import InputError
 
-FEWEST: Final = 4
+FEWEST = 4
 """Points for a curve."""
-PLANES: Final = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 """Planes onto which markers in space are projected: the axis to the right, and the one upwards.
 
 A plane is seen from the positive end of the third axis, so that no body is mirrored: z points
@@ -113,5 +113,5 @@ class Choice(AnimalChoice):
         return [list(nodes).index(name) for name in self.keypoints]
 
 
-ALL: Final = Choice()
+ALL = Choice()
 """Choice of nothing: one animal, all of its keypoints."""

@@ -5,7 +5,7 @@ The motion rests at the last waypoint and waits for another. It is done when the
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -19,19 +19,19 @@ from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.walk.course import Course, OnCourse
 
-ADD: Final = "waypoint"
+ADD = "waypoint"
 """Command ``waypoint=X,Y``: go there after the waypoints that are left."""
-NEXT: Final = "next"
+NEXT = "next"
 """Command ``next=X,Y``: go there, and leave the other waypoints out."""
-CLEAR: Final = "clear"
+CLEAR = "clear"
 """Command ``clear``: leave out the waypoints that are left."""
-END: Final = "end"
+END = "end"
 """End the run at rest, without the remaining waypoints."""
-WAYPOINTS_MAX: Final = 1000
+WAYPOINTS_MAX = 1000
 """Most waypoints that a run accepts (ours)."""
-_COMMANDS_MAX: Final = 10
+_COMMANDS_MAX = 10
 """Largest number of commands in a step (ours): a person clicks less often."""
-_LEAST_DISTANCE_M: Final = 0.05
+_LEAST_DISTANCE_M = 0.05
 """Least distance between the begin and the goal of a path (ours)."""
 
 

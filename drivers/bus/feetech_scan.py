@@ -13,13 +13,13 @@ from snakewalk.drivers.protocol.feetech import FeetechInstruction
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
 
-_HEAD: Final = Register("Firmware Version to Model Number", 0, 5, signed=False)
-_REFERENCE_MODEL: Final = "STS3215"
+_HEAD = Register("Firmware Version to Model Number", 0, 5, signed=False)
+_REFERENCE_MODEL = "STS3215"
 """Model whose first registers all Feetech models share."""
-_TURN_S: Final = 0.3e-3
+_TURN_S = 0.3e-3
 """Time after which the next servo replies to a broadcast ping (ours)."""
-_SETTLE_S: Final = 0.03
-_TRIES: Final = 3
+_SETTLE_S = 0.03
+_TRIES = 3
 """Tries of a read from a servo that replied to a ping (ours)."""
 _ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
 """Orders of the bytes of a value, by the content of register 2."""

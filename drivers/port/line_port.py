@@ -4,7 +4,7 @@
 
 from abc import ABC, abstractmethod
 from contextlib import suppress
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import serial
 
@@ -37,7 +37,7 @@ class LinePort(ABC):
         self._baud = baud
         self._clock: Clock = clock if clock is not None else WallClock()
         self._timeout_at_s = 0.0
-        self._serial: serial.Serial | None = None
+        self._serial: Any = None
         self.openPort()
 
     def __enter__(self) -> Self:
@@ -155,7 +155,7 @@ class LinePort(ABC):
         return (ValueError, *self.line_errors)
 
     @property
-    def _line(self) -> serial.Serial:
+    def _line(self) -> Any:
         if self._serial is None:
             raise PortError(f"{self._name}: is closed")
         return self._serial

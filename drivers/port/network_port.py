@@ -7,7 +7,6 @@ from __future__ import annotations
 import os
 import socket
 from contextlib import suppress
-from typing import Final
 from urllib.parse import urlsplit
 
 import serial
@@ -17,19 +16,18 @@ from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import is_url
 from snakewalk.drivers.port.line_port import LinePort
 from snakewalk.drivers.port.serial_port import SerialPort
+from snakewalk.drivers.port.served_line import SCHEME, ServedLine
 
-NETWORK_LATENCY_S: Final = 0.1
+NETWORK_LATENCY_S = 0.1
 """Largest delay of a reply besides its wire time: a local network and its server (ours)."""
-_POLL_S: Final = 0.001
+_POLL_S = 0.001
 """Time-out of each read; constant, because a server of RFC 2217 would set up its line again."""
-_SCHEMES_WITHOUT_BAUD: Final = ("socket",)
+_SCHEMES_WITHOUT_BAUD = ("socket",)
 """Schemes that carry no baud rate: the far end keeps its own."""
-_TO_A_HOST: Final = ("socket", "rfc2217")
+_TO_A_HOST = ("socket", "rfc2217")
 
 
-def open_port(
-    device: str, baud: int = 1_000_000, clock: Clock | None = None
-) -> SerialPort | NetworkPort:
+def open_port(device: str, baud: int = 1_000_000, clock: Clock | None = None) -> LinePort:
     """Open a serial device, or the line behind a URL.
 
     Ports of one chain share a ``clock``; None: its own.
@@ -38,6 +36,10 @@ def open_port(
         PortError: it is missing, or cannot be opened.
 
     """
+    if device.startswith(f"{SCHEME}://"):
+        if clock is not None:
+            raise PortError(f"{device}: has virtual time, which ports of one chain cannot share")
+        return ServedLine(device, baud)
     kind = NetworkPort if is_url(device) else SerialPort
     return kind(device, baud, clock)
 

@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
 
 try:
     import pwd
@@ -13,9 +12,9 @@ except ImportError:  # Windows has no /proc either
 
 PROC = "/proc"
 """Folder with the processes and locks of all users on Linux."""
-_PROGRAM_NAME: Final = "snakewalk"
+_PROGRAM_NAME = "snakewalk"
 """Name of this program."""
-_MASTERS: Final = ("/dev/ptmx", "/dev/pts/ptmx")
+_MASTERS = ("/dev/ptmx", "/dev/pts/ptmx")
 """Devices of the other ends of pseudo-terminals."""
 
 

@@ -2,13 +2,12 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import LAST_ID
 
-_SEGMENT: Final = re.compile(r"\s*(?P<ids>\d[\d\s,-]*)=(?P<port>[^,]+)(?:,|$)")
-_EXAMPLE: Final = "write 1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1"
+_SEGMENT = re.compile(r"\s*(?P<ids>\d[\d\s,-]*)=(?P<port>[^,]+)(?:,|$)")
+_EXAMPLE = "write 1-8=/dev/ttyUSB0,9-16=/dev/ttyUSB1"
 
 
 def is_port_map(text: str) -> bool:

@@ -20,13 +20,13 @@ from snakewalk.drivers.protocol.packet import ALERT, StatusPacket
 from snakewalk.drivers.protocol.protocol1 import HEADER, checksum
 from snakewalk.drivers.protocol.registers import Alarm
 
-MAX_ID: Final = 0xFD
-STATUS_BYTES: Final = 6
+MAX_ID = 0xFD
+STATUS_BYTES = 6
 """Status packet without data: header 2, ID, length, error, checksum."""
-GROUP_BYTES: Final = 8
+GROUP_BYTES = 8
 """Sync instruction without entries: header 2, ID, length, instruction, address, data length,
 checksum. A read of one servo is as long."""
-POSITION_MODE: Final = 0
+POSITION_MODE = 0
 TORQUE_ON = 1
 TORQUE_DAMPING = 2
 CALIBRATE_MIDDLE = 128
@@ -86,7 +86,7 @@ _ALARMS: Final[Mapping[int, int]] = {
     FeetechAlarm.OVER_CURRENT: Alarm.OVER_CURRENT,
     FeetechAlarm.OVERLOAD: Alarm.OVERLOAD,
 }
-ALARM_BITS: Final = sum(_ALARMS)
+ALARM_BITS = sum(_ALARMS)
 """Bits of the error byte that report an alarm."""
 
 

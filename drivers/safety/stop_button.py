@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Self
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.errors import notes_of
@@ -34,17 +34,17 @@ except ImportError:  # Windows: a killed program leaves its button until the fil
     fcntl = None  # type: ignore[assignment]
 
 _HAS_LOCKS: bool = fcntl is not None
-_BYTES: Final = 4096
+_BYTES = 4096
 _PRESSED_BYTE = 0
 _ENDED_BYTE = 1
-_REQUESTER: Final = slice(16, 528)
-_END: Final = slice(528, 1552)
-_RUN: Final = slice(1552, _BYTES)
-BUTTON_SUFFIX: Final = ".stop"
-_LOOK_EVERY: Final = 16
+_REQUESTER = slice(16, 528)
+_END = slice(528, 1552)
+_RUN = slice(1552, _BYTES)
+BUTTON_SUFFIX = ".stop"
+_LOOK_EVERY = 16
 """Calls of ``pressed`` until it looks at the file again (ours)."""
-_TEMPORARY: Final = "/tmp" if _HAS_LOCKS else os.path.expanduser("~")
-_OPEN_FLAGS: Final = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
+_TEMPORARY = "/tmp" if _HAS_LOCKS else os.path.expanduser("~")
+_OPEN_FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 
 
 @dataclass(frozen=True, slots=True)

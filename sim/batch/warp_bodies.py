@@ -1,7 +1,7 @@
 """``BatchBodies`` on MuJoCo-Warp, on a GPU or the CPU, in single precision."""
 
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import mujoco
 import mujoco_warp
@@ -16,14 +16,14 @@ from snakewalk.sim.batch import kernels
 from snakewalk.sim.batch.bodies import BatchBodies
 from snakewalk.sim.physics.mechanics import PhysicsError
 
-CONTACTS: Final = 5
+CONTACTS = 5
 """Contacts that are allocated for each link, on average: two with the floor, others with links."""
-ITERATIONS: Final = 8
+ITERATIONS = 8
 """Most iterations of the solver. The CPU device launches all of them; Newton's method needs two or
 three for these contacts (ours)."""
-_NO_LIMIT_A: Final = 1e9
+_NO_LIMIT_A = 1e9
 """Current limit of a motor without one."""
-_INPUTS: Final = (
+_INPUTS = (
     "torque_on",
     "goal_rad",
     "p_gain_per_rad",

@@ -1,7 +1,6 @@
 """Feetech servos: the registers drive the motors and show their shafts."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +72,7 @@ class FeetechAlarms(Ax12Alarms):
 POSITION, VELOCITY, PUSH, STEP = range(4)
 """Operating Mode(33); PUSH is open-loop PWM on STS servos, and current on HLS servos. STEP is
 open-loop PWM on HLS servos."""
-ACCELERATION_RAD_S2: Final = np.radians(100.0 * 360.0 / 4096.0)
+ACCELERATION_RAD_S2 = np.radians(100.0 * 360.0 / 4096.0)
 """Acceleration(41): 100 positions/s^2, 8.7 degrees/s^2 in the memory table."""
 _PUSH_GAIN = 1e-9
 """Gain of a motor that only pushes: its goal is far away."""

@@ -11,7 +11,6 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import Final
 
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.byte_port import DRAIN_LIMIT_S
@@ -98,7 +97,7 @@ INSTANT_S = 1e-9
 """Largest difference between two times that count as the same."""
 HOLD_UP_MAX_S = 0.01
 """A reply that is later than this does not hold up the servos behind it (ours)."""
-SLICE_S: Final = 2e-3
+SLICE_S = 2e-3
 """Longest step in which the servos of several lines advance one after the other (ours)."""
 PacketTap = Callable[[float, bool, bytes], None]
 """Function that gets every packet on the wire: time of its end, whether the host sent it, its

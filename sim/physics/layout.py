@@ -9,7 +9,7 @@ import ctypes
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -30,9 +30,9 @@ _SCALAR_TYPES: dict[str, type] = {
     "mjtBool": ctypes.c_uint8,
     "mjtByte": ctypes.c_uint8,
 }
-_POINTERS: Final = (ctypes.c_void_p,) * 3
-_IN_DATA: Final = POINTERS[2:]
-_WORD_BYTES: Final = 8
+_POINTERS = (ctypes.c_void_p,) * 3
+_IN_DATA = POINTERS[2:]
+_WORD_BYTES = 8
 _BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body pos="0 0 .09"><freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
 

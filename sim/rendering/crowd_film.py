@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import mujoco
 
@@ -18,7 +17,7 @@ from snakewalk.sim.rendering.movie_file import MovieFile
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
-FOVY_DEG: Final = 45.0
+FOVY_DEG = 45.0
 
 
 @dataclass(frozen=True, slots=True)

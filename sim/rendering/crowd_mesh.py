@@ -17,7 +17,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.sim.rendering.looks import EYE, PUPIL, Rgba
 from snakewalk.sim.rendering.shade import DARK, under_sun
 
-MESHES: Final = ((7, 4), (13, 6), (33, 12))
+MESHES = ((7, 4), (13, 6), (33, 12))
 """Rings and sides of a body at each level, farthest first (ours)."""
 COLOURS: Final[tuple[tuple[Rgba, Rgba], ...]] = (
     ((0.80, 0.56, 0.20, 1), (0.36, 0.22, 0.11, 1)),
@@ -27,20 +27,20 @@ COLOURS: Final[tuple[tuple[Rgba, Rgba], ...]] = (
     ((0.86, 0.76, 0.48, 1), (0.55, 0.40, 0.18, 1)),
 )
 """Back and bands of five kinds of animals (ours)."""
-_TEXTURE: Final = (256, 32)
+_TEXTURE = (256, 32)
 """Texels along and around half of a body."""
-_BANDS: Final = 5
-_HEAD: Final = 0.05
+_BANDS = 5
+_HEAD = 0.05
 """Share of the body in which the head is round."""
-_EYE: Final = (0.035, 0.27)
+_EYE = (0.035, 0.27)
 """Place of an eye: along the body, and from back to belly."""
 _NOSE = 0.4
 _TAIL = 3.0
 """Length of the tips beyond the centre line's ends, radii there (ours)."""
-_SHADOW_RINGS: Final = 13
-_SHADOW_LIFT_M: Final = 0.006
+_SHADOW_RINGS = 13
+_SHADOW_LIFT_M = 0.006
 """Height of a shadow above the ground, so that the two do not flicker into each other."""
-_SHADOW_WIDTH: Final = 1.7
+_SHADOW_WIDTH = 1.7
 """Half width of a shadow with its soft edge, radii of the body."""
 
 

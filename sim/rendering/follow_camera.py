@@ -1,7 +1,6 @@
 """The camera of a film: it follows a body, shows all of it, and looks over hills that hide it."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
@@ -10,32 +9,32 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.sim.rendering.view_frustum import camera_axes
 
-SMOOTHING_S: Final = 1.2
+SMOOTHING_S = 1.2
 """Time constant of the camera's smoothing, in seconds of film."""
-TURN_SMOOTHING_S: Final = 4.0
-STRIDING_TURN_S: Final = 1.5
+TURN_SMOOTHING_S = 4.0
+STRIDING_TURN_S = 1.5
 """Time constant of the camera's turn around a body on legs, whose heading does not sway with
 waves."""
-DISTANCE_LENGTHS: Final = 1.2
+DISTANCE_LENGTHS = 1.2
 """Distance of the camera from the body, in lengths of the body."""
-UPRIGHT_LENGTHS: Final = 1.4
+UPRIGHT_LENGTHS = 1.4
 """Distance of the camera from a body on legs, whose head and horns are above the bones."""
-ELEVATIONS_DEG: Final = (19.0, 26.0, 33.0, 40.0, 47.0, 54.0, 61.0, 68.0, 75.0, 82.0)
+ELEVATIONS_DEG = (19.0, 26.0, 33.0, 40.0, 47.0, 54.0, 61.0, 68.0, 75.0, 82.0)
 """Heights of the camera above the horizon; the first one that sees the body is used."""
-LEVEL: Final = 33.0
+LEVEL = 33.0
 """First elevation for a body that lies on the ground: it is best seen from above."""
-BEHIND_DEG: Final = (28.0, -28.0, 62.0, -62.0, 118.0, -118.0, 152.0, -152.0)
+BEHIND_DEG = (28.0, -28.0, 62.0, -62.0, 118.0, -118.0, 152.0, -152.0)
 """Directions of view from the heading, by preference: behind the body, to its side, before it."""
-BESIDE_DEG: Final = (118.0, -118.0, 62.0, -62.0, 152.0, -152.0, 28.0, -28.0)
+BESIDE_DEG = (118.0, -118.0, 62.0, -62.0, 152.0, -152.0, 28.0, -28.0)
 """Directions for a body on legs: from behind, the hind legs hide the front legs."""
-_RELUCTANCE_DEG: Final = 4.0
+_RELUCTANCE_DEG = 4.0
 """Decrease of mean elevation that justifies another direction."""
-_STRIDE: Final = 5
+_STRIDE = 5
 """Frames between two tests of the line of sight."""
-_SAMPLES: Final = 40
-_EDGE: Final = 0.9
+_SAMPLES = 40
+_EDGE = 0.9
 """Share of the half picture in which the body stays."""
-_GIRTH: Final = 0.08
+_GIRTH = 0.08
 """Reach of the body around its bones, body lengths."""
 
 

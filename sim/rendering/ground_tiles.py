@@ -6,7 +6,6 @@ whose error is at most a few pixels. Skirts close the gaps between levels.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -15,13 +14,13 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
-STEPS: Final = (1, 2, 4, 8)
+STEPS = (1, 2, 4, 8)
 """Samples of the field for one of a tile, finest level first."""
-CELLS: Final = 32
+CELLS = 32
 """Cells of a tile along each side."""
-MOST_PIXELS: Final = 2.0
+MOST_PIXELS = 2.0
 """Largest error of a drawn tile, pixels (ours)."""
-_UNSEEN: Final = 5
+_UNSEEN = 5
 """Group of geoms that are not drawn."""
 
 

@@ -23,8 +23,8 @@ CENTRE: Final[Rgba] = rgba(colours.CENTRE)
 """Colour of the trail of the body's centre."""
 AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """Colours of the world's x and y axes."""
-AXES_GEOMS: Final = 5
-_AXES_SAMPLES: Final = 9
+AXES_GEOMS = 5
+_AXES_SAMPLES = 9
 """Points of each rod at which the ground is looked up (ours)."""
 LIFT_M = 0.004
 SPACING_M = 0.12

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from typing import Final
 
 from snakewalk.config.archive import parse_json
 from snakewalk.config.errors import InputError
@@ -14,9 +13,9 @@ from snakewalk.sim.faults.fault_player import FaultPlayer
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.serve.register_access import register_name, rows_of, set_load, set_register
 
-_BEFORE_KEY: Final = re.compile(r" (?=\w+=)")
+_BEFORE_KEY = re.compile(r" (?=\w+=)")
 """Space between two pairs of key and value; a value may contain spaces."""
-HELP: Final = """\
+HELP = """\
 set IDS REGISTER VALUE    set 3 Homing Offset 100; IDS: 3, 1-4, 1,3,5-8 or all
 get IDS REGISTER          get all Present Position
 load IDS NM               a constant torque on shafts of a bench, N m: load 2 -0.4

@@ -10,12 +10,13 @@ import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
 from snakewalk.drivers.errors import PortError
-from snakewalk.sim.line.wire import Wire
+from snakewalk.drivers.port.byte_port import BytePort
+from snakewalk.drivers.port.served_line import ServedLine
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
 
-LINES: dict[str, Wire] = {}
+LINES: dict[str, BytePort] = {}
 """Lines by their URL."""
 _ENDLESS_S = 10.0
 """Simulated time after which a read without a time-out counts as endless (ours)."""
@@ -36,9 +37,11 @@ class Serial(SerialBase):
             SerialException: no bus has this URL, or its port has vanished.
 
         """
-        line = LINES.get(str(self.port))
-        if line is None:
-            raise SerialException(f"{self.port}: no bus has this URL; open bus.url during its test")
+        url = str(self.port)
+        try:
+            line = LINES.get(url) or ServedLine(url, self.baudrate)
+        except PortError as error:
+            raise SerialException(f"{error}; or open bus.url during its test") from error
         if not line.openPort():
             raise SerialException(f"{self.port}: the port has vanished")
         self._line = line
@@ -53,7 +56,7 @@ class Serial(SerialBase):
     def in_waiting(self) -> int:
         """Number of bytes that have arrived; the clock advances by 0.1 ms."""
         line = self._opened()
-        line.clock.advance(_POLL_S)
+        line.clock.sleep_until_s(line.clock.now_s() + _POLL_S)
         return line.getBytesAvailable()
 
     def read(self, size: int = 1) -> bytes:
@@ -94,7 +97,7 @@ class Serial(SerialBase):
     def reset_output_buffer(self) -> None:
         """Nothing: written bytes are on the wire."""
 
-    def _opened(self) -> Wire:
+    def _opened(self) -> BytePort:
         if not self.is_open:
             raise PortNotOpenError
         return self._line

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE, BROADCAST_ID, HEADER, Instruction
@@ -15,7 +14,7 @@ from snakewalk.sim.sniff.trace import read_exchange
 _ID_AT = 4
 _CODE_AT = 7
 _ADDRESS = slice(8, 10)
-_WRITES: Final = (Instruction.WRITE, Instruction.REG_WRITE)
+_WRITES = (Instruction.WRITE, Instruction.REG_WRITE)
 
 
 @dataclass(slots=True)

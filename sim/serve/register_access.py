@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Final
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bench import BenchPlant
 
 BenchLine = SimLine | Ax12Line
-_MEASURED_NAMES: Final = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
+_MEASURED_NAMES = ("Present ", "Realtime Tick", "Moving", "Model Number", "Firmware Version")
 
 
 def rows_of(line: BenchLine, servo_ids: Sequence[int] | None) -> list[int]:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from snakewalk.sim.servo.blocked_shaft import BlockedShaft
 from snakewalk.sim.servo.constant_readings import ConstantReadings
 from snakewalk.sim.servo.event_queue import EventQueue
 
-SLICE_S: Final = 2e-3
+SLICE_S = 2e-3
 """Longest step between two updates of drives and alarms (ours)."""
 
 

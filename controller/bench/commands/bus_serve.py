@@ -28,11 +28,12 @@ from snakewalk.controller.bench.commands.serve_options import (
     TruthFile,
 )
 from snakewalk.controller.bench.live_table import LiveScreen, MakeDecoder, Snapshot
-from snakewalk.controller.bench.served_body import PosePublisher, ServedBody
+from snakewalk.controller.bench.served_body import ServedBody
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, World
 from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.pose.udp_feed import UdpSender
 from snakewalk.controller.run.external.served_robot import ServedRobot
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.drivers.priority import raised_priority
@@ -45,6 +46,7 @@ from snakewalk.sim.serve.chain_spec import ChainSpec, parse_chain, parse_imu
 from snakewalk.sim.serve.console import Console
 from snakewalk.sim.serve.live_table import LiveTable, ax12_rows, servo_rows
 from snakewalk.sim.serve.recorded_line import RecordedLine
+from snakewalk.sim.serve.virtual_time import VirtualTimeServer
 from snakewalk.sim.sniff.decode import Decoder
 from snakewalk.sim.sniff.trace import TraceWriter
 
@@ -56,6 +58,7 @@ except ImportError:  # Windows
 if TYPE_CHECKING:
     from snakewalk.sim.line.wire import Wire
 
+    Server = PtyServer | VirtualTimeServer
     Served = tuple[ChainSpec, Wire, LiveTable, MakeDecoder, FaultPlayer | None]
 
 REFRESH_S = 0.25
@@ -104,6 +107,14 @@ def serve(
     imu: BenchImu = None,
     baud: Annotated[int | None, typer.Option(help="baud rate of the servos in bit/s")] = None,
     pace: Annotated[float, typer.Option(help="simulated seconds per second of real time")] = 1.0,
+    virtual_time: Annotated[
+        bool,
+        typer.Option(
+            "--virtual-time",
+            help="print a URL for --port of one snakewalk command; time passes only while that "
+            "command waits",
+        ),
+    ] = False,
     faults: Annotated[Path | None, typer.Option(help="TOML file of faults to simulate")] = None,
     latency: Annotated[float, typer.Option(help="latency of the USB adapter in ms")] = 0.0,
     link: Annotated[
@@ -137,12 +148,9 @@ def serve(
     body.check()
     if sum(given_source is not None for given_source in (servos, robot or run, play)) > 1:
         raise InputError("give one of --servos, --robot, --run and --play")
-    if play is not None and (imu is not None or faults is not None):
-        raise InputError("--play: repeats a recorded exchange; leave --imu and --faults out")
-    if imu is not None and body.is_given:
-        raise InputError(
-            "--imu: the robot's file describes its IMU in the table [imu]; leave --imu out"
-        )
+    _check_additions(play, imu, faults, body)
+    if virtual_time:
+        _check_virtual_time(link, pace)
     _check_serving(latency, for_s, record, link)
     refuse_to_overwrite([record, truth], force)
     refuse_to_overwrite([link], force=True)
@@ -157,8 +165,15 @@ def serve(
         clock = WallClock()
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # files are closed
         stack.enter_context(raised_priority())
-        server = stack.enter_context(PtyServer(line, clock, pace=pace, link=link))
-        publish = _publisher(stack, served, body, server)
+        server: Server
+        publish: Callable[[], object] = list
+        if virtual_time:
+            server = stack.enter_context(
+                VirtualTimeServer(line, None if served is None else served.due)
+            )
+        else:
+            server = stack.enter_context(PtyServer(line, clock, pace=pace, link=link))
+            publish = _publisher(stack, served, body, server)
         if record is not None:
             line.taps.append(TraceWriter(stack.enter_context(record.open("w", encoding="utf-8"))))
         _announce(server, what, line, as_json)
@@ -181,6 +196,22 @@ def serve(
         _report_losses(late_share, server.output_flushes)
 
 
+def _check_additions(
+    play: Path | None, imu: str | None, faults: Path | None, body: ServedBody
+) -> None:
+    if play is not None and (imu is not None or faults is not None):
+        raise InputError("--play: repeats a recorded exchange; leave --imu and --faults out")
+    if imu is not None and body.is_given:
+        raise InputError(
+            "--imu: the robot's file describes its IMU in the table [imu]; leave --imu out"
+        )
+
+
+def _check_virtual_time(link: Path | None, pace: float) -> None:
+    if link is not None or pace != 1.0:
+        raise InputError("--virtual-time: has no device and no pace; leave --link and --pace out")
+
+
 def _publisher(
     stack: ExitStack, served: ServedRobot | None, body: ServedBody, server: "PtyServer"
 ) -> Callable[[], None]:
@@ -188,12 +219,17 @@ def _publisher(
     if served is None or body.pose_out is None:
         return lambda: None
     served.tracker.clock = server.real_time_s
-    publisher = PosePublisher(served.tracker, served.line.clock.now_s, body.address())
-    stack.callback(publisher.close)
-    return publisher
+    sender = UdpSender(*body.address())
+    stack.callback(sender.close)
+
+    def publish() -> None:
+        for sent in served.tracker.due(served.line.clock.now_s()):
+            sender.send(sent.data)
+
+    return publish
 
 
-def _print_counts(traffic: LiveTable, server: "PtyServer") -> None:
+def _print_counts(traffic: LiveTable, server: "Server") -> None:
     counts: dict[str, float] = {
         "questions": traffic.questions,
         "answers": traffic.answers,
@@ -275,7 +311,7 @@ def _simulated_line(
     return spec, line, LiveTable(lambda: servo_rows(line)), decoder, player
 
 
-def _announce(server: "PtyServer", what: ChainSpec, line: "Wire", as_json: bool) -> None:
+def _announce(server: "Server", what: ChainSpec, line: "Wire", as_json: bool) -> None:
     ids = ", ".join(map(str, what.ids))
     if as_json:
         print(
@@ -295,7 +331,7 @@ def _announce(server: "PtyServer", what: ChainSpec, line: "Wire", as_json: bool)
 
 
 def _run(
-    server: "PtyServer",
+    server: "Server",
     traffic: LiveTable,
     make_decoder: MakeDecoder,
     clock: Clock,
@@ -331,8 +367,8 @@ def _console(line: "Wire", player: FaultPlayer | None, as_json: bool) -> Console
     return Console(line, player or FaultPlayer(line, FaultPlan()))
 
 
-def _converse(server: "PtyServer", console: Console, stopped: Callable[[], bool]) -> None:
-    console.set_pace = server.set_pace
+def _converse(server: "Server", console: Console, stopped: Callable[[], bool]) -> None:
+    console.set_pace = getattr(server, "set_pace", None)
     terminal = sys.stdin.fileno()
     unread = ""
     listening = True

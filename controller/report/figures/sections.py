@@ -17,7 +17,7 @@ from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
-_IN_CURVES: Final = frozenset({"Effort"})
+_IN_CURVES = frozenset({"Effort"})
 """Quantities that the curves of the page show as well, to be zoomed."""
 _SECTIONS: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
     (

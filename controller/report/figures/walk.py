@@ -1,7 +1,5 @@
 """The walk over the library of shapes: which, how many, and how well they fitted the aim."""
 
-from typing import Final
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -11,9 +9,9 @@ from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, PALE, RED
 from snakewalk.controller.figures.style import canvas, legend_above
 from snakewalk.controller.runlog.record import RunRecord
 
-_MARKS: Final = 4000
+_MARKS = 4000
 """Decisions from which marks are drawn as one picture (ours): 4 MB of the page otherwise."""
-_ABOVE: Final = 10
+_ABOVE = 10
 """Drawing order above all marks."""
 
 

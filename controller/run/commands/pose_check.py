@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
@@ -27,8 +27,8 @@ from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.clock import Clock, WallClock
 
-LOOK_S: Final = 0.02
-LINE_S: Final = 1.0
+LOOK_S = 0.02
+LINE_S = 1.0
 Judge = Callable[[PoseSample], str | None]
 
 

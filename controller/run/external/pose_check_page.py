@@ -1,6 +1,6 @@
 """Page of ``pose check``: the measured body on its ground, and facts of the feed."""
 
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from snakewalk.controller.runlog.topics import PoseTable
 from snakewalk.controller.runlog.writer import RunLog
 from snakewalk.drivers.types import BodyPose, JointState
 
-FACTS: Final = (
+FACTS = (
     ("rate_hz", "rate {} Hz"),
     ("jitter_mean_s", "delay beyond the quickest {} s"),
     ("longest_gap_s", "longest gap {} s"),

@@ -1,7 +1,7 @@
 """A simulated robot on its ground at a serial device, in real time, by another process."""
 
 from multiprocessing.connection import Connection
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.priority import raised_priority
 from snakewalk.sim.serve.pty import IDLE_S, PtyServer
 
-_ASK: Final = b"qpos"
+_ASK = b"qpos"
 
 
 class RealTimeRobot:

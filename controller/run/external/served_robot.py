@@ -17,7 +17,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.kinematics.links import body_in_world, mean_heading_rad
 from snakewalk.controller.pose.tracked_body import TrackedBody
-from snakewalk.controller.pose.tracker import SimulatedTracker
+from snakewalk.controller.pose.tracker import Sent, SimulatedTracker
 from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.record import MotorEnergy
@@ -211,6 +211,11 @@ class ServedRobot:
     def __exit__(self, *raised: Any) -> None:
         if self._truth is not None:
             self._truth.__exit__(*raised)
+
+    def due(self, now_s: float) -> Sequence[Sent]:
+        """Return the datagrams of the tracker that are to arrive by now."""
+        self.line.settle()
+        return self.tracker.due(now_s)
 
     def _measure(self) -> None:
         head = self.body.head_pose()

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from typing import Final
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -18,10 +17,10 @@ from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.twin_answers import TwinAnswer, TwinQuestion
 from snakewalk.controller.walk.twin_rollout import TwinRollout
 
-PIECE_S: Final = 0.22
+PIECE_S = 0.22
 """Time of a piece in a rehearsal: median CPU time of 807 pieces on a busy machine; a tenth needed
 less than 0.16 s (docs/benchmarks/steep-rehearsal.md)."""
-LARGEST_BYTES: Final = 60_000
+LARGEST_BYTES = 60_000
 """Largest question that a pipe accepts at once."""
 
 

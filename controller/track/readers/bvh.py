@@ -8,7 +8,6 @@ has no scale.
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,10 +19,10 @@ from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.markers import number_or_none, projected
 
-_MOST_JOINTS: Final = 1000
-_MOST_VALUES: Final = 20_000_000
-_AXES: Final = "XYZ"
-_TO_Z_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_MOST_JOINTS = 1000
+_MOST_VALUES = 20_000_000
+_AXES = "XYZ"
+_TO_Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 def is_bvh(head: bytes) -> bool:

@@ -1,7 +1,7 @@
 """HDF5 recordings: SLEAP's analysis and projects, DeepLabCut's table, Tierpsy, MATLAB 7.3."""
 
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,7 +17,7 @@ from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.sleap import load_analysis, load_project
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_TIERPSY: Final = (
+_TIERPSY = (
     ("coordinates/skeletons", "timeseries_data", "worm_index", "timestamp"),
     ("skeleton", "trajectories_data", "worm_index_joined", "frame_number"),
 )

@@ -10,7 +10,6 @@ other properties of its objects follow, then column names and rows of values.
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -27,12 +26,12 @@ from snakewalk.controller.track.readers.markers import (
 )
 from snakewalk.controller.track.track import frame_numbers
 
-VICON_HEAD: Final = "Trajectories"
-_MOTIVE_KINDS: Final = ("Marker", "Rigid Body", "Bone")
+VICON_HEAD = "Trajectories"
+_MOTIVE_KINDS = ("Marker", "Rigid Body", "Bone")
 """Types of objects whose measured places are used, in this order of preference."""
-_SAME_RATE: Final = 0.01
+_SAME_RATE = 0.01
 """Share by which the rate of Motive's rounded times may differ from the stated one (ours)."""
-_MOST_COLUMNS: Final = 30_000
+_MOST_COLUMNS = 30_000
 
 
 def is_trc(head: bytes) -> bool:

