@@ -4,7 +4,6 @@ It also makes the JSON Schema, with which editors complete and check files.
 """
 
 from collections.abc import Mapping
-from itertools import takewhile
 from types import UnionType
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
@@ -16,7 +15,6 @@ from snakewalk.config.animal import AnimalConfig, SkinConfig
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.field_facts import bounds_in, bounds_text, description_of
 from snakewalk.config.gait import GaitSetConfig
-from snakewalk.config.loader import Kind, locate, shipped
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
@@ -46,8 +44,9 @@ _HEAD = """# Configuration
 
 A run is a TOML file that names a robot and a world; each is a shipped name or a path ending in
 `.toml` (relative to the file that names it). `snakewalk list` shows what is shipped, and
-`config/runs`, `config/robots` and `config/worlds` hold the files. Unknown keys, wrong types and
-values out of range are reported all at once, one line each, with exit code 2.
+each file in `config/runs`, `config/robots` and `config/worlds` begins with its
+description. Unknown keys, wrong types and values out of range are reported all at once, one line
+each, with exit code 2.
 
 ```
 # my-run.toml
@@ -114,10 +113,7 @@ def reference() -> str:
     parts = [_HEAD]
     for title, model in _FILES:
         parts += _tables(title, model)
-    kinds: tuple[Kind, ...] = ("runs", "robots", "worlds")
-    for kind in kinds:
-        parts += _shipped_names(kind)
-    return "\n".join(parts)
+    return "\n".join(parts).rstrip() + "\n"
 
 
 def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, Any]:
@@ -136,20 +132,6 @@ def json_schema(kind: str, model: type[BaseModel] | None = None) -> dict[str, An
         "description": (model.__doc__ or "").partition("\n")[0],
     }
     return schema | head
-
-
-def _shipped_names(kind: Kind) -> list[str]:
-    lines = [f"## Shipped {kind}", "", "| name | |", "|---|---|"]
-    return [*lines, *(f"| `{name}` | {_comment(kind, name)} |" for name in shipped(kind)), ""]
-
-
-def _comment(kind: Kind, name: str) -> str:
-    lines = locate(kind, name).read_text(encoding="utf-8").splitlines()
-    return " ".join(line.removeprefix("# ") for line in takewhile(_is_comment, lines))
-
-
-def _is_comment(line: str) -> bool:
-    return line.startswith("#")
 
 
 def _tables(title: str, model: type[BaseModel]) -> list[str]:

@@ -5,10 +5,15 @@ from tests.campaign.campaign import Tally
 BEGIN, END = "<!-- campaign begins -->", "<!-- campaign ends -->"
 _COLUMNS = {
     "cycles": "cycles",
-    "values": "values read",
     "missing": "not read",
-    "clamped": "clamped",
     "trips": "trips",
+    "noticed": "changes named",
+    "ended_otherwise": "ended otherwise",
+    "violations": "violations",
+}
+_TOTALS = {
+    "values": "values read",
+    "clamped": "clamped",
     "brought_back": "brought back",
     "unsafe_trips": "trips not ending safe",
     "beyond_limit": "beyond a limit",
@@ -17,8 +22,6 @@ _COLUMNS = {
     "foreign": "another's",
     "not_held": "not held",
     "too_long": "hangs",
-    "noticed": "changes named",
-    "ended_otherwise": "ended otherwise",
     "unnoticed": "unnoticed",
     "false_alarms": "false alarms",
     "raced": "raced",
@@ -26,12 +29,18 @@ _COLUMNS = {
 
 
 def table(whole: Tally, by_kind: dict[str, Tally]) -> str:
-    """Markdown."""
-    lines = [
-        "| fault | " + " | ".join(_COLUMNS.values()) + " |",
-        "| --- |" + " ---: |" * len(_COLUMNS),
-    ]
+    """Markdown: a row for each kind, then the counts of all kinds together."""
+    lines = _head(["fault", *_COLUMNS.values()])
     for name, tally in (*sorted(by_kind.items()), ("**all**", whole)):
-        cells = " | ".join(f"{getattr(tally, column):,}" for column in _COLUMNS)
-        lines.append(f"| {name.replace('_', ' ')} | {cells} |")
-    return "\n".join(lines)
+        lines.append(_row(name.replace("_", " "), tally, _COLUMNS))
+    lines += ["", *_head(["all kinds", *_TOTALS.values()])]
+    return "\n".join([*lines, _row("count", whole, _TOTALS)])
+
+
+def _head(columns: list[str]) -> list[str]:
+    return ["| " + " | ".join(columns) + " |", "| --- |" + " ---: |" * (len(columns) - 1)]
+
+
+def _row(name: str, tally: Tally, columns: dict[str, str]) -> str:
+    cells = " | ".join(f"{getattr(tally, column):,}" for column in columns)
+    return f"| {name} | {cells} |"

@@ -37,10 +37,25 @@ def test_no_page_stands_in_two_places() -> None:
     assert len(names) == len(set(names))
 
 
+def words(page: Path) -> int:
+    """Number of words of a page: strings between blanks, without the bars and rules of tables."""
+    text = page.read_text(encoding="utf-8").replace("|", " ")
+    return sum(bool(re.search(r"\w", word)) for word in text.split())
+
+
+def test_the_site_stays_short() -> None:
+    pages = [page for page in DOCS.rglob("*.md") if page.parent.name != "decisions"]
+    counts = {page.relative_to(DOCS).as_posix(): words(page) for page in pages}
+    longest = sorted(counts, key=counts.__getitem__)[-5:]
+    assert sum(counts.values()) <= MOST_WORDS, f"the longest pages are {', '.join(longest)}"
+
+
 GENERATED = {"configuration.md", "reference.md"}
 LARGEST_PAGE = 250
 """Lines of a page above its measured figures."""
 MOST_PAGES = 140
+MOST_WORDS = 112_500
+"""Words of the site, tables and commands included; only what an editor deletes pays for more."""
 
 
 def guide(page: Path) -> str:
