@@ -16,7 +16,6 @@ pytestmark = pytest.mark.costs("reads every file of the library")
 ROOT: Final = Path(__file__).resolve().parents[2]
 OPENINGS: Final = {
     "config/archive.py": "bounds every read",
-    "config/document.py": "reads shipped files",
     "controller/bench/loop_compiler.py": "reads the package's own source",
     "controller/capture/review.py": "reads the package's own page",
     "controller/cli/main.py": "opens the null device",
