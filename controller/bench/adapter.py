@@ -61,7 +61,12 @@ def wire(budget: WireBudget, rate_hz: float) -> Finding:
         f"{budget.share(rate_hz):.0%} of the wire"
     )
     if budget.share(rate_hz) > 1.0:
-        return Finding(WIRE_CHECK, "fail", load_text, "raise the baud rate or lower the rate")
+        return Finding(
+            WIRE_CHECK,
+            "fail",
+            load_text,
+            "snakewalk bus set --id ID --new-baud 1000000, or a lower rate",
+        )
     if budget.share(rate_hz) > 0.7:
         return Finding(WIRE_CHECK, "warn", load_text, "little is left for retries: raise the baud")
     return Finding(WIRE_CHECK, "ok", load_text)

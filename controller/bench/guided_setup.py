@@ -149,38 +149,42 @@ class GuidedSetup:
             InputError: a step was skipped that the others need.
 
         """
-        for number, step in enumerate(STEPS, 1):
-            if step.name in self._done:
-                continue
-            typer.echo(f"\n{number} of {len(STEPS)}  {step.purpose}")
+        while len(self._done) < len(STEPS):
+            step = STEPS[len(self._done)]
+            typer.echo(f"\n{len(self._done) + 1} of {len(STEPS)}  {step.purpose}")
             if step.name == "pose":
                 question = "source, e.g. udp:9870 or ros:/pose; Enter: none, dead reckoning"
                 self.files = replace(self.files, pose=self._ask(question))
             if step.name == "find":
                 self.files = replace(self.files, axes=self._axes())
-            self._run_step(step)
-            self._done.append(step.name)
+            if self._run_step(step):
+                self._done.append(step.name)
+            else:
+                del self._done[-1:]
             text = json.dumps({"port": self.files.port, "done": self._done})
             write_result(self._file, f"{text}\n")
 
-    def _run_step(self, step: SetupStep) -> None:
-        """Run the step's command until it succeeds, is skipped, or the person stops."""
+    def _run_step(self, step: SetupStep) -> bool:
+        """Run the step's command until it succeeds or is skipped; False: back to the last step."""
         code = 0
         words = step.words(self.files)
         while words:
             typer.echo(f"  snakewalk {' '.join(words)}")
-            answer = self._ask("Enter: run it; s: skip; q: stop here").lower()
+            answer = self._ask("Enter: run it; s: skip; b: back; q: stop here").lower()
             if answer.startswith("q"):
                 typer.echo(f"snakewalk setup {self.files.folder} goes on with this step", err=True)
                 raise SystemExit(code)
+            if answer.startswith("b"):
+                return False
             if answer.startswith("s"):
                 self._skip(step)
-                return
+                break
             code = self._run(words)
             if code in (0, _DEAD_RECKONED):
-                return
+                break
             typer.echo(f"  exit code {code}: correct the faults above, then try again")
             words = step.words(self.files)
+        return True
 
     def _skip(self, step: SetupStep) -> None:
         first = self.files.first_robot
@@ -195,8 +199,8 @@ class GuidedSetup:
         """Ask for the axes, which no servo knows."""
         while True:
             word = self._ask(
-                "axes from the head: y turns about the vertical, p lifts; a short word repeats, "
-                "e.g. yp; Enter: all y"
+                "axes from the head, a letter for each joint: y turns about the vertical, p lifts; "
+                "a short word repeats; Enter: all y"
             )
             if set(word) <= {"y", "p"}:
                 return word

@@ -52,10 +52,8 @@ def bus_identify(
                 line, line.latency_s, baud or (), lambda step: typer.echo(step, err=True)
             )
         ]
-    if not entries:
-        raise InputError(
-            f"{lines.port}: no servo replies; check power, cable and the adapter's switch"
-        )
+    if len(entries) < len(axes):
+        raise InputError(_too_few(lines.port, len(entries), axes))
     for note in lines.misplaced((name, entry.found.servo_id) for name, entry in entries):
         LOGGER.warning("%s", note)
     if out is not None:
@@ -87,3 +85,13 @@ def bus_identify(
         console.print(
             f"robot {out}: check its joint_axes, then: snakewalk bus calibrate --robot {out}"
         )
+
+
+def _too_few(port: str, count: int, axes: str) -> str:
+    if not count:
+        return f"{port}: no servo replies; check power, cable and the adapter's switch"
+    return (
+        f"--axes {axes}: {len(axes)} joints, but servos reply with {count} IDs; check power and "
+        "plugs. New servos share ID 1: connect each alone and change it "
+        "(snakewalk bus set --baud 57600 --id 1 --new-id 2)"
+    )

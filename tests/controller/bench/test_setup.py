@@ -17,6 +17,7 @@ from snakewalk.controller.bench.guided_setup import STEPS, GuidedSetup, RobotFil
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.command import snakewalk
 
+Answer = str | Callable[[], str]
 COMMAND = "from snakewalk.controller.cli.main import main; main()"
 
 
@@ -133,13 +134,16 @@ def test_each_command_of_it_exists() -> None:
                 assert word in help_text, shlex.join(words)
 
 
+def test_it_goes_back_to_the_step_before(bench: Bench) -> None:
+    ran = bench.sets_up("y", "", "b", "yp", "", "", "s", "s", "s", "", "s")
+    assert ran == ["bus inventory", "bus inventory", "doctor --robot"]
+    assert bench.ran[1][2:4] == ["--axes", "yp"]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("servos", ["11-14:XL330-M288"])
-def test_a_chain_with_ids_of_its_own(
-    servos: str, tmp_path: Path, servo_bus: Callable[..., ServoBus]
-) -> None:
-    bus = servo_bus(servos)
-    answers = ["", "", "s", "s", "", "", "", "q"]
+def test_a_chain_with_ids_of_its_own(tmp_path: Path, servo_bus: Callable[..., ServoBus]) -> None:
+    bus = servo_bus("11-14:XL330-M288")
+    answers: list[Answer] = ["ypyp", "", "s", "s", "", "", "", "q"]
     text, code = typed(tmp_path, ["setup", "snake", "--port", bus.path], answers)
     assert code == 0, text
     assert "7 of 7" in text
@@ -148,8 +152,75 @@ def test_a_chain_with_ids_of_its_own(
     assert bus["Torque Enable"].tolist() == [0] * 4
 
 
-def typed(folder: Path, words: list[str], answers: list[str]) -> tuple[str, int]:
-    """Run the program in a terminal, answer its questions, and return its text and exit code."""
+@pytest.mark.slow
+def test_new_servos_share_an_id_and_the_setup_names_the_command(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus("1-4:XL330-M288", baud=57_600)
+    bus.set("ID", 1)
+    answers: list[Answer] = ["ypyp", "", "q"]
+    text, code = typed(tmp_path, ["setup", "snake", "--port", bus.path], answers)
+    assert code == 2, text
+    said = " ".join(text.split())
+    assert "--axes ypyp: 4 joints, but servos reply with 1 IDs" in said
+    assert "snakewalk bus set --baud 57600 --id 1 --new-id 2" in said
+
+
+@pytest.mark.slow
+def test_servos_at_the_baud_rate_of_the_factory_are_set_and_found_again(
+    tmp_path: Path, servo_bus: Callable[..., ServoBus]
+) -> None:
+    bus = servo_bus("1-4:XL330-M288", baud=57_600)
+
+    def sets_baud_rates() -> str:
+        for servo_id in "1234":
+            words = ("--id", servo_id, "--new-baud", "1000000", "--yes")
+            done = snakewalk("bus", "set", "--port", bus.path, "--baud", "57600", *words)
+            assert done.returncode == 0, done
+        return "b"
+
+    answers: list[Answer] = ["y", "", "", sets_baud_rates, "ypyp", "", "", "q"]
+    text, code = typed(tmp_path, ["setup", "snake", "--port", bus.path], answers)
+    assert code == 0, text
+    assert "snakewalk bus set --id ID --new-baud 1000000" in " ".join(text.split())
+    robot = load_robot(str(tmp_path / "snake" / "found.toml"))
+    assert (robot.servo_ids, robot.servo.baud) == ((1, 2, 3, 4), 1_000_000)
+    assert "fail" not in text.partition("3 of 7")[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "keys", "named"),
+    [
+        ("mute", {"ids": [3]}, "fail servo IDs no answer from servo 3"),
+        ("clash", {"id": 3, "takes": 2}, "fail duplicate IDs servo 2 answers with damaged bytes"),
+    ],
+)
+def test_a_servo_that_is_missing_or_has_the_id_of_another_is_named(
+    kind: str,
+    keys: dict[str, object],
+    named: str,
+    tmp_path: Path,
+    servo_bus: Callable[..., ServoBus],
+) -> None:
+    bus = servo_bus("1-4:XL330-M288")
+
+    def breaks() -> str:
+        bus.set("Homing Offset", 300, ids=[3])  # two servos never stand at the same place
+        bus.fault(kind, **keys)
+        return ""
+
+    answers: list[Answer] = ["ypyp", "", breaks, "q"]
+    text, code = typed(tmp_path, ["setup", "snake", "--port", bus.path], answers)
+    assert code == 1, text
+    assert named in " ".join(text.split())
+
+
+def typed(folder: Path, words: list[str], answers: list[Answer]) -> tuple[str, int]:
+    """Run the program in a terminal, answer its questions, and return its text and exit code.
+
+    An answer that is a function does what a person does before the answer.
+    """
     ours, theirs = pty.openpty()
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "TERM": "dumb"}
     environment |= {"XDG_RUNTIME_DIR": str(folder)}
@@ -160,14 +231,20 @@ def typed(folder: Path, words: list[str], answers: list[str]) -> tuple[str, int]
         [sys.executable, "-c", COMMAND, *words], cwd=folder, env=environment, **streams
     ) as child:
         os.close(theirs)
-        while True:
-            try:
-                text += os.read(ours, 4096).decode(errors="replace")
-            except OSError:  # the program has ended
-                break
-            if text[asked:].endswith(": ") and answers:
-                asked = len(text)
-                os.write(ours, f"{answers.pop(0)}\n".encode())
+        try:
+            while True:
+                try:
+                    text += os.read(ours, 4096).decode(errors="replace")
+                except OSError:  # the program has ended
+                    break
+                if text[asked:].endswith(": ") and answers:
+                    asked = len(text)
+                    answer = answers.pop(0)
+                    word = answer if isinstance(answer, str) else answer()
+                    os.write(ours, f"{word}\n".encode())
+        except BaseException:
+            child.kill()
+            raise
         code = child.wait()
     os.close(ours)
     return text, code
