@@ -49,7 +49,9 @@ class Serial(SerialBase):
         self._reconfigure_port()
 
     def close(self) -> None:
-        """Close the port; the bus stays."""
+        """Close the port; a bus of this process stays."""
+        if self.is_open and self.port not in LINES:
+            self._line.closePort()
         self.is_open = False
 
     @property

@@ -111,7 +111,7 @@ def test_a_second_client_is_rejected_and_the_line_is_free_after_the_first() -> N
     with served() as (server, _):
         with (
             ServedLine(server.path),
-            pytest.raises(PortError, match=r"its server has ended.* whose line has one client"),
+            pytest.raises(PortError, match=r"the port is gone.* whose line has one client"),
         ):
             ServedLine(server.path)
         with ServedLine(server.path) as line:
@@ -186,7 +186,12 @@ def test_pyserial_opens_it_too() -> None:
         ping = bytes.fromhex("fffffd000103000119 4e")
         port.write(ping)
         assert port.read(14)[4] == 1
+        with pytest.raises(serial.SerialException, match="whose line has one client"):
+            serial.serial_for_url(server.path)
         port.close()
+        with serial.serial_for_url(server.path) as again:
+            assert again.is_open
+        assert not again.is_open
 
 
 def test_datagrams_come_with_the_time() -> None:
