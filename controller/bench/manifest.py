@@ -7,6 +7,7 @@ PLUGINS = (
     ("command", "bus blink", "Blink the LED of servos to find them; nothing moves.", "snakewalk.controller.bench.commands.bus_blink:blink"),
     ("command", "bus calibrate", "Move one servo at a time weakly, ask which joint moved, and write the robot's file.", "snakewalk.controller.bench.commands.calibrate:calibrate"),
     ("command", "bus inventory", "List the servos on the wire: models, IDs, firmware, faults; suggest a robot file.", "snakewalk.controller.bench.commands.bus_identify:bus_identify"),
+    ("command", "bus pendulum", "Swing a weight by 1.2 rad for 6 s, let it fall for 2 s, and record the servo.", "snakewalk.controller.bench.commands.bus_pendulum:pendulum"),
     ("command", "bus reboot", "Restart servos and clear their alarms; torque goes off, so a held load falls.", "snakewalk.controller.bench.commands.bus_reboot:reboot"),
     ("command", "bus restore", "Write the values of a backup that differ; shows them and asks first.", "snakewalk.controller.bench.commands.bus_restore:restore"),
     ("command", "bus scan", "List the servos on a bus, at every baud rate; changes nothing.", "snakewalk.controller.bench.commands.scan:scan"),

@@ -1,6 +1,6 @@
 """Facts about a file of elevations that it may not state."""
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -8,8 +8,8 @@ from snakewalk.config.answers import LISTED, Answers
 from snakewalk.controller.console.option import Flag
 
 _Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
-SMALLEST: Final = 1e-6
-LARGEST: Final = 1e6
+SMALLEST = 1e-6
+LARGEST = 1e6
 """Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 
 

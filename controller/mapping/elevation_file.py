@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -34,14 +33,14 @@ from snakewalk.controller.mapping.raster_file import (
 )
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
-LOWEST_M: Final = -430.0
+LOWEST_M = -430.0
 """Height of the lowest dry land: the shore of the Dead Sea, which sinks by a metre a year."""
-HIGHEST_M: Final = 8850.0
+HIGHEST_M = 8850.0
 """Height of the highest land: Mount Everest, 8848.86 m (China and Nepal, 2020)."""
-_HIGHEST_M: Final = 1e6
-_GAP_M: Final = 50.0
+_HIGHEST_M = 1e6
+_GAP_M = 50.0
 """Step to all other heights, wider than their relief, that is suspicious (ours)."""
-_MANY_EQUAL_CELLS: Final = 3
+_MANY_EQUAL_CELLS = 3
 """Number of cells of one value that counts as a missing height (ours)."""
 
 
@@ -107,31 +106,31 @@ def _question(finite: Floats, value: float, per_value_m: float, why: str, key: s
     )
 
 
-_UNSTATED: Final = (UNSTATED_UNIT, UNSTATED_HEIGHTS)
-_FEW_SHARE: Final = 0.2
+_UNSTATED = (UNSTATED_UNIT, UNSTATED_HEIGHTS)
+_FEW_SHARE = 0.2
 """Share of points that may be outliers (ours)."""
-_SAME_PLACE: Final = 1e-7
-_EVEN_STEP: Final = 0.01
+_SAME_PLACE = 1e-7
+_EVEN_STEP = 0.01
 """Shares of a length in which places, and of a step in which steps, are the same (ours)."""
-LASERS: Final = (".las", ".laz")
-CLOUDS: Final = (".pcd", ".ply", ".xyz", *LASERS)
-MESHES: Final = (".obj", ".stl", ".glb")
-_MOST_SIZE_M: Final = 100_000.0
+LASERS = (".las", ".laz")
+CLOUDS = (".pcd", ".ply", ".xyz", *LASERS)
+MESHES = (".obj", ".stl", ".glb")
+_MOST_SIZE_M = 100_000.0
 """Largest size of a map in the robot's world: a run's places reach a hundredth of it (ours)."""
-ENDINGS: Final = (*RASTERS, *CLOUDS, *MESHES)
-_POINTS_A_CELL: Final = 2.0
+ENDINGS = (*RASTERS, *CLOUDS, *MESHES)
+_POINTS_A_CELL = 2.0
 """Mean number of points in a cell of a cloud whose spacing is not given (ours)."""
 _STACKED_SHARE, _STACKED_RELIEF, _STACKED_POINTS = 0.2, 0.5, 3
 """Share of the points, in cells with some of them, that lie one above the other by a share of the
 relief: beyond it a cloud is not seen from above (ours)."""
-_FEW_CELLS: Final = 10
-_TURNS: Final = {
+_FEW_CELLS = 10
+_TURNS = {
     "z": ((0, 1, 2), (1.0, 1.0, 1.0)), "-z": ((0, 1, 2), (1.0, -1.0, -1.0)),
     "y": ((0, 2, 1), (1.0, -1.0, 1.0)), "-y": ((0, 2, 1), (1.0, 1.0, -1.0)),
     "x": ((1, 2, 0), (1.0, 1.0, 1.0)), "-x": ((1, 2, 0), (1.0, -1.0, -1.0)),
 }  # fmt: skip
 """Order and signs of the axes that turn one up, without mirroring."""
-_MESH_SAMPLES: Final = 200
+_MESH_SAMPLES = 200
 """Number of samples along the longer side of a mesh without a given spacing (ours)."""
 
 

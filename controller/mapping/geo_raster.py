@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -35,19 +35,19 @@ from snakewalk.controller.mapping.raster_file import (
     raster_window,
 )
 
-MOST_STRIPPED_CELLS: Final = 1_000_000_000
+MOST_STRIPPED_CELLS = 1_000_000_000
 """Most cells of a raster that is read in strips (ours)."""
-_MOST_CELLS: Final = 4 * MOST_SAMPLES
+_MOST_CELLS = 4 * MOST_SAMPLES
 """Largest number of cells that are read at once; more would make too many samples."""
-_STRIP_CELLS: Final = 2_000_000
+_STRIP_CELLS = 2_000_000
 """Largest number of cells in a window that is read at once (ours)."""
-_COARSER: Final = 2.0
+_COARSER = 2.0
 """Spacing of a map over a raster's from which strips are read (ours)."""
-_CACHE_BYTES: Final = 64_000_000
+_CACHE_BYTES = 64_000_000
 """Cache of GDAL's blocks (ours)."""
-_COLOURS: Final = ("palette", "red", "green", "blue", "alpha", "hue", "cyan", "magenta")
+_COLOURS = ("palette", "red", "green", "blue", "alpha", "hue", "cyan", "magenta")
 """Meanings of a band (GDAL's color interpretation) that exclude heights."""
-_DEGREES_LIKE: Final = 1.0 / 60.0 + 1e-9
+_DEGREES_LIKE = 1.0 / 60.0 + 1e-9
 """Largest cell in degrees: a minute, 1.8 km (ours)."""
 
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -29,15 +29,15 @@ from snakewalk.controller.mapping.length_units import (
 )
 from snakewalk.controller.mapping.raster_file import Crop
 
-MOST_POINTS: Final = 10_000_000
+MOST_POINTS = 10_000_000
 """Points that are kept at once (ours): 240 MB, and some copies."""
-_MOST_READ: Final = 2_000_000_000
-_CHUNK: Final = 1_000_000
-_GROUND: Final = (2, 8)
+_MOST_READ = 2_000_000_000
+_CHUNK = 1_000_000
+_GROUND = (2, 8)
 """Classes of the ground: ground, model key points (ASPRS LAS 1.4, tables 8 and 17)."""
-_NOISE: Final = (7, 18)
+_NOISE = (7, 18)
 """Low and high noise."""
-_NAMES: Final = {
+_NAMES = {
     0: "never classified",
     1: "unclassified",
     2: "ground",
@@ -58,14 +58,14 @@ _LINEAR_UNITS, _VERTICAL_UNITS = 3076, 4099
 """Keys of GeoTIFF, as records 34735 have them."""
 _USER_DEFINED = 32767
 _WKT_RECORD = 2112
-_PROJECTED_PART: Final = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
-_KEY_UNITS: Final = {9001: "m", 9002: "ft", 9003: "us-ft"}
+_PROJECTED_PART = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
+_KEY_UNITS = {9001: "m", 9002: "ft", 9003: "us-ft"}
 
 
 _MOST_MEMORY_BYTES = 3_000_000_000
 _MOST_CPU_S = 600
 """Limits of the process that reads a file: memory and CPU time (ours)."""
-_CHILD: Final = """
+_CHILD = """
 import sys
 words, memory_bytes, cpu_s = sys.argv[1:]
 try:

@@ -7,9 +7,9 @@ from typing import Any, Final
 
 from snakewalk.config.errors import InputError
 
-FOOT_M: Final = 0.3048
-US_FOOT_M: Final = 1200.0 / 3937.0
-UNITS_M: Final = {
+FOOT_M = 0.3048
+US_FOOT_M = 1200.0 / 3937.0
+UNITS_M = {
     "m": 1.0,
     "cm": 0.01,
     "mm": 0.001,
@@ -19,9 +19,9 @@ UNITS_M: Final = {
 }
 """Metres per unit of length, by the names that options accept."""
 DEGREE: Final = "deg"
-UNSTATED_UNIT: Final = "the file states no unit of lengths: metres; --unit states another"
-UNSTATED_HEIGHTS: Final = "the file states no unit of heights: metres"
-_SPELLINGS: Final = {
+UNSTATED_UNIT = "the file states no unit of lengths: metres; --unit states another"
+UNSTATED_HEIGHTS = "the file states no unit of heights: metres"
+_SPELLINGS = {
     "m": ("m", "metre", "meter", "metres", "meters"),
     "cm": ("cm", "centimetre", "centimeter", "centimetres", "centimeters"),
     "mm": ("mm", "millimetre", "millimeter", "millimetres", "millimeters"),
@@ -42,11 +42,11 @@ _SPELLINGS: Final = {
         "usft",
     ),
 }
-VERTICAL_PART: Final = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
-WKT_UNIT: Final = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
-_TRUE_SCALE_TOLERANCE: Final = 0.005
+VERTICAL_PART = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
+WKT_UNIT = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
+_TRUE_SCALE_TOLERANCE = 0.005
 """Share by which a map's lengths may be off before true lengths are used (ours): UTM is within."""
-_MOST_VARIATION: Final = 0.1
+_MOST_VARIATION = 0.1
 """Change of a map's scale over a file that is accepted (ours)."""
 
 

@@ -7,7 +7,6 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -19,9 +18,9 @@ from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import DEGREE, unit_m
 from snakewalk.controller.mapping.number_table import read_numbers
 
-GEO_RASTERS: Final = (".tif", ".tiff", ".asc")
-RASTERS: Final = (*GEO_RASTERS, ".png", ".csv", ".npz")
-MOST_CELLS: Final = 40_000_000
+GEO_RASTERS = (".tif", ".tiff", ".asc")
+RASTERS = (*GEO_RASTERS, ".png", ".csv", ".npz")
+MOST_CELLS = 40_000_000
 """Most cells of a raster that is read at once (ours): 320 MB as numbers."""
 Crop = tuple[float, float, float, float]
 """Least x and y, greatest x and y, in metres from the south-west corner of the file's content."""

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -20,7 +20,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.reading import Fact, Facts
 from snakewalk.controller.mapping.length_units import unit_m
 
-_NAMES: Final = {
+_NAMES = {
     "k_left": ("K1", "M1", "cameraMatrix1", "camera_matrix_left", "K_left"),
     "distortion_left": ("D1", "distCoeffs1", "dist_coeffs_left", "D_left"),
     "k_right": ("K2", "M2", "cameraMatrix2", "camera_matrix_right", "K_right"),
@@ -29,9 +29,9 @@ _NAMES: Final = {
     "translation": ("T",),
 }
 """Names that people use for the results of ``stereoCalibrate``."""
-_OPTIONAL: Final = ("distortion_left", "distortion_right")
-_MOST_BYTES: Final = 1_000_000
-_MOST_BASELINE_M: Final = 5.0
+_OPTIONAL = ("distortion_left", "distortion_right")
+_MOST_BYTES = 1_000_000
+_MOST_BASELINE_M = 5.0
 """Distance of the cameras above which the unit of a calibration is wrong (ours)."""
 
 

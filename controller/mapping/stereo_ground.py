@@ -5,7 +5,6 @@ left, z up.
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -15,18 +14,18 @@ from snakewalk.controller.mapping.disparity import match
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
-DISPARITY_ERROR_PX: Final = 0.3
+DISPARITY_ERROR_PX = 0.3
 """Standard error that is assumed for a disparity (ours): the median on a real pair is 0.15 px."""
-MOST_ROLL_DEG: Final = 3.0
+MOST_ROLL_DEG = 3.0
 """A camera is set up upright to about this angle (ours): a larger roll may be a slope."""
-_TRIALS: Final = 300
-_SAMPLE: Final = 20_000
+_TRIALS = 300
+_SAMPLE = 20_000
 """Points that a plane is searched in."""
-_LEAST_UP_COSINE: Final = np.cos(np.radians(70.0))
+_LEAST_UP_COSINE = np.cos(np.radians(70.0))
 """A ground's normal leans from the camera's up by at most 70 degrees (ours)."""
-_LEAST_POINTS: Final = 2
+_LEAST_POINTS = 2
 """Least number of points in a known cell (ours)."""
-_LEAST_GROUND: Final = 0.2
+_LEAST_GROUND = 0.2
 """Share of the points that must lie on a ground that is fitted (ours)."""
 
 

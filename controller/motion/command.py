@@ -1,20 +1,20 @@
 """Commands of another program to the joints of a robot."""
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.gaits.gait import Gait
 
-LATE_S: Final = 1.0
+LATE_S = 1.0
 """An operator's command that is older is dropped (ours): its user no longer expects it."""
-TIMEOUT_S: Final = 1.0
+TIMEOUT_S = 1.0
 """Time for which joints go on towards goals that nobody renews (ours)."""
-POINTS_MAX: Final = 500
+POINTS_MAX = 500
 """Largest number of points of a trajectory, which is splined and checked within a cycle."""
-JOINTS_MAX: Final = 256
+JOINTS_MAX = 256
 """Joints that a command may name (ours): a robot has at most 200."""
-LINE_BYTES: Final = 1 << 20
+LINE_BYTES = 1 << 20
 """Longest command on its way to the run: a trajectory of 500 points for 64 joints (ours)."""
 
 

@@ -5,7 +5,7 @@ present angles and speeds.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import PPoly
@@ -38,9 +38,9 @@ from snakewalk.controller.motion.trajectory import (
 )
 from snakewalk.controller.motion.velocity_gait import VelocityGait
 
-_GAIN_PER_S: Final = 20.0
-_REACHED_GOAL_RAD: Final = 1e-3
-_JOIN_STEP_S: Final = 0.02
+_GAIN_PER_S = 20.0
+_REACHED_GOAL_RAD = 1e-3
+_JOIN_STEP_S = 0.02
 """Steps in which a join is tried before it begins."""
 
 

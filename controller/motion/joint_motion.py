@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -17,18 +17,18 @@ from snakewalk.config.playback import JointRequest
 from snakewalk.config.reading import Fact, Facts
 from snakewalk.config.robot import RobotConfig
 
-UNITS: Final = {"rad": 1.0, "deg": np.pi / 180.0}
+UNITS = {"rad": 1.0, "deg": np.pi / 180.0}
 """Units of angles and their size in radians."""
-TIME_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of times and their size in seconds."""
-MOST_CELLS: Final = 20_000_000
+MOST_CELLS = 20_000_000
 """Angles of a motion (ours): an hour of 50 joints at 100 Hz."""
-REST: Final = "rest"
+REST = "rest"
 """Name that keeps a joint of the robot at 0."""
-_STILL_JOINT_RAD: Final = 1e-6
-_NUMBERED_NAME: Final = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
+_STILL_JOINT_RAD = 1e-6
+_NUMBERED_NAME = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
 """Name of a joint with a number near its end."""
-_STEPS_S: Final = (0.0005, 0.5)
+_STEPS_S = (0.0005, 0.5)
 """Steps between rows of a motion, s (ours)."""
 
 

@@ -5,7 +5,6 @@ that nobody measured.
 """
 
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 
@@ -17,8 +16,8 @@ from snakewalk.controller.kinematics.ramp import Ramp
 from snakewalk.controller.motion.recorded import Recorded
 from snakewalk.controller.motion.source import HEADROOM, Pace
 
-_STEPS: Final = 3.5
-_GAP_S: Final = 0.25
+_STEPS = 3.5
+_GAP_S = 0.25
 """A gap is longer than both: usual steps between rows, and a time in which a wave changes little
 (ours)."""
 

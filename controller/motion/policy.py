@@ -24,7 +24,7 @@ _Amplitude = Annotated[float, Field(ge=0.0, le=0.8)]
 _Waves = Annotated[float, Field(ge=0.2, le=3.0)]
 _Gain = Annotated[float, Field(ge=-1.0, le=1.0)]
 _Bend = Annotated[float, Field(ge=-3.0, le=3.0)]
-DIGITS: Final = 6
+DIGITS = 6
 """Significant digits of a number in a file."""
 
 

@@ -1,7 +1,5 @@
 """Recorded joint angles as a motion: splined, and slowed as far as the robot needs."""
 
-from typing import Final
-
 import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
 
@@ -15,7 +13,7 @@ from snakewalk.controller.motion.source import HEADROOM, Pace
 
 RAMP_S = 0.5
 """Shortest time in which a recording comes to its speed, and to rest again (ours)."""
-_RAMP_SAMPLES: Final = 400
+_RAMP_SAMPLES = 400
 
 
 class Recorded:

@@ -1,17 +1,16 @@
 """Reports of rejected commands, limited to a readable rate."""
 
 from collections.abc import Callable
-from typing import Final
 
 from snakewalk.config.plain_text import plain
 
-QUIET_S: Final = 1.0
+QUIET_S = 1.0
 """Time after which the same line is reported again (ours)."""
-LINES_MAX: Final = 10
+LINES_MAX = 10
 """Lines per ``QUIET_S``; the others are counted (ours)."""
-NAME_MAX: Final = 100
+NAME_MAX = 100
 """Characters that are quoted of a name or a word (ours)."""
-TEXT_MAX: Final = 300
+TEXT_MAX = 300
 """Characters of a line (ours): a command may contain a name of any length."""
 
 

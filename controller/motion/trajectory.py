@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.motion.command import POINTS_MAX, JointTrajectory
 from snakewalk.controller.motion.refusals import NAME_MAX
 
-START_RAD: Final = 0.05
+START_RAD = 0.05
 """Largest distance of a joint from a first point at 0 s (ours)."""
-_SAMPLES: Final = 32
+_SAMPLES = 32
 """Points of each piece at which the limits are checked."""
-_SLACK: Final = 1.0 + 1e-6
-_REST_SPEED_RAD_S: Final = 1e-3
+_SLACK = 1.0 + 1e-6
+_REST_SPEED_RAD_S = 1e-3
 
 JointNumbers = NDArray[np.intp]
 

@@ -1,7 +1,5 @@
 """A gait with a turn parameter, and the rate at which the turn may change."""
 
-from typing import Final
-
 import numpy as np
 
 from snakewalk.config.robot import RobotConfig
@@ -9,9 +7,9 @@ from snakewalk.controller.gaits.gait import CYCLE_SAMPLES, Gait
 from snakewalk.controller.gaits.wave import TURN
 from snakewalk.controller.motion.source import Pace
 
-TURN_RATE_PER_S: Final = 0.5
+TURN_RATE_PER_S = 0.5
 """Rate of change of the turn (ours): within a cycle of 4 s it goes from straight to its limit."""
-TURN_PER_S2: Final = 1.0
+TURN_PER_S2 = 1.0
 
 
 def turned(gait: Gait, key: str, turn: float) -> Gait:

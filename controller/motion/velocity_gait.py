@@ -8,7 +8,6 @@ fed back.
 
 import math
 from copy import copy
-from typing import Final
 
 import numpy as np
 
@@ -28,14 +27,14 @@ from snakewalk.controller.motion.turned_gait import (
     turned,
 )
 
-BEND_LIMIT_RAD: Final = 1.4
+BEND_LIMIT_RAD = 1.4
 """Largest bend of the axis over the body (ours), as of a steered gait."""
-_RATE_PER_S: Final = 0.7
+_RATE_PER_S = 0.7
 """Rate of change of the share of the full rate (ours): from full speed to rest in 1.5 s."""
-_RATE_PER_S2: Final = 4.0
-_REST_RATE: Final = 1e-3
-_ROUNDING: Final = 1.0 + 1e-9
-_KEY: Final = "turn_rad"
+_RATE_PER_S2 = 4.0
+_REST_RATE = 1e-3
+_ROUNDING = 1.0 + 1e-9
+_KEY = "turn_rad"
 
 
 class VelocityGait:

@@ -9,7 +9,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +28,11 @@ from snakewalk.controller.motion.command import (
     Velocity,
 )
 
-LATE_S: Final = 0.5
+LATE_S = 0.5
 """A command that waited longer for the run is rejected (ours): nothing stale moves a joint."""
-_MOST_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S = 0.1
 """A command with a later time is rejected (ours): both processes read the same clock."""
-_NAMES: Final = {
+_NAMES = {
     "goals": "joint goals",
     "trajectory": "trajectory",
     "gait": "gait",

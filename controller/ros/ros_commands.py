@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from rclpy.node import Node
@@ -34,11 +34,11 @@ from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name, is_gait
 
-_PENDING_MAX: Final = 16
+_PENDING_MAX = 16
 """Commands kept from one cycle to the next; older ones are dropped, and so are joint goals that
 newer ones of the same joints follow, and velocities and goal poses that newer ones follow."""
-QUEUE: Final = QoSProfile(depth=10)
-_WINDOW_S: Final = 120.0
+QUEUE = QoSProfile(depth=10)
+_WINDOW_S = 120.0
 """Time whose fastest message counts as having no delay (ours), so that clocks need not agree."""
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -56,23 +56,23 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.safety.stop_button import PressedButton
 
-NAME: Final = "snakewalk"
-_CYCLE: Final = CycleTable.topic.name
-_SLOW_TOPIC: Final = SlowTable.topic.name
-_POSE_SOURCE: Final = PoseSourceTable.topic.name
-_STEP_S: Final = 0.05
-_DIAGNOSTICS_S: Final = 1.0
-_OFFSET_SPAN_S: Final = 2.0
-_STOP_S: Final = 1.0
+NAME = "snakewalk"
+_CYCLE = CycleTable.topic.name
+_SLOW_TOPIC = SlowTable.topic.name
+_POSE_SOURCE = PoseSourceTable.topic.name
+_STEP_S = 0.05
+_DIAGNOSTICS_S = 1.0
+_OFFSET_SPAN_S = 2.0
+_STOP_S = 1.0
 """Longest wait of the stop service for the run to confirm that torque is off."""
-_POLL_S: Final = 1e-3
-_LAST_MESSAGES_S: Final = 0.2
+_POLL_S = 1e-3
+_LAST_MESSAGES_S = 0.2
 """Time for the last messages to leave."""
-_RUN: Final = "run"
-_LEVELS: Final = {0: OK, NOT_MEASURED: WARNING}
+_RUN = "run"
+_LEVELS = {0: OK, NOT_MEASURED: WARNING}
 """Diagnostic level of a run by its exit code."""
-_LATCHED_QOS: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-_TOPICS: Final = {
+_LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+_TOPICS = {
     JOINT_STATES: ("robot_joint_states", QUEUE),
     JOINT_GOALS: ("robot_joint_goals", QUEUE),
     HEAD_POSE: ("head_pose", QUEUE),

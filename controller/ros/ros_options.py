@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
 
 from snakewalk.controller.motion.command import TIMEOUT_S
 
-READY: Final = b"ready"
+READY = b"ready"
 """First message of a process with a node that passes poses on."""
-_RANGE: Final = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-_SAYS_WHERE: Final = (_RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
+_RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
+_SAYS_WHERE = (_RANGE, "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ import re
 import threading
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
@@ -24,8 +23,8 @@ from snakewalk.controller.ros.ros_options import READY, RosOptions, not_loaded
 from snakewalk.controller.run.external.external_source import ExternalSource
 from snakewalk.drivers.clock import Clock
 
-_START_S: Final = 60.0
-_END_S: Final = 2.0
+_START_S = 60.0
+_END_S = 2.0
 
 
 @plugin("pose", "ros")

@@ -24,10 +24,10 @@ KINDS: Final[dict[str, tuple[Any, bool]]] = {
     "nav_msgs/msg/Odometry": (Odometry, True),
 }
 """Message types, and whether they have a covariance."""
-SPIN_S: Final = 0.05
+SPIN_S = 0.05
 
 
-TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"
+TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
 
 def serve(line: Connection, argument: str) -> None:

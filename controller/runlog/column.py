@@ -14,7 +14,6 @@ from tempfile import TemporaryFile
 from typing import (
     Any,
     ClassVar,
-    Final,
     Literal,
     Self,
     TypeVar,
@@ -36,14 +35,14 @@ JOINT = "joint"
 LINK = "link"
 ANY = "any"
 """Sizes that differ from robot to robot, and from row to row."""
-_JSON_TYPES: Final = {
+_JSON_TYPES = {
     "integer": "integer",
     "joints": "integer",
     "flag": "boolean",
     "text": "string",
 }
-REQUIRED: Final = object()
-_NAN: Final = float("nan")
+REQUIRED = object()
+_NAN = float("nan")
 
 
 class Panel(StrEnum):
@@ -219,7 +218,7 @@ class Table:
         return type(self)(**self.stored_columns() | columns)
 
 
-ROWS: Final = 4096
+ROWS = 4096
 """Rows of a long log that are in memory at once (ours)."""
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Final, Self
+from typing import Any, Self
 
 from snakewalk.config.run import RunConfig
 
@@ -70,7 +70,7 @@ class PoseEvidence:
         return cls(Kind(row["kind"]), row["source"], row["position_m"], row["heading_rad"])
 
 
-SIMULATED: Final = PoseEvidence(Kind.MEASURED, "simulator", 0.0, 0.0)
+SIMULATED = PoseEvidence(Kind.MEASURED, "simulator", 0.0, 0.0)
 
 
 def evidence_of_old_log(run: RunConfig, backend: str, has_imu: bool) -> PoseEvidence:

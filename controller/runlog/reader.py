@@ -9,7 +9,7 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from tempfile import gettempdir
-from typing import Any, BinaryIO, Final
+from typing import Any, BinaryIO
 
 from mcap.exceptions import McapError
 from mcap.records import Channel, Chunk, Header, McapRecord, Message
@@ -25,17 +25,17 @@ from snakewalk.controller.runlog.tables import RowPacker, record_of
 from snakewalk.controller.runlog.topics import FORMAT, ConfigTable
 from snakewalk.controller.runlog.writer import part_path
 
-_MAGIC: Final = bytes([137, 77, 67, 65, 80, 48, 13, 10])
-_HEAD: Final = struct.Struct("<BQ")  # opcode and length before every record
-_FOOTER: Final = 2
-_CHUNK: Final = 6
-_CHUNK_HEAD: Final = struct.Struct("<16xQ4xI")  # two times, bytes unpacked, CRC, length of a name
-_CHUNK_LENGTH: Final = 8  # after the packing's name, before the packed bytes
-_ZSTD_HEAD: Final = 18  # at most
-_NAME_BYTES: Final = 1000
+_MAGIC = bytes([137, 77, 67, 65, 80, 48, 13, 10])
+_HEAD = struct.Struct("<BQ")  # opcode and length before every record
+_FOOTER = 2
+_CHUNK = 6
+_CHUNK_HEAD = struct.Struct("<16xQ4xI")  # two times, bytes unpacked, CRC, length of a name
+_CHUNK_LENGTH = 8  # after the packing's name, before the packed bytes
+_ZSTD_HEAD = 18  # at most
+_NAME_BYTES = 1000
 """Bytes of a chunk that hold its head and the name of its packing (ours)."""
-_COMPRESSIONS: Final = ("zstd", "")
-_MOST_NAMED_TOPICS: Final = 8
+_COMPRESSIONS = ("zstd", "")
+_MOST_NAMED_TOPICS = 8
 """Topics that a message names at most (ours)."""
 _BROKEN = (McapError, ZstdError, ValueError, KeyError, RecursionError, struct.error)
 Rows = dict[str, list[dict[str, Any]]]

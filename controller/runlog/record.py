@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import partial
 from importlib.metadata import version
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -45,7 +45,7 @@ class MotorEnergy(NamedTuple):
     """Net work at the shafts."""
 
 
-POSE_CHECK: Final = "pose check"
+POSE_CHECK = "pose check"
 """Backend of a log that contains only the poses of a source, before torque."""
 
 
@@ -300,7 +300,7 @@ class RunRecord:
         )
 
 
-_TIMES: Final = ("time_s", "deadline_s", "arrival_s")
+_TIMES = ("time_s", "deadline_s", "arrival_s")
 """Fields of tables that are points in time."""
 
 

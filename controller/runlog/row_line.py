@@ -12,38 +12,38 @@ import socket
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.controller.motion.command import LINE_BYTES
 from snakewalk.controller.runlog.topics import TABLES, PoseTable
 
-BUTTON: Final = "/button"
-GAIT: Final = "/gait"
-COURSE: Final = "/course"
-PICTURE: Final = "/picture"
-VERDICT: Final = "/verdict"
+BUTTON = "/button"
+GAIT = "/gait"
+COURSE = "/course"
+PICTURE = "/picture"
+VERDICT = "/verdict"
 """Topics of the line that are not in the log."""
-KEPT: Final = frozenset(
+KEPT = frozenset(
     {BUTTON, GAIT, COURSE, VERDICT, *(t.topic.name for t in TABLES if t.topic.watched == "all")}
 )
 """Topics of which every row is sent, in order; of others the newest."""
-SENT: Final = KEPT | {PICTURE, *(t.topic.name for t in TABLES if t.topic.watched == "newest")}
-_KEPT_MAX: Final = 1000
-_COMMANDS_MAX: Final = 100
+SENT = KEPT | {PICTURE, *(t.topic.name for t in TABLES if t.topic.watched == "newest")}
+_KEPT_MAX = 1000
+_COMMANDS_MAX = 100
 """Commands that wait for the run; the oldest are dropped beyond it."""
-_WAITING_BYTES: Final = 4 * LINE_BYTES
+_WAITING_BYTES = 4 * LINE_BYTES
 """Commands that wait for the socket in the observer (ours); the oldest are dropped beyond it."""
-SILENT_S: Final = 3.0
+SILENT_S = 3.0
 """An observer without a request for this time does not respond (ours): it requests rows 20 times a
 second, and on a busy machine late by a second."""
-_START_S: Final = 60.0
+_START_S = 60.0
 """Longest time without a request before an observer has shown a cycle (ours): building a scene
 needs seconds."""
-STEP_MAX_S: Final = 0.1
+STEP_MAX_S = 0.1
 """Largest part of the time between two checks that counts (ours)."""
-_RECEIVE_BYTES: Final = 1 << 18
-_HEAD: Final = 4
-_END: Final = b"\n"
+_RECEIVE_BYTES = 1 << 18
+_HEAD = 4
+_END = b"\n"
 
 
 class RunEnd:

@@ -41,7 +41,7 @@ _TABLES: Final[Mapping[str, type[Table]]] = {
 """Tables of a record, by attribute."""
 
 
-_PARTS: Final = 16
+_PARTS = 16
 """Parts of a table that stay in memory (ours): 22 minutes at 50 Hz."""
 
 

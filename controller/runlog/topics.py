@@ -9,7 +9,7 @@ meaning.
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,15 +27,15 @@ from snakewalk.controller.runlog.column import (
     topic,
 )
 
-FORMAT: Final = 1
-NAN: Final = float("nan")
-FLAT_V: Final = 0.15
+FORMAT = 1
+NAN = float("nan")
+FLAT_V = 0.15
 """Span up to which a supply holds no information (ours)."""
-FLAT_C: Final = 1.0
+FLAT_C = 1.0
 """Span up to which a temperature holds no information (ours)."""
 Flags = NDArray[np.bool_]
 Texts = tuple[str, ...]
-_TIME: Final = Column("clock of the run, s", "exact", is_known=True)
+_TIME = Column("clock of the run, s", "exact", is_known=True)
 _per_joint = partial(Column, shape=(JOINT,))
 _optional = partial(Column, default=NAN)
 
@@ -352,5 +352,5 @@ class QposTable(Table):
     qpos: Annotated[Floats, Column("generalised position of the simulation", shape=(ANY,))]
 
 
-TABLES: Final = registered_tables()
+TABLES = registered_tables()
 """Table of each topic, in the order of the log's channels."""

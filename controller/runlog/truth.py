@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import MotorEnergy
 
-FORMAT: Final = 1
+FORMAT = 1
 
 
 class TruthLog:

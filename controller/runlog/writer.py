@@ -6,7 +6,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from mcap.writer import Writer
@@ -28,12 +28,12 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.drivers.types import JointState
 
 Level = Literal["info", "warning", "error"]
-_LOGGER: Final = logging.getLogger("snakewalk")
-_FLUSH_S: Final = 0.5
-_BATCH: Final = 32
+_LOGGER = logging.getLogger("snakewalk")
+_FLUSH_S = 0.5
+_BATCH = 32
 """Rows printed together (ours): about ten cycles. A row in a batch costs a third of the time,
 because the processor's caches forget the printing code between two cycles."""
-_CHUNK_BYTES: Final = 1 << 20
+_CHUNK_BYTES = 1 << 20
 
 
 class RunLog:

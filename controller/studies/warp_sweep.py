@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.console.messages import LOGGER
@@ -23,7 +22,7 @@ from snakewalk.controller.studies.sweep_measure import (
 from snakewalk.controller.studies.sweep_points import Point
 from snakewalk.sim.batch.warp_bodies import WarpBodies, device_name
 
-BATCH: Final = 256
+BATCH = 256
 """Most robots of a batch: each has its log open (ours)."""
 Result = tuple[Point, Measurement]
 

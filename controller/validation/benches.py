@@ -30,17 +30,17 @@ from snakewalk.controller.validation.measurement import (
 from snakewalk.sim.servo.bench import BenchPlant
 from snakewalk.sim.servo.motor import gears_of, make_drive, motors_of, p_gain_per_rad
 
-RISE_S: Final = 1.0
+RISE_S = 1.0
 """Time in which the amplitudes of a wave rise from 0 (ours)."""
-_CYCLE_HZ: Final = 100.0
+_CYCLE_HZ = 100.0
 """Goals per second: steps of 20 ms would shake a stiff body, and water resists by the square."""
-_PENDULUM_S: Final = 6.0
+_PENDULUM_S = 6.0
 """Duration of BAM's trajectories."""
-_SETTLING_S: Final = 1.0
-_LAG_STEP_S: Final = 2.5e-3
-_MOST_LAG_S: Final = 0.4
+_SETTLING_S = 1.0
+_LAG_STEP_S = 2.5e-3
+_MOST_LAG_S = 0.4
 """Lags are searched in these steps and up to this limit, as in ``feetech-bench-figures``."""
-_SPIN_UP_S: Final = 3.0
+_SPIN_UP_S = 3.0
 _TRAJECTORIES: Final[dict[str, Callable[[Floats], Floats]]] = {
     "sin_sin": lambda t: np.sin(t) * np.pi / 2 + 0.5 * np.sin(5.0 * t) * np.sin(2.0 * t),
     "sin_time_square": lambda t: np.sin(t**2),

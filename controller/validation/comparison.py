@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from statistics import median
-from typing import Final, Literal
+from typing import Literal
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.validation.benches import simulate
@@ -16,7 +16,7 @@ from snakewalk.controller.validation.measurement import (
 )
 
 State = Literal["ok", "reported", "outside", "failed"]
-SHOWN: Final = {
+SHOWN = {
     "head_speed_m_s": ("head speed", "cm/s", 100.0),
     "tail_speed_m_s": ("tail speed", "cm/s", 100.0),
     "speed_m_s": ("speed", "cm/s", 100.0),

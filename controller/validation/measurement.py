@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -15,7 +15,7 @@ from snakewalk.config.world import WorldConfig
 Kind = Literal["measured", "data sheet", "published model", "held out", "fitted"]
 """``held out``: constants come from other results of the same source, not from this one.
 ``fitted``: a constant of ours comes from this result."""
-NEAR: Final = (0.8, 1.25)
+NEAR = (0.8, 1.25)
 """Ratios within a quarter; a row that leaves them states a cause (ours)."""
 
 

@@ -1,12 +1,11 @@
 """The page of all measurements: ``docs/validation.md``."""
 
 from collections.abc import Sequence
-from typing import Final
 
 from snakewalk.controller.validation.comparison import SHOWN, Compared, median_ratio
 from snakewalk.controller.validation.measurement import PublishedResults
 
-_HEAD: Final = """# Comparison with reality
+_HEAD = """# Comparison with reality
 
 This page compares the simulator with published results. Each row repeats one result with the same
 body, ground and motion, as far as the source states them. To add your robot, see
@@ -17,7 +16,7 @@ body, ground and motion, as far as the source states them. To add your robot, se
     snakewalk trials validate --page docs/validation.md --force
 
 """
-_TERMS: Final = """
+_TERMS = """
 - **Ratio**: simulated / measured.
 - **Range**: the ratios with which the command succeeds. It contains today's ratio; it is not a
   tolerance.
@@ -32,7 +31,7 @@ _TERMS: Final = """
 | held out | a measurement; constants come from other results of the same source |
 | fitted | a measurement from which a constant comes |
 """
-_LIMITS: Final = """
+_LIMITS = """
 ## Limits of this comparison
 
 - The crawler has hobby servos, and its friction was not measured. No row has a crawler with

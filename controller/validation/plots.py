@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -13,7 +12,7 @@ from snakewalk.controller.validation.comparison import Compared
 from snakewalk.controller.validation.measurement import NEAR
 
 matplotlib.use("Agg")
-_COLOURS: Final = {"ok": BLUE, "reported": INK, "outside": RED, "failed": RED}
+_COLOURS = {"ok": BLUE, "reported": INK, "outside": RED, "failed": RED}
 
 
 def draw_ratios(rows: Sequence[Compared], path: Path) -> None:

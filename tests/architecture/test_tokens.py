@@ -64,7 +64,7 @@ LIMITS: Final = {
 RAISED: Final[dict[str, tuple[int, str]]] = {
     "sim.serve": (4450, "0256-virtual-time-for-two-processes.md"),
     "drivers.port": (2950, "0256-virtual-time-for-two-processes.md"),
-    "controller.bench": (22_600, "0276-setup-runs-commands.md"),
+    "controller.bench": (22_800, "0257-a-pendulum-is-a-chain-of-one-joint.md"),
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "controller.console": (7750, "0188-options-are-fields.md"),
     "controller.images": (14_900, "0220-faint-tails-are-followed.md"),

@@ -21,7 +21,6 @@ NAMES = (
     "sweep",
     "learn_wave",
     "send_pose",
-    "record_pendulum",
 )
 WITH_TORCH = "learn_policy"
 """Trains with packages that are no extra of ours; that it ran is told in docs/policies.md."""

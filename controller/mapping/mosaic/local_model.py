@@ -1,7 +1,7 @@
 """Local model of a position: points, colours and valid region of a stereo pair ([KP] 3.2)."""
 
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Self
 
 import cv2
 import numpy as np
@@ -12,12 +12,12 @@ from snakewalk.controller.mapping.disparity import match
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
 from snakewalk.controller.mapping.stereo_ground import DISPARITY_ERROR_PX
 
-LEAST_DISPARITY_PX: Final = 2.0
+LEAST_DISPARITY_PX = 2.0
 """Below it a depth is uncertain by 15 % or more and the pixel is a hole (ours)."""
-_WINDOW_PX: Final = 7
-_LEAST_SPREAD: Final = 2.0
+_WINDOW_PX = 7
+_LEAST_SPREAD = 2.0
 """Variance of the grey levels of a window that shows something (ours)."""
-LARGEST_STEP: Final = 0.08
+LARGEST_STEP = 0.08
 """Relative difference of depth between neighbours that belong to one surface (ours)."""
 
 

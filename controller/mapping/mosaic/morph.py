@@ -1,7 +1,6 @@
 """Morphable model: a local model and its destination at the next position ([KP] 3.4)."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -12,9 +11,9 @@ from snakewalk.controller.mapping.mosaic.poisson import continued
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_flow import LEAST_CORRELATION, ScaleFlow
 
-LARGEST_GAP: Final = 0.12
+LARGEST_GAP = 0.12
 """Relative difference of depth between a point and its counterpart (ours); more is occlusion."""
-_LEAST_ISLAND_PX: Final = 40
+_LEAST_ISLAND_PX = 40
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -14,9 +13,9 @@ from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 from snakewalk.controller.mapping.mosaic.poisson import continued
 from snakewalk.controller.mapping.mosaic.scale_matches import match_over_scale
 
-_TOLERANCE_RAD: Final = 0.008
-_LEAST_MATCHES: Final = 12
-_WIDEST_PICTURES: Final = 4.0
+_TOLERANCE_RAD = 0.008
+_LEAST_MATCHES = 12
+_WIDEST_PICTURES = 4.0
 """Limit of the mosaic's width and height, in pictures (ours): views turned by 60 degrees fit."""
 
 

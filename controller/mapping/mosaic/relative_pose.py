@@ -1,7 +1,6 @@
 """Relative pose of two positions by reprojection of a local model's points ([KP] 3.3)."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -12,9 +11,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 from snakewalk.controller.mapping.mosaic.scale_matches import ScaleMatches
 
-LEAST_INLIERS: Final = 12
+LEAST_INLIERS = 12
 """Number of inliers below which a pose is an accident (ours)."""
-_TOLERANCE_PX: Final = 3.0
+_TOLERANCE_PX = 3.0
 """Reprojection error of an inlier, per unit of its match's scale (ours)."""
 
 

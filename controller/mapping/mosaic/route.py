@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Final
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -15,7 +14,7 @@ from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
 from snakewalk.sim.rendering.movie_file import MovieFile
 
-_SWAY: Final = 0.04
+_SWAY = 0.04
 """Radius of the circle of the camera at a single position, in median depths (ours)."""
 
 

@@ -5,7 +5,6 @@ one at several reduced sizes.
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -14,18 +13,18 @@ from numpy.typing import NDArray
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 
-SCALES: Final = tuple(10.0 / k for k in range(10, 0, -1))
+SCALES = tuple(10.0 / k for k in range(10, 0, -1))
 """Scales of the set S of the paper: 1, 1 / 0.9, ..., 1 / 0.1."""
-_MOST_POINTS: Final = 500
-_RADIUS_PX: Final = 7
+_MOST_POINTS = 500
+_RADIUS_PX = 7
 """Patches are 15 px wide (ours)."""
-_LEAST_CORRELATION: Final = 0.75
-_UNIQUE: Final = 0.03
+_LEAST_CORRELATION = 0.75
+_UNIQUE = 0.03
 """Least lead of the best correlation over any other that is more than a patch's radius away
 (ours)."""
-_WIDE_SEARCH: Final = 0.35
+_WIDE_SEARCH = 0.35
 """Half the width of the search region, in widths of the picture, without a guess (ours)."""
-_NARROW_SEARCH: Final = 0.12
+_NARROW_SEARCH = 0.12
 """Search radius around the place that a guess of the distance predicts (ours)."""
 
 

@@ -1,7 +1,6 @@
 """Ground of a walk: heights and colours of all models, with holes at unseen ground."""
 
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -12,9 +11,9 @@ from snakewalk.controller.mapping.mosaic.walk import StereoWalk
 from snakewalk.controller.mapping.stereo_ground import fit_ground
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
-_LEAST_POINTS: Final = 2
+_LEAST_POINTS = 2
 """Least number of points in a known cell (ours)."""
-_HOLE: Final = (150, 150, 150)
+_HOLE = (150, 150, 150)
 """Colour of unknown ground (ours)."""
 
 

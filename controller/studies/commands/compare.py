@@ -3,7 +3,7 @@
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.table import Column, Table
@@ -19,7 +19,7 @@ from snakewalk.controller.studies.run_comparison import compared_run, differing,
 if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
 
-_HIDDEN_NUMBERS: Final = frozenset(
+_HIDDEN_NUMBERS = frozenset(
     {"config_hash", "software", "outcome", "pose_evidence", "pose_source", "assumptions"}
 )
 """Numbers that the verdicts or the differing settings state."""

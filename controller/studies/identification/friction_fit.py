@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -38,42 +37,42 @@ from snakewalk.controller.studies.shadow.diagnosis import (
     goals_of,
 )
 
-RATIO: Final = "across_over_along"
-MASS: Final = "mass"
-_LIFTING_RAD: Final = 0.1
+RATIO = "across_over_along"
+MASS = "mass"
+_LIFTING_RAD = 0.1
 """Pitch joints that turn less in a log lift nothing (ours)."""
-WINDOW_S: Final = 1.0
+WINDOW_S = 1.0
 """Length of a window in which motions are compared (ours)."""
-MOVED_M: Final = 0.02
+MOVED_M = 0.02
 """A body that moves less in all windows gives no friction estimate (ours)."""
-_FLOORS: Final = (1.0, 1.0, 1e-3**2, 2e-3**2)
+_FLOORS = (1.0, 1.0, 1e-3**2, 2e-3**2)
 """Least variance of the model error: currents and angles (register steps), displacement (m) and
 turn (rad) of a window (ours)."""
-_PER_SAMPLE: Final = (40.0, 40.0, 4.0, 4.0)
+_PER_SAMPLE = (40.0, 40.0, 4.0, 4.0)
 """Values of each kind that count as one, those of 4 s: model errors repeat with each cycle of a
 gait (ours)."""
-_PRIOR: Final = 1.5
+_PRIOR = 1.5
 """Prior standard deviation of a friction's logarithm: a factor of 4.5 (ours)."""
-_COMMON: Final = 0.05
+_COMMON = 0.05
 """Prior of the common torque for a current: the data sheet's tolerance (ours)."""
-_STEP: Final = 0.1
+_STEP = 0.1
 """Change of the logarithms for a numerical derivative (ours)."""
-_LONGEST_STEP: Final = 0.7
+_LONGEST_STEP = 0.7
 """Longest step of a logarithm: a factor of two (ours)."""
 _STEPS_ALONE = 4
 _STEPS_TOGETHER = 2
 """Steps with friction alone, then with all differences of robots (ours)."""
-_DETERMINED_SIGMA: Final = 0.35
+_DETERMINED_SIGMA = 0.35
 """Standard deviation of a logarithm from which a friction is undetermined: 95 % reach from half to
 twice the value (ours)."""
-_NORMAL_95: Final = 1.96
+_NORMAL_95 = 1.96
 
 
 _MOST_STEPS = 12
-_CONVERGED_STEP: Final = 0.01
+_CONVERGED_STEP = 0.01
 """Steps with friction alone when laws are compared, and the step that ends them: a law that is not
 fitted to the end seems to be wrong (ours)."""
-_REPORTED_CORRELATION: Final = 0.9
+_REPORTED_CORRELATION = 0.9
 """Correlation of two errors from which they are reported (ours)."""
 Resistance = FrictionConfig | Water
 """Part of a world that resists a body: the friction of a floor, or the water."""

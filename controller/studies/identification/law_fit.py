@@ -5,12 +5,11 @@ The friction is fitted under each law. A log decides if the motion that is left 
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from snakewalk.config.friction_law import LAWS, LawName
 from snakewalk.controller.studies.identification.friction_fit import FrictionLog, friction_misfit
 
-_DECIDING_LIKELIHOOD: Final = 5.0
+_DECIDING_LIKELIHOOD = 5.0
 """Difference of log-likelihoods that decides for a law (ours): odds of 150."""
 
 

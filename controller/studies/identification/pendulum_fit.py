@@ -6,7 +6,6 @@ next sample. Many starts find the basin of the minimum, steps from the best ones
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Final
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -27,40 +26,40 @@ from snakewalk.controller.studies.identification.servo_constants import (
     ranges,
 )
 
-BACKLASHES_RAD: Final = (0.003, 0.008, 0.017, 0.035)
+BACKLASHES_RAD = (0.003, 0.008, 0.017, 0.035)
 """First backlashes of the search: 0.2 to 2 degrees (ours)."""
-STARTS: Final = 24
-HOPS: Final = 60
-_COARSE_S: Final = 2e-3
-_COARSE_TURNS: Final = 25
-_FINE_TURNS: Final = 100
-_SPREAD: Final = 0.4
+STARTS = 24
+HOPS = 60
+_COARSE_S = 2e-3
+_COARSE_TURNS = 25
+_FINE_TURNS = 100
+_SPREAD = 0.4
 """Spread of the starts, as a factor's logarithm."""
-_BEST_FITS: Final = 4
+_BEST_FITS = 4
 """Best fits that hops begin from."""
-_OUTLIER_RAD: Final = 0.02
+_OUTLIER_RAD = 0.02
 """Errors above this count linearly, as in a mean absolute error."""
-_TURN: Final = 1e-3
+_TURN = 1e-3
 """Share of a constant's range: step of the search's derivatives."""
-_BACKLASH_TURN: Final = 0.02
+_BACKLASH_TURN = 0.02
 """Step as a share of the backlash; a smaller one is lost at the contacts of the teeth (ours)."""
-_FINE_TURN: Final = 1e-4
+_FINE_TURN = 1e-4
 """Step of the intervals' derivatives, as a share of a constant or of a hundredth of its range. For
 constants that compensate each other, a long step's error would look like knowledge."""
-_BLOCK_S: Final = 0.5
+_BLOCK_S = 0.5
 """Errors within this time count as one in the intervals (ours)."""
-_COVERAGE: Final = 0.95
-_LEAST_SHARE: Final = 0.01
+_COVERAGE = 0.95
+_LEAST_SHARE = 0.01
 """Least relative error of a constant: mass, arm and supply are known to a per cent (ours)."""
-_FACTOR: Final = 1.05
+_FACTOR = 1.05
 """Step along constants that move a servo alike (ours)."""
-_CHI_SQUARE: Final = 3.84
+_CHI_SQUARE = 3.84
 """Threshold of one constant: less likely than 5 %."""
-_TORQUE_CONSTANT: Final = NAMES.index("torque_constant_n_m_a")
-_RESISTANCE: Final = NAMES.index("resistance_ohm")
-_BACKLASH: Final = NAMES.index("backlash_rad")
-_P_UNIT: Final = NAMES.index("p_unit_per_rad")
-_SLOW_TERMS: Final = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
+_TORQUE_CONSTANT = NAMES.index("torque_constant_n_m_a")
+_RESISTANCE = NAMES.index("resistance_ohm")
+_BACKLASH = NAMES.index("backlash_rad")
+_P_UNIT = NAMES.index("p_unit_per_rad")
+_SLOW_TERMS = ("stribeck_n_m", "by_motor_slow", "by_load_slow")
 
 
 def error_deg(constants: ServoConstants, log: PendulumLog) -> float:

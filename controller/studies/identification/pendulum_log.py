@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from snakewalk.config.archive import read_json_object
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
-_COLUMNS: Final = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
-_LOG_KEYS: Final = ("mass", "length", "kp")
-_LIMIT: Final = "goal_current_a"
+_COLUMNS = ("timestamp", "goal_position", "position", "input_volts", "torque_enable")
+_LOG_KEYS = ("mass", "length", "kp")
+_LIMIT = "goal_current_a"
 """Our addition to BAM's logs: Goal Current of a servo in current-based position mode."""
-_LEAST_ROWS: Final = 20
+_LEAST_ROWS = 20
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,9 +46,9 @@ class Constant(NamedTuple):
     """Value for a file of BAM that lacks it."""
 
 
-_XL330: Final = MOTORS["XL330-M288"]
-_XL330_P_UNIT: Final = _XL330.positions_per_rad / _XL330.p_gain_divisor / _XL330.full_pwm
-CONSTANTS: Final = (
+_XL330 = MOTORS["XL330-M288"]
+_XL330_P_UNIT = _XL330.positions_per_rad / _XL330.p_gain_divisor / _XL330.full_pwm
+CONSTANTS = (
     Constant("torque_constant_n_m_a", "kt", 0.05, 5.0, 0.4, math.nan),
     Constant("resistance_ohm", "R", 0.3, 20.0, 4.0, math.nan),
     Constant("armature_kg_m2", "armature", 1e-5, 0.1, 2e-3, math.nan),
@@ -71,18 +71,18 @@ CONSTANTS: Final = (
 """``p_unit_per_rad`` is the share of the supply that a radian of error gets for each unit of the P
 gain. ``offset_rad`` and ``delay_s`` are the bench's: the offset of its zero, and the delay until a
 goal has an effect. The offset is at most half a tooth of a horn with 25."""
-NAMES: Final = tuple(constant.name for constant in CONSTANTS)
-_SQUARES: Final = ("by_motor_square", "by_load_square")
-FITTED: Final = NAMES.index("backlash_rad")
+NAMES = tuple(constant.name for constant in CONSTANTS)
+_SQUARES = ("by_motor_square", "by_load_square")
+FITTED = NAMES.index("backlash_rad")
 """Number of constants that every fit estimates, the first. The next one, the backlash, is estimated
 on request; squares stay as given (``docs/identify.md`` states the reason)."""
-_OHM_FACTOR: Final = 6.0
+_OHM_FACTOR = 6.0
 """Greatest factor of a resistance on nominal voltage over stall current (ours): recordings give
 that of a weaker motor with a smaller torque constant, too."""
-_END_OF_RANGE: Final = 1e-3
+_END_OF_RANGE = 1e-3
 """Share of a range within which a constant stands on its end (ours)."""
-_FORMS: Final = ("m1", "m2", "m3", "m4", "m5", "m6")
-_BOTH_SIDES: Final = {
+_FORMS = ("m1", "m2", "m3", "m4", "m5", "m6")
+_BOTH_SIDES = {
     "load_friction_base": ("load_friction_motor", "load_friction_external"),
     "load_friction_stribeck": (
         "load_friction_motor_stribeck",

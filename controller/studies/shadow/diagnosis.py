@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -28,32 +28,32 @@ from snakewalk.controller.runlog.record import InitialPose, RunRecord
 from snakewalk.controller.studies.shadow.shadow import Shadow
 
 Cause = Literal["friction", "load", "weaker servo", "slipped horn"]
-NAMED_FROM: Final = 3.0
+NAMED_FROM = 3.0
 """Least log ratio of a cause's evidence to a healthy robot's for naming it (ours)."""
-_BIN_S: Final = 0.1
+_BIN_S = 0.1
 """Angles and currents are averaged over this, so that their steps average out (ours)."""
-_CURRENT_STEP_A: Final = 2.69e-3
-_ANGLE_STEP_RAD: Final = 1.5e-3
+_CURRENT_STEP_A = 2.69e-3
+_ANGLE_STEP_RAD = 1.5e-3
 """Units of the two: a step of the registers of most models."""
-_CORRELATED_BINS: Final = 4.0
+_CORRELATED_BINS = 4.0
 """Bins of noise that count as one: the model error is not white (ours)."""
-_LEAST_NOISE: Final = 1.0 / 12.0
+_LEAST_NOISE = 1.0 / 12.0
 """Variance of a value that is rounded to whole steps, before averaging."""
-_REFINEMENTS: Final = 4
-_LEAST_STEP: Final = 0.01
+_REFINEMENTS = 4
+_LEAST_STEP = 0.01
 """Least change of ``faulty``: smaller ones have no effect (ours)."""
-_REFINED_CAUSES: Final = dict[Cause, int](friction=1, load=2) | {
+_REFINED_CAUSES = dict[Cause, int](friction=1, load=2) | {
     "weaker servo": 1,
     "slipped horn": 2,
 }
 """Number of causes of each kind, those that explain most at first, that are followed on the
 simulator (ours)."""
-SETTLED_S: Final = 1.0
+SETTLED_S = 1.0
 """Time from which on the shadow is compared: it begins at rest, wherever the robot was at
 (ours)."""
-MOST_S: Final = 12.0
+MOST_S = 12.0
 """Length of the part that is looked at, the last one of the run (ours)."""
-LEAST_S: Final = 4.0
+LEAST_S = 4.0
 """A shorter log is not sufficient (ours)."""
 _DELAY_STEP_S = 0.005
 _USUAL_DELAY_S = 0.005

@@ -3,7 +3,6 @@
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
 
 import numpy as np
 
@@ -28,17 +27,17 @@ from snakewalk.controller.studies.shadow.diagnosis import (
 from snakewalk.controller.studies.shadow.shadow import Shadow, measured_s
 from snakewalk.drivers.types import JointState
 
-ALARM_A: Final = 0.03
+ALARM_A = 0.03
 """Mean difference of a current from which the alarm names a joint (ours)."""
-ALARM_RAD: Final = 0.02
+ALARM_RAD = 0.02
 """Mean difference of an angle from which the alarm names a joint (ours)."""
-_MEMORY_S: Final = 2.0
+_MEMORY_S = 2.0
 """Time constant of the alarm's average (ours)."""
-_SMOOTH_S: Final = 0.1
+_SMOOTH_S = 0.1
 """Time constant that smooths steps of encoder and current (ours)."""
-_LONGEST_DELAY: Final = 0.5
+_LONGEST_DELAY = 0.5
 """Greatest time between the shadow's reading and its goals, over its watchdog's (ours)."""
-_CLOCK_DIGITS: Final = 9
+_CLOCK_DIGITS = 9
 """Digits of a time in seconds without rounding errors of clocks."""
 
 
