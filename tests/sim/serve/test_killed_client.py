@@ -73,12 +73,16 @@ def robot_of(model: str) -> RobotConfig:
 
 
 def moving(port: BytePort, robot: RobotConfig, patience_s: float) -> Iterator[list[str]]:
-    """Move both joints towards a far goal; yield the events of the start in each cycle."""
+    """Move both joints towards a far goal; yield the events of the start in each cycle.
+
+    A device in real time needs patience: the server may be late.
+    """
     safety = SafetyConfig(
         stale_limit_s=patience_s, following_time_s=60.0, goal_lead_rad=4.0, goal_rate_rad_s=0.3
     )
     events: list[str] = []
-    chain = ServoChain(servo_bus(port, robot.models_by_id, latency_s=0.02), robot)
+    latency_s = min(0.2 * patience_s, 0.2)
+    chain = ServoChain(servo_bus(port, robot.models_by_id, latency_s=latency_s), robot)
     link = SafeLink(
         chain, SafetyLimits.from_config(robot, safety), port.clock, on_event=events.append
     )
