@@ -62,7 +62,7 @@ class CameraConfig(Strict):
     )
     lens: str | None = Field(
         None,
-        description="lens file of `snakewalk pose calibrate`, which removes a real "
+        description="lens file of `snakewalk pose lens`, which removes a real "
         "camera's distortion; default: no correction",
     )
     shade: float = Field(

@@ -40,6 +40,9 @@ class PoseConfig(Strict):
     world_deg: Degrees3 = Field(
         (0.0, 0.0, 0.0), description="roll, pitch and yaw of the source's axes in the world"
     )
+    scale: float = Field(
+        1.0, gt=0.0, le=1000.0, description="factor on the positions of the source, for metres"
+    )
     frame: str | None = Field(
         None,
         max_length=100,

@@ -38,6 +38,12 @@ def rotation_by(vector: Floats) -> Floats:
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
 
 
+def about_up(angle_rad: float) -> Floats:
+    """(3, 3) rotation about the up axis."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 class AttitudeFilter:
     """Axes of a device in the world; the heading begins at 0."""
 

@@ -24,6 +24,7 @@ from snakewalk.controller.cameras.pose_tracking import (
     track_pose,
 )
 from snakewalk.controller.images.compression import Compression, compression_of, without_blocks
+from snakewalk.drivers.attitude import about_up
 
 _CALM_PX: Final = 200  # fewest pixels away from the body for the noise
 _CLEAR = 0.2
@@ -171,7 +172,7 @@ def confirmed(
     as_coded = replace(contrast, frame=contrast.coded, compression=Compression(None))
     other = track_pose(robot, as_coded.standing_out(shade), prior, tracked.time_s)
     turn = other.heading_rad - tracked.heading_rad
-    difference = np.append(other.head_m - tracked.head_m, np.arctan2(np.sin(turn), np.cos(turn)))
+    difference = np.append(other.head_m - tracked.head_m, np.angle(np.exp(1j * turn)))
     wider = replace(
         tracked, covariance=tracked.covariance + _DISAGREES * np.outer(difference, difference)
     )
@@ -183,9 +184,8 @@ def links_at(prior: BodyPrior, tracked: TrackedPose) -> Floats:
     """(L, 2) centres of the links of an expected body at the found pose."""
     ahead = prior.forward[0]
     turn = tracked.heading_rad - float(np.arctan2(ahead[1], ahead[0]))
-    c, s = np.cos(turn), np.sin(turn)
     away = prior.links_m - prior.links_m[0]
-    return np.asarray(tracked.head_m + away @ np.array([[c, s], [-s, c]]))
+    return np.asarray(tracked.head_m + away @ about_up(-turn)[:2, :2])
 
 
 def _smooth(image: Image) -> Image:

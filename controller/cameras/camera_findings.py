@@ -100,7 +100,7 @@ def _markers(report: CameraReport, camera: CameraConfig) -> list[Finding]:
             "floor",
             "warn",
             f"{markers_text}; the lens distorts by up to {error_mm:.0f} mm",
-            "calibrate the lens: snakewalk pose board, snakewalk pose calibrate",
+            "calibrate the lens: snakewalk pose board, snakewalk pose lens",
         )
     elif floor.residual_m[worst] > MISPLACED_M:
         second = Finding(

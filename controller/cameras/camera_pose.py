@@ -22,6 +22,7 @@ from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.pose.dead_reckoning import DeadReckoning
 from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.types import BodyPose, JointState
 
 MISFIT = 0.5
@@ -185,8 +186,7 @@ class CameraPose:
         if is_separate and better.error_m < DECISIVE * worse.error_m:
             return better
         believed = _in_world(self._offset, then.place)
-        c, s = np.cos(believed[2]), np.sin(believed[2])
-        return max(fits, key=lambda fit: np.cos(fit.heading_rad) * c + np.sin(fit.heading_rad) * s)
+        return max(fits, key=lambda fit: np.cos(fit.heading_rad - believed[2]))
 
     def _moment_at(self, time_s: float) -> _Moment:
         if len(self._history) == 1:
@@ -199,7 +199,7 @@ class CameraPose:
             np.clip((time_s - earlier_head.time_s) / (two.time_s - earlier_head.time_s), 0.0, 1.0)
         )
         change = two.place - earlier_head.place
-        change[2] = np.arctan2(np.sin(change[2]), np.cos(change[2]))
+        change[2] = np.angle(np.exp(1j * change[2]))
         joints = earlier_head.joint_rad + part * (two.joint_rad - earlier_head.joint_rad)
         return _Moment(time_s, earlier_head.place + part * change, joints)
 
@@ -215,8 +215,7 @@ class CameraPose:
 
 
 def _turned_point(point: Floats, by_rad: float) -> Floats:
-    c, s = np.cos(by_rad), np.sin(by_rad)
-    return np.array([c * point[0] - s * point[1], s * point[0] + c * point[1]])
+    return np.asarray(about_up(by_rad)[:2, :2] @ point[:2])
 
 
 def _in_world(frame: Floats, place: Floats) -> Floats:

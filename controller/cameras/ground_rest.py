@@ -9,7 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import SpineLinks
-from snakewalk.drivers.attitude import rotation_by
+from snakewalk.drivers.attitude import about_up, rotation_by
 from snakewalk.drivers.types import BodyPose
 
 Heights = Callable[[Floats], Floats]
@@ -42,8 +42,7 @@ class GroundRest:
 
     def pose(self, place: Floats, joint_rad: Floats, time_s: float) -> BodyPose:
         """Return the head link's pose from its place (3,): x, y, heading."""
-        c, s = np.cos(place[2]), np.sin(place[2])
-        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rotation = about_up(place[2])
         head_m = np.array([*place[:2], self._radius_m])
         if self._heights is None:
             return BodyPose(time_s, head_m, rotation)
@@ -55,9 +54,7 @@ class GroundRest:
             rotation = rotation_by(np.array([slope[1], -slope[0], 0.0])) @ rotation
             # tilting turns the head slightly about the vertical; keep the measured heading
             turn = place[2] - np.arctan2(rotation[1, 0], rotation[0, 0])
-            rotation = rotation_by(np.array([0.0, 0.0, np.arctan2(np.sin(turn), np.cos(turn))])) @ (
-                rotation
-            )
+            rotation = about_up(turn) @ rotation
         return BodyPose(time_s, head_m, rotation)
 
 

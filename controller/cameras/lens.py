@@ -59,7 +59,7 @@ class Lens:
 
     @classmethod
     def read(cls, file: Path) -> Self:
-        """Read a file of ``snakewalk pose calibrate``, or of OpenCV's calibration.
+        """Read a file of ``snakewalk pose lens``, or of OpenCV's calibration.
 
         Raises:
             InputError: it does not exist, is of another kind, or does not describe a lens.

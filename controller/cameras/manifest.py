@@ -3,9 +3,9 @@
 # ruff: noqa: E501
 # fmt: off
 PLUGINS = (
-    ("command", "pose board", "Draw the board for `pose calibrate`; print it without scaling, and glue it to a plate.", "snakewalk.controller.cameras.commands.board:board"),
-    ("command", "pose calibrate", "Calibrate a camera's lens with OpenCV from pictures of the board of `pose board`.", "snakewalk.controller.cameras.commands.lens:calibrate_camera"),
+    ("command", "pose board", "Draw the board for `pose lens`; print it without scaling, and glue it to a plate.", "snakewalk.controller.cameras.commands.board:board"),
     ("command", "pose camera", "Check a camera, real or simulated: markers, frame rate, latency, light.", "snakewalk.controller.cameras.commands.check:check"),
+    ("command", "pose lens", "Calibrate a camera's lens with OpenCV from pictures of the board of `pose board`.", "snakewalk.controller.cameras.commands.lens:calibrate_camera"),
     ("command", "pose markers", "Draw markers for the floor under the camera; print them without scaling.", "snakewalk.controller.cameras.commands.markers:markers"),
     ("pose", "camera", "A camera that looks down on known ground, level or not.", "snakewalk.controller.cameras.camera_source:OverheadCameraPose"),
     ("pose", "tags", "Printed tags on the links, seen by one calibrated camera in any position.", "snakewalk.controller.cameras.tags.tag_source:TagsPose"),

@@ -18,6 +18,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.markers.floor_markers import Bump
 from snakewalk.controller.images.compression import Compression
+from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.least_squares import least_squares
 
 REACH_M: Final = 0.10
@@ -202,8 +203,7 @@ def _compare_frame(
 ) -> _Comparison:
     """Compare at a shift (2,), a turn and a half width of the sections in radii."""
     (shift, turn, wide), radius_m = place, robot.body_radius_m
-    c, s = np.cos(turn), np.sin(turn)
-    spin = np.array([[c, s], [-s, c]])
+    spin = about_up(-turn)[:2, :2]
     middle_m = chain.middle_m + shift
     spun_m = (chain.places_m - chain.middle_m) @ spin
     forward = chain.ahead @ spin
@@ -286,8 +286,7 @@ def _fit_tips(
             if wide == _NARROW_SECTIONS:
                 break
             wide = _NARROW_SECTIONS
-    c, s = np.cos(turn), np.sin(turn)
-    spin = np.array([[c, s], [-s, c]])
+    spin = about_up(-turn)[:2, :2]
     head = spin.T @ (chain.head_m - chain.middle_m) + chain.middle_m + shift
     heading = chain.heading_rad + turn
     off_m = look.across[look.used]
@@ -297,7 +296,7 @@ def _fit_tips(
     tracked = TrackedPose(
         time_s,
         head,
-        float(np.arctan2(np.sin(heading), np.cos(heading))),
+        float(np.angle(np.exp(1j * heading))),
         error_m,
         _covariance(robot, look, head - chain.middle_m - shift, alike),
         _fault(robot, look, error_m, shift),

@@ -46,7 +46,7 @@ FAMILIES = {
     "world": "Worlds from real ground",
     "animal": "Animals from video",
     "animal fish": "Fish from video",
-    "pose": "Poses by camera or port",
+    "pose": "Measured poses",
     "ros": "",
     "tools": "Tools",
 }
@@ -73,7 +73,7 @@ FORMER = {
     "terrain from-stereo": "world stereo",
     "terrain": "world",
     "camera board": "pose board",
-    "camera calibrate": "pose calibrate",
+    "camera calibrate": "pose lens",
     "camera check": "pose camera",
     "camera markers": "pose markers",
     "camera": "pose",

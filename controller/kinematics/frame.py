@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.attitude import about_up
 
 UP = (0.0, 0.0, 1.0)
 
@@ -22,9 +23,7 @@ class Frame:
     @staticmethod
     def flat(x_m: float, y_m: float, heading_rad: float, z_m: float = 0.0) -> "Frame":
         """Return a level frame."""
-        c, s = np.cos(heading_rad), np.sin(heading_rad)
-        rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return Frame(rotation=rotation, origin_m=np.array([x_m, y_m, z_m]))
+        return Frame(rotation=about_up(heading_rad), origin_m=np.array([x_m, y_m, z_m]))
 
     @property
     def heading_rad(self) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.types import BodyPose
 
@@ -213,9 +214,7 @@ def _forward(
 
 def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
     """Return the pose of a level head link."""
-    c, s = np.cos(heading_rad), np.sin(heading_rad)
-    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return BodyPose(time_s, np.append(position_m[:2], 0.0), rotation)
+    return BodyPose(time_s, np.append(position_m[:2], 0.0), about_up(heading_rad))
 
 
 def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:

@@ -13,6 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.disparity import match
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
 from snakewalk.controller.terrain.elevation_map import ElevationMap
+from snakewalk.drivers.attitude import about_up
 
 DISPARITY_ERROR_PX = 0.3
 """Standard error that is assumed for a disparity (ours): the median on a real pair is 0.15 px."""
@@ -42,10 +43,8 @@ class CameraStand:
     def world_from_camera(self) -> Floats:
         """(3, 3) rotation from the camera's axes (right, down, forward) to (ahead, left, up)."""
         ct, st = np.cos(self.tilt_rad), np.sin(self.tilt_rad)
-        cr, sr = np.cos(self.roll_rad), np.sin(self.roll_rad)
         upright = np.array([[0.0, -st, ct], [-1.0, 0.0, 0.0], [0.0, -ct, -st]])
-        about = np.array([[cr, -sr, 0.0], [sr, cr, 0.0], [0.0, 0.0, 1.0]])
-        return np.asarray(upright @ about)
+        return np.asarray(upright @ about_up(self.roll_rad))
 
     @classmethod
     def on_plane(cls, normal: Floats, height_m: float) -> "CameraStand":

@@ -130,7 +130,7 @@ class SlideWindow:
 
         current = self.heads(track, readings.time_s)
         off = readings.place - current
-        off[:, 2] = np.arctan2(np.sin(off[:, 2]), np.cos(off[:, 2]))
+        off[:, 2] = np.angle(np.exp(1j * off[:, 2]))
         independent = np.minimum(counts[kept], BIN_S / NOISE_S)
         noise = averages(readings.variance) / independent[:, None]
         covariance = _model_covariance(averages(current), track[:-1], kept) + np.diag(noise.ravel())

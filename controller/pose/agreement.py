@@ -37,6 +37,8 @@ TURNS: Final = (0.6, 1.5)
 """Measured over expected turning that agrees: 0.84 to 1.23 in 13 walks of sound sources."""
 SCALES: Final = (0.6, 1.5)
 """Measured over expected swing that agrees on a floor: 0.74 to 1.29 in five walks."""
+SCALES_FLOOR: Final = (0.8, 1.25)
+"""The same on a floor, as the median of ``WINDOWS`` windows: within 0.04 of 1 in five walks."""
 SCALES_HILLS: Final = (0.5, 1.7)
 """Measured over expected swing that agrees on hills, as the median of ``WINDOWS`` windows: dead
 reckoning knows no hills, and single windows of sound sources have 0.57 to 1.75."""
@@ -48,6 +50,10 @@ WINDOWS: Final = 5
 """Windows before the scale is judged on hills, or its accuracy stated (ours)."""
 ENDS: Final = 8
 """Samples at each end of a window whose mean is a place."""
+STEP_RAD: Final = 0.12
+STEP_ROWS: Final = 10
+"""Least step of the heading that a frame or a marker made, and number of samples whose mean is
+compared with that of the samples before: 0.10 rad in a sound walk (ours)."""
 SCALE_SD: Final = 0.02
 """Least standard deviation of the scale (ours)."""
 SCALE_FLAT: Final = 0.05
@@ -73,6 +79,8 @@ class Agreement:
         """Standard deviation of the source's scale, over 1."""
         self._aside_m = 0j
         self._summed_s = -np.inf
+        self.step_rad = 0.0
+        """Largest step of the heading of poses, by which the joints did not turn; 0 on hills."""
         self.has_agreed = False
         """Whether the source ever agreed with the joints."""
 
@@ -136,10 +144,9 @@ class Agreement:
             rows.clear()
         self._begun_s = time_s if self._begun_s is None else self._begun_s
         self._seconds = time_s - self._begun_s
-        x, y, heading_rad = then.place.tolist()
-        head_x, head_y = measured.position_m[:2].tolist()
         seen_rad = float(np.arctan2(measured.rotation[1, 0], measured.rotation[0, 0]))
-        rows.append(_Row(time_s, complex(head_x, head_y), seen_rad, complex(x, y), heading_rad))
+        place_m, predicted_m = complex(*measured.position_m[:2]), complex(*then.place[:2])
+        rows.append(_Row(time_s, place_m, seen_rad, predicted_m, float(then.place[2])))
         while time_s - rows[0].time_s > WINDOW_S:
             rows.popleft()
         if time_s - rows[0].time_s >= LEAST_S and time_s - self._judged_s >= JUDGE_S:
@@ -157,6 +164,10 @@ class Agreement:
         share = float(turns @ expected / (expected @ expected))
         related = float(expected @ turns) / _size(expected, turns)
         off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(predicted_rad))
+        means_rad = np.convolve(off_rad, np.full(STEP_ROWS, 1.0 / STEP_ROWS), "valid")
+        step_rad = float(np.abs(means_rad[STEP_ROWS:] - means_rad[:-STEP_ROWS]).max())
+        if self._is_level and step_rad > STEP_RAD:
+            self.step_rad = max(self.step_rad, step_rad)
         slow_rad = off_rad - _detrended_values(off_rad, line)
         steps = np.diff(predicted_m) * np.exp(1j * slow_rad[:-1])
         way_m = np.concatenate([[0.0], np.cumsum(steps)])
@@ -172,11 +183,12 @@ class Agreement:
         if swings and named is None:
             named = self._swing_fault(shape, swing, times[-1])
         is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
+        agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
         if named is None and not is_alike and (self._named or not self.has_agreed):
+            if agrees and self._named is None and self.is_cautious:
+                return  # hills may hide the swing for a while
             named = self._named  # a window without a swing clears nothing
             agrees = False
-        else:
-            agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
         self._named = named
         self._doubt_s = 0.0 if agrees else self._doubt_s + JUDGE_S
         self.has_agreed |= agrees
@@ -196,18 +208,16 @@ class Agreement:
         if time_s - self._scaled_s >= WINDOW_S:  # windows that do not overlap
             self._scaled_s = time_s
             self._note_scale(scale)
-        low, high = SCALES
-        if not self._is_level:
-            low, high = SCALES_HILLS
-            few = len(self._scales) < WINDOWS and scale < UNIT
-            scale = 1.0 if few else float(np.median([*self._scales, scale][-WINDOWS:]))
-        if scale > UNIT:
-            return f"wrong unit: the head moves {scale:.0f} times as far as expected; send metres"
+        if len(self._scales) < WINDOWS:
+            low, high = SCALES if self._is_level else (0.0, UNIT)
+        else:
+            low, high = SCALES_FLOOR if self._is_level else SCALES_HILLS
+            scale = float(np.median([*self._scales, scale][-WINDOWS:]))
         if low < scale < high:
             return None
         return (
-            f"wrong scale: the head swings {scale:.2f} times as far as its joints say; correct the "
-            "source's scale, or the robot's link_length_m"
+            f"wrong scale: the head swings {scale:.2f} times as far as its joints say; correct "
+            "pose.scale, or the robot's link_length_m"
         )
 
 

@@ -12,12 +12,11 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import BodyView, SpineLinks, link_weights
 from snakewalk.controller.mechanics.body_slide import BodySlide
-from snakewalk.drivers.attitude import rotation_by
-from snakewalk.drivers.types import BodyPose, JointState
+from snakewalk.drivers.attitude import about_up
+from snakewalk.drivers.types import BodyPose, ImuState, JointState
 
 _ORIGIN = np.zeros(3)
 _LEVEL_ROTATION = np.eye(3)
-_UP_AXIS = np.array([0.0, 0.0, 1.0])
 _STILL_SPEED_M_S = 1e-6
 """Speed of a link up to which the shape counts as unchanged (ours)."""
 
@@ -46,7 +45,7 @@ class DeadReckoning:
         """
         self._spine = SpineLinks.of(robot)
         self._slide = BodySlide(link_weights(robot), friction)
-        self._head_m = start_m
+        self._head_m = np.array(start_m, dtype=float)
         self._heading_rad = heading_rad
         self._imu_link = robot.imu.link if imu and robot.imu is not None else None
         self._zero_rad: float | None = None
@@ -55,13 +54,15 @@ class DeadReckoning:
 
     def __call__(self, state: JointState) -> BodyPose:
         """Advance to the state's time."""
-        joints = state.position_rad
-        time_s = state.time_s
+        return self.advance(state.time_s, state.position_rad, state.imu)
+
+    def advance(self, time_s: float, joints: Floats, imu: ImuState | None = None) -> BodyPose:
+        """Advance to a time with joint angles (J,); returns the estimated pose."""
         last = self._last
         if last is None:
             level = self._spine.in_world(BodyPose(0.0, _ORIGIN, _LEVEL_ROTATION), joints)
             self._heading_rad -= level.heading_rad
-        turned_rad = self._take_attitude(state, joints)
+        turned_rad = self._take_attitude(imu, joints)
         body = self._spine.in_world(BodyPose(0.0, _ORIGIN, self._tilt), joints)
         if last is not None and time_s > last[0]:
             rate_rad_s = self._integrate(time_s - last[0], last[1], body)
@@ -70,21 +71,17 @@ class DeadReckoning:
         if turned_rad is not None:
             self._heading_rad = turned_rad
         self._last = (time_s, body)
-        c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
-        rotation = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
-        if self._tilt is not _LEVEL_ROTATION:
-            rotation = rotation @ self._tilt
-        x_m, y_m = self._head_m
-        return BodyPose(time_s, np.array((x_m, y_m, 0.0)), rotation)
+        rotation = about_up(self._heading_rad) @ self._tilt
+        return BodyPose(time_s, np.append(self._head_m, 0.0), rotation)
 
-    def _take_attitude(self, state: JointState, joints: Floats) -> float | None:
+    def _take_attitude(self, imu: ImuState | None, joints: Floats) -> float | None:
         """Set the head's tilt from the IMU; return its heading, None without a reading."""
-        if self._imu_link is None or state.imu is None:
+        if self._imu_link is None or imu is None:
             return None
         behind = self._spine.in_world(BodyPose(0.0, _ORIGIN, _LEVEL_ROTATION), joints)
-        head = BodyPose(0.0, _ORIGIN, state.imu.rotation @ behind.rotation[self._imu_link].T)
+        head = BodyPose(0.0, _ORIGIN, imu.rotation @ behind.rotation[self._imu_link].T)
         heading_rad = head.heading_rad
-        self._tilt = rotation_by(-heading_rad * _UP_AXIS) @ head.rotation
+        self._tilt = about_up(-heading_rad) @ head.rotation
         if self._zero_rad is None:  # the device's north is any: at first its heading is what it was
             self._zero_rad = self._heading_rad - heading_rad
         return heading_rad + self._zero_rad
@@ -95,7 +92,5 @@ class DeadReckoning:
         if slide.set_shapes(before, after, step_s) < _STILL_SPEED_M_S:
             return 0.0
         u, v, rate_rad_s = slide.velocity().tolist()
-        c, s = np.cos(self._heading_rad), np.sin(self._heading_rad)
-        x_m, y_m = self._head_m
-        self._head_m = x_m + step_s * (c * u - s * v), y_m + step_s * (s * u + c * v)
+        self._head_m += step_s * (about_up(self._heading_rad)[:2, :2] @ (u, v))
         return float(rate_rad_s)

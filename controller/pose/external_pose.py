@@ -21,6 +21,7 @@ from snakewalk.controller.pose.pose_filter import PoseFilter
 from snakewalk.controller.pose.relocation import PlacedPose, Relocation
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, UnusablePoseError
 from snakewalk.controller.pose.sender_clock import MOST_DRIFT, SenderClock
+from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
 from snakewalk.drivers.types import BodyPose, JointState
 
@@ -63,9 +64,7 @@ class LatencyEstimate:
             heading = heading_rad
         else:
             step_s = stamped_s - self._last[0]
-            heading = self._last[1] + float(
-                np.arctan2(*(f(heading_rad - self._last[1]) for f in (np.sin, np.cos)))
-            )
+            heading = self._last[1] + math.remainder(heading_rad - self._last[1], math.tau)
         if not 0.0 <= step_s < 0.5 * SLOW_S:  # a gap: begin again
             self._last = None
             self._seconds = 0.0
@@ -99,8 +98,6 @@ class LatencyEstimate:
 
 AGAIN_S: Final = 10.0
 """Time after which the same fault is reported again (ours)."""
-RESTART_S: Final = 1.0
-"""Silence after which another sender on the same host replaces the first one (ours)."""
 FROZEN: Final = 10
 FROZEN_M: Final = 0.03
 """This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
@@ -166,9 +163,8 @@ class ExternalPose:
         self._relocation = Relocation()
         self._has_slid = False
         self._latency = LatencyEstimate(config.latency_s)
-        self._sender: str | None = None
+        self._senders = Senders(config.sender)
         self._frame = config.frame
-        self._newest: ArrivedPose | None = None
         self._early: list[ArrivedPose] = []
         self._equal: tuple[int, np.ndarray, np.ndarray] = (0, np.zeros(12), np.zeros(2))
         self._measured: deque[TimedHead] = deque(maxlen=_MOST_KEPT_POSES)
@@ -176,10 +172,8 @@ class ExternalPose:
         self._used: PoseSample | None = None
         self._reason = ""
         self._reported: dict[str, float] = {}
-        self.counts = dict.fromkeys(
-            ("poses", "used", "lost", "rejected", "restarts", "relocations"), 0
-        )
-        """Poses that arrived, that were used, that never arrived, that were rejected; restarts of
+        self.counts = dict.fromkeys(("poses", "used", "rejected", "restarts", "relocations"), 0)
+        """Poses that arrived, that were used, that were rejected; restarts of
         the sender; and slides after which poses were used again."""
 
     def store_poses(self, early: list[ArrivedPose]) -> None:
@@ -220,6 +214,7 @@ class ExternalPose:
             self._filter.position_sd_m,
             check.scale_sd * away_m,
             0.5 * turned_rad * away_m,
+            check.step_rad * away_m,
             0.5 * off_m,
             check.aside_m,
         )
@@ -250,6 +245,7 @@ class ExternalPose:
         known = {"sender_drift_ppm": round(1e6 * drift, 1)} if abs(drift) < MOST_DRIFT else {}
         return {
             "poses": self.counts["poses"],
+            "poses_lost": self._senders.lost,
             **counts,
             "pose_latency_s": round(self._latency.latency_s, 3),
             **known,
@@ -258,13 +254,14 @@ class ExternalPose:
     def row(self) -> dict[str, Any]:
         """Return a row of the log."""
         used = self._used
+        newest = self._senders.newest
         return {
             "age_s": self._now_s - self._used_s if np.isfinite(self._used_s) else float("nan"),
             "position_sd_m": self.position_sd_m,
             "heading_sd_rad": self._filter.heading_sd_rad,
             "latency_s": self._latency.latency_s,
             "sequence": -1 if used is None else used.sequence,
-            "arrival_s": float("nan") if self._newest is None else self._newest.arrival_s,
+            "arrival_s": float("nan") if newest is None else newest.arrival_s,
             "fault": self.fault() or "",
             "is_confirmed": int(self._check.is_confirmed),
         }
@@ -273,11 +270,16 @@ class ExternalPose:
         """Judge a pose, and use it if nothing is wrong with it."""
         self.counts["poses"] += 1
         sample = arrived.sample
+        placed = self._senders.place(arrived)
+        if placed.order in ("late", "other"):
+            is_late = placed.order == "late"
+            self._reject(placed.text, placed.text, counts_as_reason=is_late)
+            return
         if isinstance(sample, UnusablePoseError):
             self._reject("damaged", str(sample))
             return
-        if not self._is_of_first_sender(arrived) or not self._follows_newest(sample, arrived):
-            return
+        if placed.order == "restarted":
+            self._restart(placed.text)
         if self._frame is None:
             self._frame = sample.frame
         if sample.frame != self._frame:
@@ -363,46 +365,8 @@ class ExternalPose:
         )
         return True
 
-    def _is_of_first_sender(self, arrived: ArrivedPose) -> bool:
-        if self._sender is None:
-            self._sender = arrived.sender
-        if arrived.sender == self._sender:
-            return True
-        assert self._newest is not None
-        if (
-            arrived.host == self._newest.host
-            and arrived.arrival_s - self._newest.arrival_s > RESTART_S
-        ):
-            self._restart(f"another sender on the same host, {arrived.sender}")
-            self._sender = arrived.sender
-            return True
-        self._reject(
-            f"sender {arrived.sender}",
-            f"two senders: {arrived.sender} is ignored, {self._sender} was first; stop one of them",
-            counts_as_reason=False,
-        )
-        return False
-
-    def _follows_newest(self, sample: PoseSample, arrived: ArrivedPose) -> bool:
-        """Whether a pose follows the newest one; a sender that starts again is reported."""
-        newest = self._newest
-        before = None
-        if newest is not None and isinstance(newest.sample, PoseSample):
-            before = newest.sample
-        if before is not None and sample.sequence <= before.sequence:
-            is_late = abs(sample.time_s - before.time_s) < RESTART_S
-            if is_late and before.sequence - sample.sequence < 1000:
-                self._reject("order", "a pose arrived twice or out of order")
-                return False
-            self._restart(f"its sequence begins again at {sample.sequence}")
-        elif before is not None:
-            self.counts["lost"] += sample.sequence - before.sequence - 1
-        self._newest = arrived
-        return True
-
     def _restart(self, why: str) -> None:
         self.counts["restarts"] += 1
-        self._newest = None
         self._clock = SenderClock()
         self._check = Agreement(is_level=self._is_level)
         self._relocation = Relocation()

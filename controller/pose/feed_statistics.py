@@ -1,16 +1,16 @@
 """Statistics of the poses that arrive: rate, delay, noise, frame and senders."""
 
 from collections import deque
-from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from snakewalk.config.arrays import Floats
 from snakewalk.config.pose import PoseConfig
-from snakewalk.controller.pose.pose_filter import rotation_vector
-from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError
 from snakewalk.controller.pose.sender_clock import SenderClock
+from snakewalk.controller.pose.senders import Senders
+from snakewalk.controller.pose.tracked_body import tracked_link
 
 MOST: Final = 2000
 """Newest poses that count."""
@@ -24,16 +24,23 @@ class FeedStatistics:
         self._clock = SenderClock()
         self._poses: deque[tuple[float, float, PoseSample]] = deque(maxlen=MOST)
         """Arrival, delay and pose."""
-        self.invalid = self.lost = 0
-        """Messages without a usable pose; poses that are missing in the sequence."""
+        self._order = Senders(config.sender)
+        self._others: list[str] = []
+        self.invalid = 0
+        """Messages without a usable pose."""
         self.last_fault = ""
         self.senders: list[str] = []
         self.frames: list[str] = []
 
     def add(self, arrived: ArrivedPose) -> None:
         """Count a message."""
+        placed = self._order.place(arrived)
         if arrived.sender not in self.senders:
             self.senders.append(arrived.sender)
+            if placed.order == "other":
+                self._others.append(placed.text)
+        if placed.order == "other":
+            return
         sample = arrived.sample
         if isinstance(sample, UnusablePoseError):
             self.invalid += 1
@@ -41,8 +48,6 @@ class FeedStatistics:
             return
         if sample.frame not in self.frames:
             self.frames.append(sample.frame)
-        if self._poses:
-            self.lost += max(sample.sequence - self._poses[-1][2].sequence - 1, 0)
         self._clock.add(sample.time_s, arrived.arrival_s)
         late_s = arrived.arrival_s - self._clock.local_s(sample.time_s, arrived.arrival_s)
         self._poses.append((arrived.arrival_s, late_s, sample))
@@ -62,12 +67,7 @@ class FeedStatistics:
         problems = []
         if not self._poses:
             problems.append(self.last_fault or "nothing arrived; start the sender")
-        host = self._config.sender
-        if host is not None:
-            others = [sender for sender in self.senders if sender.rpartition(":")[0] != host]
-            problems += [f"sender {other} is not {host} (pose.sender)" for other in others]
-        elif len(self.senders) > 1:
-            problems.append(f"two senders: {', '.join(self.senders)}; stop one of them")
+        problems += self._others
         if len(self.frames) > 1:
             problems.append(f"wrong frame: poses name {', '.join(self.frames)}; send one frame")
         return problems
@@ -77,7 +77,7 @@ class FeedStatistics:
         facts: dict[str, Any] = {
             "poses": len(self._poses),
             "invalid": self.invalid,
-            "lost": self.lost,
+            "lost": self._order.lost,
             "senders": list(self.senders),
             "frame": self.frames[0] if self.frames else None,
         }
@@ -86,7 +86,7 @@ class FeedStatistics:
         arrival_s = np.array([row[0] for row in self._poses])
         late_s = np.array([row[1] for row in self._poses])
         span_s = float(arrival_s[-1] - arrival_s[0])
-        position_m, axes = self._in_world(self._poses[-1][2])
+        position_m, axes = tracked_link(self._poses[-1][2], self._config)
         return facts | {
             "rate_hz": round((len(self._poses) - 1) / span_s, 1) if span_s > 0.0 else None,
             "longest_gap_s": _rounded_value(np.diff(arrival_s).max(initial=0.0)),
@@ -99,14 +99,6 @@ class FeedStatistics:
             "up": [round(float(value), 3) for value in axes[:, 2]],
         }
 
-    def _in_world(self, sample: PoseSample) -> tuple[Floats, Floats]:
-        """Return centre (3,) and axes (3, 3) of the link that carries the body."""
-        config = self._config
-        world = turned(self._config.world_deg)
-        axes = world @ sample.rotation @ turned(config.offset_deg).T
-        body_m = np.array(config.world_m) + world @ sample.position_m
-        return body_m - axes @ np.array(config.offset_m), axes
-
     def _noise_m(self) -> float | None:
         """Standard deviation of a coordinate; slow motion does not count."""
         positions = np.array([sample.position_m for sample in self.samples])
@@ -116,10 +108,10 @@ class FeedStatistics:
 
     def _noise_deg(self) -> float | None:
         """Standard deviation of an angle; slow motion does not count."""
-        rotations = [sample.rotation for sample in self.samples]
-        if len(rotations) < 10:
+        if len(self._poses) < 10:
             return None
-        steps = np.array([rotation_vector(two @ before.T) for before, two in pairwise(rotations)])
+        turns = Rotation.from_matrix([sample.rotation for sample in self.samples])
+        steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
         return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
 
 

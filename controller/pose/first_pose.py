@@ -15,6 +15,8 @@ from snakewalk.controller.pose.sample import (
     UnusablePoseError,
     turned,
 )
+from snakewalk.controller.pose.senders import Senders
+from snakewalk.controller.pose.tracked_body import tracked_link
 from snakewalk.drivers.clock import Clock
 
 WAIT_S: Final = 5.0
@@ -36,9 +38,15 @@ HEIGHT_M: Final = 0.3
 
 
 def await_first_pose(
-    source: str, feed: PoseFeed, clock: Clock, judge: Callable[[PoseSample], str | None]
+    source: str,
+    feed: PoseFeed,
+    clock: Clock,
+    judge: Callable[[PoseSample], str | None],
+    host: str | None = None,
 ) -> list[ArrivedPose]:
     """Wait for the first pose, and watch the next ones at rest; returns the newest message.
+
+    Poses of another sender are ignored; ``host`` is the only host whose poses count.
 
     Raises:
         InputError: none arrives, none can be read, ``judge`` returns why it cannot be right, or
@@ -46,10 +54,11 @@ def await_first_pose(
 
     """
     until_s = clock.now_s() + WAIT_S
+    senders = Senders(host)
     arrived = list[ArrivedPose]()
     reason = ""
     while clock.now_s() < until_s:
-        for arrival in feed.arrived(clock.now_s()):
+        for arrival in _of_source(feed, clock, senders):
             arrived.append(arrival)
             if isinstance(arrival.sample, UnusablePoseError):
                 reason = str(arrival.sample)
@@ -57,7 +66,7 @@ def await_first_pose(
             fault = judge(arrival.sample)
             if fault is not None:
                 raise InputError(f"pose {source}: {fault}")
-            return _watched_poses(source, feed, clock, arrived)
+            return _watched_poses(source, feed, clock, senders, arrived)
         clock.sleep_until_s(clock.now_s() + LOOK_S)
     raise InputError(
         f"pose {source}: no usable pose within {WAIT_S:g} s: "
@@ -65,8 +74,13 @@ def await_first_pose(
     )
 
 
+def _of_source(feed: PoseFeed, clock: Clock, senders: Senders) -> list[ArrivedPose]:
+    arrived = feed.arrived(clock.now_s())
+    return [each for each in arrived if senders.place(each).order != "other"]
+
+
 def _watched_poses(
-    source: str, feed: PoseFeed, clock: Clock, arrived: list[ArrivedPose]
+    source: str, feed: PoseFeed, clock: Clock, senders: Senders, arrived: list[ArrivedPose]
 ) -> list[ArrivedPose]:
     """Receive the poses of a robot at rest, whose source should not drift.
 
@@ -77,7 +91,7 @@ def _watched_poses(
     until_s = clock.now_s() + WATCH_S
     while clock.now_s() < until_s:
         clock.sleep_until_s(clock.now_s() + LOOK_S)
-        arrived += feed.arrived(clock.now_s())
+        arrived += _of_source(feed, clock, senders)
     fault = drift_fault([m.sample for m in arrived if isinstance(m.sample, PoseSample)])
     if fault is not None:
         raise InputError(f"pose {source}: {fault}")
@@ -91,15 +105,15 @@ def drift_fault(samples: list[PoseSample]) -> str | None:
     time_s = np.array([sample.time_s for sample in samples])
     place_m = np.array([sample.position_m for sample in samples])
     blocks = np.array_split(np.arange(len(samples)), BLOCKS)
-    at_s = np.array([time_s[rows].mean() for rows in blocks]) - time_s.mean()
-    mean_m = np.array([place_m[rows].mean(axis=0) for rows in blocks]) - place_m.mean(axis=0)
-    spread_s2 = float(at_s @ at_s)
-    drift_m_s = at_s @ mean_m / spread_s2
-    off_m = mean_m - np.outer(at_s, drift_m_s)
-    sd_m_s = float(np.sqrt(np.sum(off_m**2) / (3 * (BLOCKS - 2)) / spread_s2))
-    speed_m_s = float(np.linalg.norm(drift_m_s))
+    at_s = np.array([time_s[rows].mean() for rows in blocks])
+    if not np.ptp(at_s):
+        return None  # the stamps are equal
+    mean_m = np.array([place_m[rows].mean(axis=0) for rows in blocks])
+    lines, covariance = np.polyfit(at_s - at_s.mean(), mean_m, 1, cov=True)
+    sd_m_s = float(np.sqrt(covariance[0, 0].mean()))
+    speed_m_s = float(np.linalg.norm(lines[0]))
     if not speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
-        return None  # also if the stamps are equal
+        return None
     return (
         f"the robot rests, and its pose moves by {100.0 * speed_m_s:.1f} cm/s; leave the robot "
         "alone, or wait until the source does not drift"
@@ -128,14 +142,11 @@ def start_fault(
     """
     if config.frame is not None and sample.frame != config.frame:
         return f"wrong frame: {sample.frame!r}, expected {config.frame!r} (pose.frame)"
-    world = turned(config.world_deg)
-    body_m = np.array(config.world_m) + world @ sample.position_m
-    link = world @ sample.rotation @ turned(config.offset_deg).T
-    link_m = body_m - link @ np.array(config.offset_m)
+    link_m, link = tracked_link(sample, config)
     reach_m = config.start_m + (robot.length_m if config.link else 0.0)
     away_m = float(np.hypot(*(link_m[:2] - start_m)))
     start = f"({start_m[0]:.2f}, {start_m[1]:.2f})"
-    small_m = np.array(config.world_m) + world @ (1e-3 * sample.position_m)
+    small_m = link_m + (1e-3 - 1.0) * config.scale * (turned(config.world_deg) @ sample.position_m)
     if away_m > UNIT_M and float(np.hypot(*(small_m[:2] - start_m))) <= reach_m:
         return (
             f"wrong unit: position {_places(sample.position_m)} looks like millimetres; send metres"

@@ -26,6 +26,7 @@ from snakewalk.controller.mechanics.slide_window import HeadReadings, SlideWindo
 from snakewalk.controller.mechanics.slope_load import slope_load
 from snakewalk.controller.pose.external_pose import MeasuredHeads, TimedHead
 from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
+from snakewalk.drivers.attitude import about_up
 
 WINDOW_S: Final = 4.0
 """Duration of motion that is compared at once (ours): the noise of slow sources averages out."""
@@ -145,9 +146,7 @@ def _cycle(time_s: float, view: BodyView) -> _Cycle:
     headings = view.headings_rad
     mean = float(headings.mean())
     points = (view.link_m - view.centre_m)[:, :2]
-    c, s = np.cos(mean), np.sin(mean)
-    x, y = points[:, 0], points[:, 1]
-    turned = np.column_stack([c * x + s * y, c * y - s * x])
+    turned = points @ about_up(mean)[:2, :2]
     place = np.array([*view.centre_m[:2], mean])
     return _Cycle(time_s, place, headings - mean, turned, view.link_m[:, :2])
 

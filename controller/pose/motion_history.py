@@ -1,5 +1,6 @@
 """Dead reckoning of the last seconds, for measurements that arrive late."""
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -43,7 +44,7 @@ class MotionHistory:
         row[0], row[1:4], row[4:] = moment.time_s, moment.place, moment.joint_rad
         if len(self):
             before = self._rows[self._end - 1, 3]
-            row[3] = before + np.arctan2(np.sin(row[3] - before), np.cos(row[3] - before))
+            row[3] = before + math.remainder(row[3] - before, math.tau)
         self._end += 1
         while self._rows[self._first, 0] < moment.time_s - HISTORY_S:
             self._first += 1

@@ -5,6 +5,7 @@ the attitude of the body, whose mean frame turns slowly while the head swings. E
 covariance; their coupling is neglected. Dead reckoning adds uncertainty with time and distance.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final
@@ -16,7 +17,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import SpineLinks
 from snakewalk.controller.pose.motion_history import Moment
 from snakewalk.controller.pose.tracked_body import HeadMeasurement
-from snakewalk.drivers.attitude import rotation_by
+from snakewalk.drivers.attitude import about_up, rotation_by, rotations
 from snakewalk.drivers.types import BodyPose
 
 SLIP_SHARE: Final = 0.15
@@ -118,7 +119,7 @@ class PoseFilter:
         step_s = moment.time_s - before.time_s
         turn, displacement_m = self._motion(before, moment)
         self.head_m[:2] += displacement_m
-        self._body = rotation_by(np.array([0.0, 0.0, turn])) @ self._body
+        self._body = about_up(turn) @ self._body
         if step_s > 0.0:
             slip = 2.0 * SLIP_TIME_S * SLIP_SHARE**2 / step_s
             moved = slip * float(displacement_m @ displacement_m)
@@ -136,9 +137,10 @@ class PoseFilter:
         assert self._last is not None
         turn, displacement_m = self._motion(then, self._last)
         head_m = self.head_m - np.append(displacement_m, 0.0)
-        body = rotation_by(np.array([0.0, 0.0, -turn])) @ self._body
+        body = about_up(-turn) @ self._body
         measured_frame = measured.rotation @ self._mean_frame(then)
-        off_m, off_rad = measured.position_m - head_m, rotation_vector(measured_frame @ body.T)
+        off_m = measured.position_m - head_m
+        off_rad = rotations().from_matrix(measured_frame @ body.T).as_rotvec()
         gap_s = min(max(then.time_s - self._seen_s, 0.0), SLIDE_S)
         self._seen_s = then.time_s
         far = float(
@@ -160,9 +162,8 @@ class PoseFilter:
     def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
         """Return the turn from the frame of dead reckoning to the world by a measurement alone."""
         measured_frame = measured.rotation @ self._mean_frame(then)
-        return _wrapped_rad(
-            float(np.arctan2(measured_frame[1, 0], measured_frame[0, 0])) - self._body_heading(then)
-        )
+        heading_rad = np.arctan2(measured_frame[1, 0], measured_frame[0, 0])
+        return math.remainder(heading_rad - self._body_heading(then), math.tau)
 
     def place_again(self, measured: HeadMeasurement, then: Moment) -> None:
         """Place the body by a measurement, whatever its pose was before."""
@@ -192,15 +193,14 @@ class PoseFilter:
     def _motion(self, before: Moment, after: Moment) -> tuple[float, Floats]:
         """Return how dead reckoning turned the body and moved the head, in the world."""
         turn = self._body_heading(after) - self._body_heading(before)
-        c, s = np.cos(self._frame_rad), np.sin(self._frame_rad)
-        x, y = after.place[:2] - before.place[:2]
-        return _wrapped_rad(turn), np.array([c * x - s * y, s * x + c * y])
+        way_m = about_up(self._frame_rad)[:2, :2] @ (after.place[:2] - before.place[:2])
+        return math.remainder(turn, math.tau), way_m
 
     def _align(self) -> None:
         """Turn the frame of dead reckoning so that the body has its heading."""
         assert self._last is not None
         heading = float(np.arctan2(self._body[1, 0], self._body[0, 0]))
-        self._frame_rad = _wrapped_rad(heading - self._body_heading(self._last))
+        self._frame_rad = math.remainder(heading - self._body_heading(self._last), math.tau)
 
     def _body_heading(self, moment: Moment) -> float:
         frame = self._mean_frame(moment)
@@ -221,38 +221,16 @@ class PoseFilter:
         forward = rotation[:, :, 0].mean(axis=0)
         up = rotation[:, :, 2].mean(axis=0)
         forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
-        left = _cross(up, forward)
+        left = np.cross(up, forward)
         left = left / max(float(np.linalg.norm(left)), 1e-9)
-        return np.stack([forward, left, _cross(forward, left)], axis=1)
-
-
-def rotation_vector(rotation: Floats) -> Floats:
-    """Return the rotation vector (3,) of a rotation matrix, below a half turn."""
-    r = rotation
-    axis = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    sine = 0.5 * float(np.linalg.norm(axis))
-    cosine = 0.5 * (float(r.trace()) - 1.0)
-    angle = float(np.arctan2(sine, cosine))
-    if sine > 1e-9:
-        return axis * (angle / (2.0 * sine))
-    if cosine > 0.0:
-        return 0.5 * axis
-    column = int(r.diagonal().argmax())  # a half turn
-    along = r[:, column] + np.eye(3)[column]
-    return np.asarray(np.pi * along / np.linalg.norm(along))
-
-
-def _wrapped_rad(angle_rad: float) -> float:
-    return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))
+        return np.stack([forward, left, np.cross(forward, left)], axis=1)
 
 
 def _turn_between(first: Floats, two: Floats) -> float:
     """Return the angle between two directions in the horizontal plane; 0 of a steep one."""
     if min(np.hypot(*first[:2]), np.hypot(*two[:2])) < LEAST_LEVEL:
         return 0.0
-    return float(
-        np.arctan2(first[0] * two[1] - first[1] * two[0], first[0] * two[0] + first[1] * two[1])
-    )
+    return float(np.angle(complex(*two[:2]) / complex(*first[:2])))
 
 
 def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
@@ -261,9 +239,3 @@ def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
     remainder = np.eye(3) - gain
     after = remainder @ prior @ remainder.T + gain @ noise @ gain.T
     return gain, 0.5 * (after + after.T)
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )

@@ -5,6 +5,7 @@ Then the measured poses lead to the new place without a gap, and later agree wit
 Swapped markers move a pose at once.
 """
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -12,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.attitude import about_up
 
 SPEED_M_S: Final = 2.0
 RATE_RAD_S: Final = 3.0
@@ -49,10 +51,8 @@ class PlacedPose:
 
     def moved_to(self, other: "PlacedPose", turn_rad: float) -> Floats:
         """Return the position (3,) at the time of another pose, moved by the joints alone."""
-        x, y = other.odometry_m - self.odometry_m
-        c, s = np.cos(turn_rad), np.sin(turn_rad)
-        moved_m: Floats = self.position_m + np.array([c * x - s * y, s * x + c * y, 0.0])
-        return moved_m
+        way_m = np.append(other.odometry_m - self.odometry_m, 0.0)
+        return np.asarray(self.position_m + about_up(turn_rad) @ way_m)
 
 
 class Relocated(NamedTuple):
@@ -109,7 +109,7 @@ def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
     """Whether a body may have moved from one pose to the next, in at most ``most_s``."""
     gap_s = min(pose.time_s - last.time_s, most_s)
     off_m = float(np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad)))
-    off_rad = abs(_wrapped_rad(pose.turn_rad - last.turn_rad))
+    off_rad = abs(math.remainder(pose.turn_rad - last.turn_rad, math.tau))
     noise_m = STEP_SD * np.hypot(last.position_sd_m, pose.position_sd_m)
     noise_rad = STEP_SD * np.hypot(last.turn_sd_rad, pose.turn_sd_rad)
     return bool(
@@ -122,7 +122,9 @@ def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
 def _agree(poses: list[PlacedPose]) -> bool:
     """Whether poses differ by the motion of the joints and by noise only."""
     newest = poses[-1]
-    turns = newest.turn_rad + np.array([_wrapped_rad(p.turn_rad - newest.turn_rad) for p in poses])
+    turns = newest.turn_rad + np.array(
+        [math.remainder(p.turn_rad - newest.turn_rad, math.tau) for p in poses]
+    )
     turn_rad = float(turns.mean())
     places_m = np.array([pose.moved_to(newest, turn_rad) for pose in poses])
     off_m = np.linalg.norm(places_m - places_m.mean(axis=0), axis=1)
@@ -130,7 +132,3 @@ def _agree(poses: list[PlacedPose]) -> bool:
     most_m = [max(SETTLED_M, SETTLED_SD * pose.position_sd_m) for pose in poses]
     most_rad = [max(SETTLED_RAD, SETTLED_SD * pose.turn_sd_rad) for pose in poses]
     return bool(np.all(off_m <= most_m) and np.all(off_rad <= most_rad))
-
-
-def _wrapped_rad(angle_rad: float) -> float:
-    return float(np.arctan2(np.sin(angle_rad), np.cos(angle_rad)))

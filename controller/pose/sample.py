@@ -7,6 +7,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.drivers.attitude import rotations
 
 UNIT_TOLERANCE: Final = 0.02
 """Largest deviation of a quaternion's length from 1 (ours)."""
@@ -65,48 +66,23 @@ def rotation_of(quaternion_wxyz: Sequence[float]) -> Floats:
         UnusablePoseError: its length is far from 1.
 
     """
-    w, x, y, z = (float(value) for value in quaternion_wxyz)
-    length = float(np.sqrt(w * w + x * x + y * y + z * z))
+    w, x, y, z = quaternion_wxyz
+    length = float(np.linalg.norm(quaternion_wxyz))
     if not abs(length - 1.0) <= UNIT_TOLERANCE:
         raise UnusablePoseError(
             f"quaternion of length {length:.3g}: must be 1; send w, x, y, z, and no angles in "
             "degrees"
         )
-    w, x, y, z = w / length, x / length, y / length, z / length
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
+    return np.asarray(rotations().from_quat([x, y, z, w]).as_matrix())
 
 
 def quaternion_of(rotation: Floats) -> tuple[float, float, float, float]:
     """Return the quaternion (w, x, y, z), w >= 0, of a rotation matrix (3, 3)."""
-    r = rotation
-    squares = np.array([
-        1.0 + r[0, 0] + r[1, 1] + r[2, 2], 1.0 + r[0, 0] - r[1, 1] - r[2, 2],
-        1.0 - r[0, 0] + r[1, 1] - r[2, 2], 1.0 - r[0, 0] - r[1, 1] + r[2, 2],
-    ])  # fmt: skip
-    largest = int(squares.argmax())
-    double = float(np.sqrt(squares[largest]))
-    a, b, c = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
-    d, e, f = r[1, 0] + r[0, 1], r[2, 0] + r[0, 2], r[2, 1] + r[1, 2]
-    four = double * double
-    row = np.array([(four, a, b, c), (a, four, d, e), (b, d, four, f), (c, e, f, four)][largest])
-    w, x, y, z = (row / (2.0 * double)).tolist()
-    return (w, x, y, z) if w >= 0.0 else (-w, -x, -y, -z)
+    x, y, z, w = rotations().from_matrix(rotation).as_quat(canonical=True).tolist()
+    return w, x, y, z
 
 
 def turned(roll_pitch_yaw_deg: Sequence[float]) -> Floats:
     """Return the rotation (3, 3) by roll, pitch and yaw about fixed axes, in this order."""
-    angles = np.radians(np.array(roll_pitch_yaw_deg, dtype=float))
-    (cr, cp, cy), (sr, sp, sy) = np.cos(angles), np.sin(angles)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    turn = rotations().from_euler("xyz", list(roll_pitch_yaw_deg), degrees=True)
+    return np.asarray(turn.as_matrix())

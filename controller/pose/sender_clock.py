@@ -52,6 +52,5 @@ class SenderClock:
         if len(complete_bins) < DRIFT_AFTER:
             return
         time_s, value = (np.array(column) for column in zip(*complete_bins, strict=True))
-        time_s = time_s - time_s.mean()
-        slope = float((time_s * (value - value.mean())).sum() / (time_s * time_s).sum())
+        slope = float(np.polyfit(time_s - time_s.mean(), value - value.mean(), 1)[0])
         self.drift = min(max(slope, -MOST_DRIFT), MOST_DRIFT)

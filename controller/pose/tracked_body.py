@@ -29,6 +29,14 @@ class HeadMeasurement:
     """(3, 3) rad^2, of rotations about the world's axes."""
 
 
+def tracked_link(sample: PoseSample, config: PoseConfig) -> tuple[Floats, Floats]:
+    """Return centre (3,) and axes (3, 3) of the link that carries the tracked body."""
+    world = turned(config.world_deg)
+    axes = world @ sample.rotation @ turned(config.offset_deg).T
+    body_m = np.array(config.world_m) + config.scale * (world @ sample.position_m)
+    return body_m - axes @ np.array(config.offset_m), axes
+
+
 class TrackedBody:
     """The body that a source tracks, on a link of the robot."""
 
@@ -37,19 +45,17 @@ class TrackedBody:
         self._config = config
         self._world_m = np.array(config.world_m)
         self._world = turned(config.world_deg)
-        self._offset_m = np.array(config.offset_m)
-        self._offset = turned(config.offset_deg)
 
     def head(self, sample: PoseSample, joint_rad: Floats) -> HeadMeasurement:
         """Return the head's pose for joint angles (J,) at the time of the sample."""
-        body_m = self._world_m + self._world @ sample.position_m
-        link = self._world @ sample.rotation @ self._offset.T
-        link_m = body_m - link @ self._offset_m
+        link_m, link = tracked_link(sample, self._config)
         joint_in_head, link_in_head = self._in_head(joint_rad)
         rotation = link @ link_in_head.T
         head_m = link_m - rotation @ joint_in_head
         position, turn = self._covariances(sample)
-        arm = _cross(head_m - body_m)  # an angle error moves the head by the lever arm
+        body_m = link_m + link @ np.array(self._config.offset_m)
+        # an angle error moves the head by the lever arm
+        arm = np.cross(head_m - body_m, np.eye(3))
         return HeadMeasurement(head_m, rotation, position + arm @ turn @ arm.T, turn)
 
     def body(self, head: BodyPose, joint_rad: Floats) -> tuple[Floats, Floats]:
@@ -57,9 +63,10 @@ class TrackedBody:
         joint_in_head, link_in_head = self._in_head(joint_rad)
         link = head.rotation @ link_in_head
         link_m = head.head_in_world_m + head.rotation @ joint_in_head
-        body_m = link_m + link @ self._offset_m
-        axes = link @ self._offset
-        return self._world.T @ (body_m - self._world_m), self._world.T @ axes
+        config = self._config
+        from_origin_m = link_m + link @ np.array(config.offset_m) - self._world_m
+        axes = link @ turned(config.offset_deg)
+        return self._world.T @ from_origin_m / config.scale, self._world.T @ axes
 
     def _in_head(self, joint_rad: Floats) -> tuple[Floats, Floats]:
         view = self._spine.in_world(BodyPose(0.0, np.zeros(3), np.eye(3)), joint_rad)
@@ -76,9 +83,3 @@ class TrackedBody:
             world @ position @ world.T + LEAST_SD_M**2 * np.eye(3),
             world @ turn @ world.T + LEAST_SD_RAD**2 * np.eye(3),
         )
-
-
-def _cross(arm: Floats) -> Floats:
-    """Return the matrix (3, 3) that gives the movement of an arm's end for a small rotation."""
-    x, y, z = arm
-    return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])

@@ -149,7 +149,7 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
     turn = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]) - true_rad
     return (
         np.hypot(*(pose.head_m[within, :2] - true_m).T),
-        np.abs(np.arctan2(np.sin(turn), np.cos(turn))),
+        np.abs(np.angle(np.exp(1j * turn))),
     )
 
 

@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.drivers.attitude import about_up
 
 AIM_SHARE = 0.75
 """Share of a waypoint's radius that the search aims at: the body ends a cycle slightly off the
@@ -44,9 +45,7 @@ class MotionPrimitives:
 
     def after(self, pose: Floats, action: int) -> Floats:
         """(3,) where ``action`` leads from ``pose`` (3,) in a cycle."""
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        x, y, turn = self.travel[action, -1]
-        return np.array([pose[0] + c * x - s * y, pose[1] + s * x + c * y, pose[2] + turn])
+        return np.asarray(pose + about_up(pose[2]) @ self.travel[action, -1])
 
 
 def plane_pose(frame: Frame) -> Floats:

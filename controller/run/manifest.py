@@ -11,6 +11,7 @@ PLUGINS = (
     ("command", "list", "List runs, robots, worlds, recordings, policies and plug-ins.", "snakewalk.controller.run.commands.list:list_"),
     ("command", "plan", "Check states, path and joint limits of a run; nothing moves.", "snakewalk.controller.run.commands.plan:plan"),
     ("command", "play", "Play a recording or joint angles on servos or in the simulator.", "snakewalk.controller.run.commands.play:play"),
+    ("command", "pose calibrate", "Swing the head for 10 s, and find the source's axes, scale, mount and delay.", "snakewalk.controller.run.commands.pose_calibrate:calibrate_source"),
     ("command", "pose check", "Show position, axes, rate, delay and noise of an external pose; exit code 1 on a fault.", "snakewalk.controller.run.commands.pose_check:check"),
     ("command", "run", "Run a job on servos or in the simulator; leaves log, report, film.", "snakewalk.controller.run.commands.run:run"),
     ("command", "tools schema", "Print the JSON Schema of a TOML file; editors use it to complete and check the file.", "snakewalk.controller.run.commands.schema:schema"),

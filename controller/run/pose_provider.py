@@ -164,7 +164,7 @@ class PoseComparison:
         true = self.true()
         self._head_m.append(float(np.hypot(*(pose.head_in_world_m - true.head_in_world_m)[:2])))
         turn = pose.heading_rad - true.heading_rad
-        self._heading_rad.append(float(abs(np.arctan2(np.sin(turn), np.cos(turn)))))
+        self._heading_rad.append(float(abs(np.angle(np.exp(1j * turn)))))
         run = self.prepared.run
         if self._reached_count < len(run.waypoints_m):
             centre = body_in_world(self.prepared.robot, true, state.position_rad).centre_m[:2]

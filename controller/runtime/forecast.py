@@ -29,6 +29,7 @@ from snakewalk.controller.mechanics.rigid_motion import (
 )
 from snakewalk.controller.mechanics.slope_load import holding_factor, slope_load
 from snakewalk.controller.walk.pilot import Pilot
+from snakewalk.drivers.attitude import about_up
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +183,7 @@ class _PaperBody:
         shape_m_s = (after.link_m - before.link_m)[:, :2] / step_s
         points = before.link_m[:, :2]
         headings = before.headings_rad
-        c, s = np.cos(self._head_rad), np.sin(self._head_rad)
-        turn = np.array([[c, -s], [s, c]])
+        turn = about_up(self._head_rad)[:2, :2]
         tangential, normal = slope_load(self._ground, view.link_m)
         tangential = share * (tangential @ turn)
         normal = share[:, 0] * normal

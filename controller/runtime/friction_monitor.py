@@ -19,6 +19,7 @@ from snakewalk.controller.mechanics.friction_filter import FoundFriction, Fricti
 from snakewalk.controller.mechanics.rigid_motion import planar_slide
 from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.walk.twin import Twin, seen_state
+from snakewalk.drivers.attitude import about_up
 
 SPAN_S = 1.5
 """Duration of motion that is replayed (ours): in a shorter span the initial speed counts too much,
@@ -51,8 +52,8 @@ class Span:
         """(3,) motion of a body that came to another centre (2,) and mean heading."""
         begin = self.views[1]
         mean = begin.heading_rad
-        (x, y), c, s = centre_m - begin.centre_m[:2], np.cos(mean), np.sin(mean)
-        return np.array([c * x + s * y, c * y - s * x, heading_rad - mean])
+        way_m = (centre_m - begin.centre_m[:2]) @ about_up(mean)[:2, :2]
+        return np.append(way_m, heading_rad - mean)
 
 
 class SlideModel(Protocol):

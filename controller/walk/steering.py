@@ -30,6 +30,7 @@ from snakewalk.controller.mechanics.rollout_kernel import (
     TIME,
 )
 from snakewalk.controller.walk.angle_track import AngleTrack
+from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 
@@ -116,9 +117,8 @@ class Steering:
         predicted = self._past_tree.roll(np.empty((1, 0)), pulse)
         gap_m = pose.centre_m - predicted.centre_m[0]
         mean = pose.offset_rad + float(self._track.body_rad(pose.head).mean())
-        c, s = np.cos(mean), np.sin(mean)
         turn = float(wrap(pose.offset_rad - predicted.offset_rad[0]))
-        measured_motion = c * gap_m[0] + s * gap_m[1], c * gap_m[1] - s * gap_m[0], turn
+        measured_motion = *(gap_m[:2] @ about_up(mean)[:2, :2]), turn
         was = self.drift.ahead_m, self.drift.left_m, self.drift.turn_rad
         self.drift = Drift(
             *(

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
@@ -144,21 +145,8 @@ def _touching(
 
 def _rotation(line: Floats, up: Floats, about_rad: float) -> Floats:
     """(3, 3) rotation of unit ``line`` to ``up``, then about it."""
-    cross = np.cross(line, up)
-    dot = float(line @ up)
-    if dot < -1.0 + 1e-9:
-        side = np.linalg.svd(up[None])[2][1]
-        first = 2.0 * np.outer(side, side) - np.eye(3)
-    else:
-        k = _skew(cross)
-        first = np.eye(3) + k + k @ k / (1.0 + dot)
-    k = _skew(up)
-    second = np.eye(3) + math.sin(about_rad) * k + (1.0 - math.cos(about_rad)) * k @ k
-    return np.asarray(second @ first)
-
-
-def _skew(v: Floats) -> Floats:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    upright = Rotation.align_vectors(up, line)[0]
+    return np.asarray((Rotation.from_rotvec(about_rad * up) * upright).as_matrix())
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
-from snakewalk.drivers.compiling import compiled
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.imu import Imu
 from snakewalk.sim.physics.body import build_model
@@ -57,7 +56,6 @@ class MujocoPlant:
         )
         self.mechanics = Mechanics.of(model, robot, world, ground)
         self._data = self.mechanics.data
-        self._place: Floats = self._data.qpos[:7]
         self._position_rad: Floats = self._data.qpos[7:]
         self._velocity_rad_s: Floats = self._data.qvel[6:]
         self._count = 0
@@ -167,9 +165,10 @@ class MujocoPlant:
 
     def head_pose(self) -> BodyPose:
         """Head link's centre and axes."""
-        pose = np.empty((4, 3))
-        _pose(self._place, pose)
-        return BodyPose(self._count * self.step_s, pose[0], pose[1:])
+        place = self._data.qpos
+        axes = np.empty(9)
+        mujoco.mju_quat2Mat(axes, place[3:7])
+        return BodyPose(self._count * self.step_s, place[:3].copy(), axes.reshape(3, 3))
 
     @property
     def link_positions_m(self) -> Floats:
@@ -238,19 +237,6 @@ class MujocoPlant:
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
         mujoco.mj_crb(m, d)
-
-
-@compiled("void(float64[::1], float64[:, ::1])", makes_arrays=False)
-def _pose(place: Floats, pose: Floats) -> None:
-    """Convert place and unit quaternion (7,) to place, then the matrix of axes as columns."""
-    w, x, y, z = place[3], place[4], place[5], place[6]
-    pose[0, 0], pose[0, 1], pose[0, 2] = place[0], place[1], place[2]
-    pose[1, 0] = w * w + x * x - y * y - z * z
-    pose[1, 1], pose[1, 2] = 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-    pose[2, 0], pose[2, 1] = 2.0 * (x * y + w * z), w * w - x * x + y * y - z * z
-    pose[2, 2] = 2.0 * (y * z - w * x)
-    pose[3, 0], pose[3, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
-    pose[3, 2] = w * w - x * x - y * y + z * z
 
 
 def plant_imu(robot: RobotConfig, plant: MujocoPlant, baud: int, seed: int = 0) -> Imu | None:

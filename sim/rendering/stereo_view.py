@@ -12,6 +12,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.drivers.attitude import about_up
 from snakewalk.sim.rendering.looks import TEXELS, Scene, dressed_model
 from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.top_view import NOISE
@@ -89,12 +90,11 @@ class StereoView:
 
         ``at_m`` is the left camera; ``heading_rad`` is seen from above, ``tilt_rad`` downwards.
         """
-        c, s = math.cos(heading_rad), math.sin(heading_rad)
         return self.taken(
             [
                 CameraFrame(
                     np.array(at_m),
-                    tilted(tilt_rad, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])),
+                    tilted(tilt_rad, about_up(heading_rad)),
                 )
             ]
         )

@@ -62,7 +62,7 @@ def compare(estimated: Postures, truth: Postures) -> Accuracy:
     if not both.any():
         raise InputError(f"{truth.name}: no frame has a posture in both")
     turn = estimated.head_rad[both] - truth.head_rad[both]
-    head = np.abs(np.arctan2(np.sin(turn), np.cos(turn)))
+    head = np.abs(np.angle(np.exp(1j * turn)))
     points = estimated.points()[both] / estimated.length
     there = truth.points()[both] / truth.length
     points, there = points - points.mean(axis=(0, 1)), there - there.mean(axis=(0, 1))

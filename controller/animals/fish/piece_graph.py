@@ -14,6 +14,7 @@ from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.segments import Kind, MotionSegment
+from snakewalk.drivers.attitude import about_up
 
 CLASSES = 3
 
@@ -117,8 +118,7 @@ def piece_graph(
 
 def placed(base: Floats, origin: Floats, head_rad: float) -> Floats:
     """Points (n, 2) of a piece that begins at ``origin`` (2,) with the head at ``head_rad``."""
-    c, s = np.cos(head_rad), np.sin(head_rad)
-    return np.asarray(base @ np.array([[c, s], [-s, c]]) + origin)
+    return np.asarray(base @ about_up(-head_rad)[:2, :2] + origin)
 
 
 def _rise(postures: Postures) -> Floats | None:

@@ -154,7 +154,7 @@ def speeds(postures: Postures) -> Floats:
 def turned(head_rad: Floats) -> float:
     """How far directions (n,) turn from first to last, each step wrapped."""
     step = np.diff(head_rad)
-    return float(np.arctan2(np.sin(step), np.cos(step)).sum())
+    return float(np.angle(np.exp(1j * step)).sum())
 
 
 def _segment(

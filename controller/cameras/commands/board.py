@@ -53,7 +53,7 @@ def board(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw the board for `pose calibrate`; print it without scaling, and glue it to a plate."""
+    """Draw the board for `pose lens`; print it without scaling, and glue it to a plate."""
     calibration_board = CalibrationBoard(
         read_pattern(pattern), read_squares(squares), 0.001 * square
     )

@@ -1,4 +1,4 @@
-"""``snakewalk pose calibrate``: the lens of a camera from pictures of a board."""
+"""``snakewalk pose lens``: the lens of a camera from pictures of a board."""
 
 import math
 from pathlib import Path
@@ -35,10 +35,10 @@ _PAUSE_S = 0.7
 
 
 @command(
-    "pose calibrate",
+    "pose lens",
     examples=(
-        "pose calibrate pictures -o lens.yml",
-        "pose calibrate 0 -o lens.yml --size 1280x720",
+        "pose lens pictures -o lens.yml",
+        "pose lens 0 -o lens.yml --size 1280x720",
     ),
     results=("out",),
 )

@@ -55,7 +55,7 @@ class Distortion:
         return (
             f"the floor's markers show that the lens distorts: places are up to "
             f"{1e3 * self.error_m:.0f} mm off; calibrate it (snakewalk pose board, snakewalk "
-            "pose calibrate) and set [camera] lens"
+            "pose lens) and set [camera] lens"
         )
 
 

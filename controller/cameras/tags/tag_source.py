@@ -62,7 +62,7 @@ class TagsPose:
                 f"pose: tags: camera.{key} is missing; {advice}"
                 for key, advice in (
                     ("device", "set the number, device or address of the camera"),
-                    ("lens", "calibrate it with snakewalk pose calibrate"),
+                    ("lens", "calibrate it with snakewalk pose lens"),
                 )
                 if getattr(camera, key) is None
             ]

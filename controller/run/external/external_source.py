@@ -1,8 +1,8 @@
 """External pose sources: another program sends the poses."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from typing import Protocol
 
 from snakewalk.config.errors import InputError
@@ -14,7 +14,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.pose.external_pose import ExternalPose
 from snakewalk.controller.pose.first_pose import await_first_pose, start_fault
-from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed
+from snakewalk.controller.pose.sample import PoseFeed
 from snakewalk.controller.pose.udp_feed import UdpFeed, parse_address
 from snakewalk.controller.run.pose_provider import PoseContext, PoseProvider
 from snakewalk.controller.runlog.evidence import Kind, PoseEvidence
@@ -90,12 +90,17 @@ class ExternalSource(ABC):
         run = prepared.run
         config = robot.pose or PoseConfig()
         rehearsed = context.backend.poses
-        opened = rehearsed if rehearsed is not None else self.open_feed(context.argument, clock)
 
         def on_event(text: str) -> None:
             context.on_event("pose", text)
 
-        with closing(_CheckedFeed(opened, config.sender, on_event)) as feed:
+        with ExitStack() as stack:
+            if rehearsed is None:
+                feed: PoseFeed = stack.enter_context(
+                    closing(self.open_feed(context.argument, clock))
+                )
+            else:
+                feed = rehearsed
             pose = ExternalPose(
                 robot,
                 config,
@@ -111,31 +116,11 @@ class ExternalSource(ABC):
                 lambda sample: start_fault(
                     sample, robot, config, run.start_m, ground_height(context.prepared.ground)
                 ),
+                config.sender,
             )
             pose.store_poses(early)
             health = PoseHealth(pose.fault, config.hold_s, pose.row, pose.needs_caution)
             yield PoseProvider(pose, pose.facts, health, pose.take_measured)
-
-
-class _CheckedFeed:
-    """A feed whose ``close`` may be missing, with the poses of one host if a file names it."""
-
-    def __init__(self, feed: PoseFeed, host: str | None, on_event: Callable[[str], None]) -> None:
-        self._feed = feed
-        self._host = host
-        self._on_event = on_event
-        self._others = set[str]()
-        self.close: Callable[[], None] = getattr(feed, "close", lambda: None)
-
-    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
-        """Return the poses that have arrived; each other sender is reported once."""
-        arrived = self._feed.arrived(now_s)
-        if self._host is None:
-            return arrived
-        for sender in {pose.sender for pose in arrived if pose.host != self._host} - self._others:
-            self._others.add(sender)
-            self._on_event(f"{sender} is ignored: it is not {self._host} (pose.sender)")
-        return [pose for pose in arrived if pose.host == self._host]
 
 
 def ground_height(ground: HeightField | None) -> Callable[[float, float], float]:

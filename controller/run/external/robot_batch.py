@@ -13,6 +13,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import DeviationConfig, RunConfig
 from snakewalk.config.world import WorldConfig
+from snakewalk.controller.pose.sample import rotation_of
 from snakewalk.controller.run.external.served_robot import simulated_line
 from snakewalk.controller.runlog.record import InitialPose, MotorEnergy
 from snakewalk.drivers.bus.feetech_bus import servo_bus
@@ -233,14 +234,7 @@ class BatchRow:
     def head_pose(self) -> BodyPose:
         """Return the true pose of the head link."""
         qpos = self._batch.bodies.qpos[self._row]
-        w, x, y, z = qpos[3:7] / np.linalg.norm(qpos[3:7])
-        rotation = np.array(
-            [
-                [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-                [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-                [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
-            ]
-        )
+        rotation = rotation_of(qpos[3:7].tolist())
         return BodyPose(self.time_s, qpos[:3].copy(), rotation)
 
     def energy(self) -> MotorEnergy:

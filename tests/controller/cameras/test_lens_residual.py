@@ -69,7 +69,7 @@ def test_a_pose_through_an_uncalibrated_lens_is_less_certain() -> None:
     floor = drawn.empty_floor()
     model = CameraModel.from_markers(camera(640), (0.0, 0.0), None, floor)
     assert model.distortion is not None
-    assert "snakewalk pose calibrate" in str(model.distortion)
+    assert "snakewalk pose lens" in str(model.distortion)
     body = body_in_world(ROBOT, POSE, BEND)
     prior = BodyPrior(body.link_m[:, :2], body.forward[:, :2])
     detector = OverheadDetector(model, floor, ROBOT.body_radius_m, 0.5)
@@ -81,12 +81,12 @@ def test_a_pose_through_an_uncalibrated_lens_is_less_certain() -> None:
 
 def test_markers_that_a_strong_lens_misplaces_name_the_calibration() -> None:
     floor = view(640, -0.5, FIVE).empty_floor()
-    with pytest.raises(InputError, match="snakewalk pose calibrate"):
+    with pytest.raises(InputError, match="snakewalk pose lens"):
         CameraModel.from_markers(camera(640), (0.0, 0.0), None, floor)
 
 
 def test_the_check_of_the_camera_reports_the_lens() -> None:
-    for k1, remedy in ((0.0, ""), (-0.1, "snakewalk pose calibrate")):
+    for k1, remedy in ((0.0, ""), (-0.1, "snakewalk pose lens")):
         check = CameraCheck(camera(640), ROBOT, None)
         check.add_frame(view(640, k1, FIVE).empty_floor(), 0.0)
         findings = camera_findings(check.report(), camera(640), {})

@@ -73,7 +73,7 @@ NOT_RUN = {
     "setup": "asks at a terminal: tests/controller/bench/test_setup.py",
     "ros": "holds a robot until it is stopped: tests/controller/ros",
     "--ros": "needs the extra ros and a graph: tests/controller/ros",
-    "pose calibrate 0": "needs a camera: tests/controller/cameras/test_camera_command.py",
+    "pose lens 0": "needs a camera: tests/controller/cameras/test_camera_command.py",
     "plan mine/run.toml --robot mine/found.toml": FOUND,
     "run mine/run.toml --robot mine/found.toml": FOUND,
     "log shadow": "needs four seconds of a run: tests/controller/studies/shadow/test_run_shadow.py",

@@ -76,7 +76,10 @@ def test_a_head_that_does_not_turn_shows_nothing() -> None:
 
 
 FAULTS: dict[str, tuple[Change, str]] = {
-    "another unit": (lambda t, at_m, axes: (1e3 * at_m, axes), r"^wrong unit: .* (9|10)\d\d times"),
+    "another unit": (
+        lambda t, at_m, axes: (1e3 * at_m, axes),
+        r"^wrong scale: .* (9|10)\d\d\.\d\d times",
+    ),
     "twice": (lambda t, at_m, axes: (2.0 * at_m, axes), r"^wrong scale: .* (1\.9|2\.0)\d times"),
     "half": (lambda t, at_m, axes: (0.5 * at_m, axes), r"^wrong scale: .* 0\.(4|5)\d times"),
     "mirrored": (

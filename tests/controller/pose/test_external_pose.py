@@ -120,7 +120,7 @@ def test_a_pose_that_never_changes_is_stale() -> None:
             lambda t, s: [replace(s, position_m=MIRROR @ s.position_m)],
             "mirrored axes|wrong frame",
         ),
-        (lambda t, s: [replace(s, position_m=1e3 * s.position_m)], "wrong unit"),
+        (lambda t, s: [replace(s, position_m=1e3 * s.position_m)], "wrong scale"),
         (
             lambda t, s: [replace(s, position_m=turned((0.0, 0.0, 90.0)) @ s.position_m)],
             r"wrong frame: the head moves [+-]\d+ degrees off",
@@ -236,10 +236,29 @@ def test_a_sender_with_a_new_port_replaces_a_silent_one() -> None:
     assert any("another sender on the same host, 10.0.0.1:6001" in line for line in scene.events)
 
 
+def test_a_clock_that_is_set_back_is_estimated_again() -> None:
+    scene = Scene()
+    scene.run(2.0)
+    scene.run(2.0, lambda t, s: [replace(s, time_s=s.time_s - 10.0)])
+    assert scene.pose.fault() is None
+    assert scene.events == [
+        "restarted sender: its clock was set back by 10.0 s; its clock is estimated again"
+    ]
+    assert scene.errors_m[-1] < 0.02
+
+
+def test_another_program_before_the_source_does_not_become_the_sender() -> None:
+    scene = Scene()
+    scene.run(0.5, lambda t, s: [ArrivedPose(t, "10.0.0.9:77", UnusablePoseError("no JSON")), s])
+    scene.run(1.0)
+    assert scene.pose.fault() is None
+    assert scene.errors_m[-1] < 0.01
+
+
 def test_lost_and_repeated_poses_are_counted() -> None:
     scene = Scene()
     scene.run(2.0, lambda t, s: [] if s.sequence % 10 == 5 else [s, s])
-    assert scene.pose.counts["lost"] == 10
+    assert scene.pose.facts()["poses_lost"] == 10
     assert scene.pose.fault() is None
     assert any("twice or out of order" in line for line in scene.events)
 

@@ -1,34 +1,51 @@
-"""The kinds of wrong poses change what they say, and name public reports."""
+"""The kinds of wrong poses change what is sent, and name public descriptions."""
 
 import numpy as np
 import pytest
 
-from benchmarks.wrong_poses import KINDS, REPORTS
-from snakewalk.controller.pose.sample import PoseSample, turned
-
-FIRST = PoseSample(1, 100.0, np.array([0.5, -0.3, 0.03]), turned((2.0, -3.0, 40.0)), "lab")
-LATER = PoseSample(2, 113.0, np.array([1.5, 0.4, 0.04]), turned((1.0, 4.0, 70.0)), "lab")
+from benchmarks.pose_errors import KINDS, Answer, Kind, source_of
+from benchmarks.wrong_poses import WrongSource
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError, turned
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - {"good"}))
-def test_a_kind_changes_poses_and_keeps_rotations(kind: str) -> None:
-    change = KINDS[kind]()
-    made = [change(FIRST, FIRST, 0.0), change(LATER, FIRST, 13.0)]
-    made += [change(LATER, FIRST, 13.0 + 0.2 * k) for k in range(1, 40)]
-    sent = [FIRST, *[LATER] * 40, FIRST]
-    made.append(change(FIRST, FIRST, 22.0))
-    is_other = [
-        not np.allclose(a.position_m, b.position_m)
-        or not np.allclose(a.rotation, b.rotation)
-        or a.time_s != b.time_s
-        for a, b in zip(made, sent, strict=True)
-    ]
-    assert any(is_other)
-    for pose in made:
-        np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-9)
-        assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+def _sample(k: int) -> PoseSample:
+    place_m = np.array([0.5 + 0.03 * k, -0.3 + 0.1 * np.sin(0.2 * k), 0.03])
+    return PoseSample(
+        k, 100.0 + 0.2 * k, place_m, turned((2.0, -3.0, 40.0 + 20.0 * np.sin(0.3 * k))), "lab"
+    )
 
 
-def test_each_report_belongs_to_a_kind() -> None:
-    assert set(REPORTS) < set(KINDS)
-    assert all(address.startswith("https://") for address in REPORTS.values())
+SAMPLES = [_sample(k) for k in range(120)]
+
+
+def _sent(kind: Kind) -> list[PoseSample | UnusablePoseError]:
+    source = WrongSource(kind.change())
+    arrived = [ArrivedPose(each.time_s, "a:1", each) for each in SAMPLES]
+    return [sent.sample for each in arrived for sent in source(each)]
+
+
+def _are_alike(sent: Answer | UnusablePoseError, true: PoseSample) -> bool:
+    if not isinstance(sent, PoseSample):
+        return False
+    return (
+        np.allclose(sent.position_m, true.position_m)
+        and np.allclose(sent.rotation, true.rotation)
+        and (sent.time_s, sent.sequence, sent.frame) == (true.time_s, true.sequence, true.frame)
+        and (sent.covariance is None) == (true.covariance is None)
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_kind_changes_what_is_sent_and_keeps_rotations(kind: Kind) -> None:
+    sent = _sent(kind)
+    is_same = len(sent) == len(SAMPLES) and all(map(_are_alike, sent, SAMPLES))
+    assert not is_same
+    for pose in sent:
+        if isinstance(pose, PoseSample):
+            np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-9)
+            assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
+
+
+def test_at_least_60_kinds_have_a_source() -> None:
+    assert len({kind.name for kind in KINDS}) == len(KINDS) >= 60
+    assert all(source_of(kind).startswith("https://") for kind in KINDS)

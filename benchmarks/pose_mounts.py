@@ -1,0 +1,159 @@
+"""``python -m benchmarks.pose_mounts``: ``pose calibrate`` of a served robot with drawn mounts.
+
+Each case draws axes, mount, delay and scale of a source with 5 mm and 1.5 degrees of noise. Right
+is a case within 1 degree, 2 %, 5 mm and 10 ms. ``--wrong`` calibrates with wrong bodies instead,
+which have to be rejected. ``--deviation`` gives the ground another friction and law.
+"""
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from benchmarks.pose_errors import StillAfter, circling, mirrored, noisy
+from snakewalk.config.errors import InputError
+from snakewalk.config.friction_law import LAWS
+from snakewalk.config.pose import PoseConfig, TrackerConfig
+from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, turned
+from snakewalk.controller.pose.udp_feed import SimulatedDatagrams
+from snakewalk.controller.rehearsal.rehearsal import SimulatedPort
+from snakewalk.controller.run.commands.pose_calibrate import calibrated, prepare_calibration
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
+from snakewalk.controller.run.external.served_robot import ServedRobot, Serving, place_of
+from snakewalk.drivers.attitude import rotation_by
+
+LIMITS: Final = (1.0, 1.0, 2.0, 5.0, 10.0)
+"""Degrees of axes and mount, per cent, mm, ms."""
+UP: Final = ((0.0, 0.0), (90.0, 0.0), (20.0, 80.0))
+"""Roll and pitch of sources: z axis up, y axis up, tilted."""
+Change = Callable[[PoseSample, float], PoseSample]
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedFeed:
+    """Poses of a served robot, changed before they arrive."""
+
+    served: ServedRobot
+    change: Change
+
+    def arrived(self, now_s: float) -> Sequence[ArrivedPose]:
+        """Return the poses that have arrived."""
+        arrived = SimulatedDatagrams(self.served.due).arrived(self.served.line.clock.now_s())
+        return [
+            replace(each, sample=self.change(each.sample, each.sample.time_s))
+            for each in arrived
+            if isinstance(each.sample, PoseSample)
+        ]
+
+
+def drawn(seed: int) -> PoseConfig:
+    """Draw a source and its mount."""
+    rng = np.random.default_rng([seed, 0x64])
+    roll, pitch = UP[seed % len(UP)]
+    world = turned((roll, pitch, 0.0))
+    world = turned((0.0, 0.0, float(rng.uniform(-180.0, 180.0)))) @ world
+    angles = Rotation.from_matrix(world).as_euler("xyz", degrees=True)
+    return PoseConfig(
+        offset_m=(*rng.uniform(-0.05, 0.05, 2).tolist(), float(rng.uniform(0.0, 0.08))),
+        offset_deg=tuple(rng.uniform(-180.0, 180.0, 3).tolist()),
+        world_m=(*rng.uniform(-1.0, 1.0, 2).tolist(), 0.0),
+        world_deg=tuple(angles.tolist()),
+        scale=float(np.exp(rng.uniform(-0.3, 0.3))),
+        latency_s=float(rng.uniform(0.0, 0.3)),
+    )
+
+
+def found(seed: int, deviation: Deviation, change: Change) -> PoseConfig:
+    """Calibrate a drawn mount."""
+    config = drawn(seed)
+    prepared = prepare_calibration(None, None)
+    robot = prepared.robot.model_copy(update={"pose": config})
+    tracker = TrackerConfig(
+        noise_m=0.005, noise_deg=1.5, delay_s=config.latency_s or 0.0, clock_offset_s=1e6
+    )
+    serving = Serving(tracker, deviation, 0.0, seed)
+    with ServedRobot(robot, prepared.world, place_of(prepared), serving) as served:
+        return calibrated(prepared, SimulatedPort(served), ChangedFeed(served, change))[0]
+
+
+def errors(config: PoseConfig, true: PoseConfig) -> tuple[float, ...]:
+    """Return the errors of axes, mount (degrees), scale (%), mount (mm) and delay (ms)."""
+    turns = (
+        Rotation.from_matrix(turned(getattr(config, key)).T @ turned(getattr(true, key)))
+        for key in ("world_deg", "offset_deg")
+    )
+    angles = (float(np.degrees(turn.magnitude())) for turn in turns)
+    off_m = np.array(config.offset_m) - true.offset_m
+    return (
+        *angles,
+        100.0 * abs(config.scale / true.scale - 1.0),
+        1e3 * float(np.linalg.norm(off_m)),
+        1e3 * abs((config.latency_s or 0.0) - (true.latency_s or 0.0)),
+    )
+
+
+def wrong(seed: int) -> tuple[str, Change]:
+    """Draw a wrong body: it lies, circles, swings by itself, is carried, or is mirrored."""
+    rng = np.random.default_rng([seed, 0x65])
+    first: list[PoseSample] = []
+    still, circle, shake = StillAfter(0.0), circling(0.0), noisy(0.05, 40.0)
+    hertz, phase = rng.uniform(0.2, 1.0), rng.uniform(0.0, 6.0)
+
+    def swinging(sample: PoseSample, time_s: float) -> PoseSample:
+        angle = 0.5 * float(np.sin(6.28 * hertz * time_s + phase))
+        return replace(
+            first[0],
+            sequence=sample.sequence,
+            time_s=sample.time_s,
+            position_m=first[0].position_m + np.array([0.1, 0.05, 0.0]) * angle,
+            rotation=rotation_by(np.array([0.0, 0.0, angle])) @ first[0].rotation,
+        )
+
+    def changed(sample: PoseSample, time_s: float) -> PoseSample:
+        first.append(sample)
+        kind = seed % 5
+        if kind == 2:
+            return swinging(sample, time_s)
+        change = (still, circle, circle, shake, mirrored)[kind]
+        answer = change(sample, first[0], time_s - first[0].time_s)
+        assert isinstance(answer, PoseSample)
+        return answer
+
+    names = ("lies still", "circles", "swings by itself", "shakes", "mirrored")
+    return names[seed % 5], changed
+
+
+def main() -> int:
+    """Calibrate and print a row for each case; 1 if one is not right."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.pose_mounts", description=__doc__)
+    parser.add_argument("--cases", type=int, default=20)
+    parser.add_argument("--wrong", action="store_true", help="wrong bodies")
+    parser.add_argument("--deviation", action="store_true", help="other friction and law")
+    given = parser.parse_args()
+    right = 0
+    for seed in range(given.cases):
+        rng = np.random.default_rng([seed, 0x66])
+        along, across = np.exp(rng.uniform(np.log(0.5), np.log(1.4), 2)).tolist()
+        deviation = Deviation(along, across, law=LAWS[seed % len(LAWS)])
+        name, change = wrong(seed) if given.wrong else ("", lambda sample, time_s: sample)
+        try:
+            config = found(seed, deviation if given.deviation else NO_DEVIATION, change)
+        except InputError as error:
+            right += given.wrong
+            print(seed, name, error.faults[0])
+            continue
+        off = errors(config, drawn(seed))
+        if not given.wrong:
+            right += all(each <= most for each, most in zip(off, LIMITS, strict=True))
+        print(
+            seed, name, "axes {:.2f}, mount {:.2f} deg, {:.2f} %, {:.1f} mm, {:.1f} ms".format(*off)
+        )
+    print(f"{right} of {given.cases} right")
+    return int(right < given.cases)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

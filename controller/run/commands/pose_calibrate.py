@@ -1,0 +1,150 @@
+"""``snakewalk pose calibrate``: frame, mount and delay of a source, from a known motion."""
+
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Final
+
+import numpy as np
+import typer
+
+from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
+from snakewalk.config.pose import PoseConfig
+from snakewalk.config.robot import RobotConfig
+from snakewalk.config.template import plain_toml
+from snakewalk.controller.console.command import command
+from snakewalk.controller.console.options import Force, Json, Robot, RunPort, World, show
+from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
+from snakewalk.controller.kinematics.smoothstep import cubic
+from snakewalk.controller.motion.parted_recording import recording
+from snakewalk.controller.pose.mount_fit import fit_mount, predicted_ways
+from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample
+from snakewalk.controller.pose.sender_clock import SenderClock
+from snakewalk.controller.run.backend import RehearsedPort
+from snakewalk.controller.run.external.external_source import ExternalSource
+from snakewalk.controller.run.factory import prepare_source
+from snakewalk.controller.run.kinds.source_run import SourceRun
+from snakewalk.controller.run.pose_provider import pose_plugin
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.drivers.clock import WallClock
+
+SECONDS: Final = 10.0
+SWING_RAD: Final = 0.7
+"""Amplitude of the head's joint; that of the neck is half of it (ours)."""
+SWING_RAD_S: Final = 2.5
+"""Frequency of the head; that of the neck is 0.61 of it (ours)."""
+NECK: Final = slice(1, 4)
+"""Joints of the neck among those behind the head's: they move the head aside."""
+LEAST: Final = 100
+"""Least number of poses (ours)."""
+
+
+@command(
+    "pose calibrate",
+    examples=("pose calibrate udp:9870 --port /dev/ttyUSB0 --robot my-robot.toml -o tracked.toml",),
+    results=("out",),
+)
+def calibrate_source(
+    source: Annotated[str, typer.Argument(help="external pose source, as for `run --pose`")],
+    port: RunPort = None,
+    robot: Robot = None,
+    world: World = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="write the robot's file with its [pose] here (.toml)"),
+    ] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Swing the head for 10 s, and find the source's axes, scale, mount and delay.
+
+    The robot lies straight on level ground. The place of its head becomes 0, 0, and it points along
+    x. Another body, and a left-handed frame, end the command with exit code 2.
+    """
+    plugin, argument = pose_plugin(source)
+    if not isinstance(plugin, ExternalSource) or port is None:
+        raise InputError(
+            f"pose calibrate {source}: needs a source of another program, such as udp:9870, and "
+            "--port; for the lens of a camera use snakewalk pose lens"
+        )
+    refuse_to_overwrite([out], force)
+    prepared = prepare_calibration(robot, world)
+    with closing(plugin.open_feed(argument, WallClock())) as feed:
+        config, residual_m = calibrated(prepared, port, feed)
+    if out is not None:
+        described = prepared.robot.model_copy(update={"pose": config})
+        write_result(out, plain_toml(described, f"Found by snakewalk pose calibrate {source}."))
+    show(
+        {
+            "body": "the tracked body is {:+.3f} m ahead of the centre of its link, {:+.3f} m "
+            "left, {:+.3f} m up".format(*config.offset_m),
+            "ground": "the source's origin is {:+.3f} m ahead of the head's first place, {:+.3f} m "
+            "left".format(*config.world_m),
+            "pose": config.model_dump(exclude_defaults=True),
+            "residual_m": round(residual_m, 4),
+        },
+        as_json,
+    )
+
+
+def prepare_calibration(robot: str | None, world: str | None) -> SourceRun:
+    """Prepare the motion."""
+    return prepare_source(
+        lambda body: recording(body, *_swing(body)),
+        robot=robot,
+        world=world,
+        seconds=40.0,
+    )
+
+
+def calibrated(
+    prepared: SourceRun, port: str | RehearsedPort, feed: PoseFeed
+) -> tuple[PoseConfig, float]:
+    """Run the motion, and fit the poses that arrive; returns the source and the fit's residual, m.
+
+    Raises:
+        InputError: the run was stopped, few poses arrived, or they are not of this robot.
+
+    """
+    arrived: list[ArrivedPose] = []
+    result = run_robot(
+        RunRequest(
+            prepared, port=port, on_progress=lambda progress: arrived.extend(feed.arrived(0.0))
+        )
+    )
+    rows = []
+    clock = SenderClock()
+    for each in arrived:
+        sample = each.sample
+        if isinstance(sample, PoseSample):
+            clock.add(sample.time_s, each.arrival_s)
+            stamp_s = clock.local_s(sample.time_s, each.arrival_s)
+            rows.append((stamp_s, sample.position_m, sample.rotation))
+    if result.outcome.tripped or len(rows) < LEAST:
+        raise InputError(f"pose calibrate: {result.outcome.tripped or 'few poses arrived'}")
+    robot = prepared.robot
+    before = robot.pose or PoseConfig()
+    poses = [np.array(column) for column in zip(*rows, strict=True)]
+    cycle = result.record.cycle
+    ways = predicted_ways(
+        robot, prepared.world.friction, cycle.time_s, cycle.measured_rad, before.link
+    )
+    fits = (fit_mount(cycle.time_s, way, *poses) for way in ways)
+    mount = min(fits, key=lambda fit: fit.residual_m)
+    ahead_m, left_m, up_m = mount.config.offset_m
+    offset_m = ahead_m, left_m, round(up_m - robot.body_radius_m, 4)
+    found = mount.config.model_dump(exclude_unset=True) | {"offset_m": offset_m}
+    return before.model_copy(update=found), mount.residual_m
+
+
+def _swing(robot: RobotConfig) -> tuple[Floats, Floats]:
+    """Return times (n,) and angles (n, J): head and neck swing at different frequencies."""
+    time_s = np.arange(0.0, SECONDS, 0.04)
+    amplitude_rad = SWING_RAD * cubic(np.clip(np.minimum(time_s, SECONDS - time_s), 0.0, 1.0))
+    angle = SWING_RAD_S * time_s
+    joint_rad = np.zeros((len(time_s), robot.joint_count))
+    head, *neck = robot.yaw_joints
+    joint_rad[:, head] = amplitude_rad * np.sin(angle)
+    joint_rad[:, neck[NECK]] = (0.5 * amplitude_rad * np.sin(0.61 * angle + 0.7))[:, None]
+    return time_s, joint_rad

@@ -1,0 +1,28 @@
+"""``pose calibrate``: a served robot swings its head, and its source is found."""
+
+import pytest
+
+from benchmarks.pose_mounts import LIMITS, drawn, errors, found, wrong
+from snakewalk.config.errors import InputError
+from snakewalk.controller.run.deviation import NO_DEVIATION
+from tests.helpers.command import snakewalk
+
+
+@pytest.mark.slow
+def test_a_drawn_mount_is_found() -> None:
+    off = errors(found(4, NO_DEVIATION, lambda sample, time_s: sample), drawn(4))
+    assert all(each <= most for each, most in zip(off, LIMITS, strict=True)), off
+
+
+@pytest.mark.slow
+def test_another_body_is_rejected() -> None:
+    name, change = wrong(1)
+    assert name == "circles"
+    with pytest.raises(InputError, match="another body"):
+        found(1, NO_DEVIATION, change)
+
+
+def test_a_picture_of_a_board_belongs_to_another_command() -> None:
+    ended = snakewalk("pose", "calibrate", "joints", "--port", "sim")
+    assert ended.returncode == 2
+    assert "snakewalk pose lens" in ended.stderr
