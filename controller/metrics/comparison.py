@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.runlog.column import ROWS, release
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -95,6 +96,7 @@ def compare(
     replay: RunRecord,
     tolerance: float = 0.0,
     tolerances: Mapping[str, float] | None = None,
+    valid: Bools | None = None,
 ) -> Comparison:
     """Compare two runs cycle by cycle.
 
@@ -103,6 +105,7 @@ def compare(
         replay: the other.
         tolerance: a difference up to this, in SI units, counts as none.
         tolerances: the same for single quantities, by name; infinite: none counts.
+        valid: readings (n, J) that count; default: all.
 
     """
     limits = dict(tolerances or {})
@@ -119,28 +122,53 @@ def compare(
     return Comparison(
         same_config=original.header.config_hash == replay.header.config_hash,
         cycles=(len(a.time_s), len(b.time_s)),
-        differences=tuple(_difference(*pair, limits.get(pair[0], tolerance)) for pair in pairs),
+        differences=tuple(
+            _difference(
+                *pair,
+                limits.get(pair[0], tolerance),
+                valid if pair[0] in names[2:] else None,
+            )
+            for pair in pairs
+        ),
     )
 
 
 def _difference(
-    name: str, columns: Sequence[str], time_s: Floats, a: Floats, b: Floats, tolerance: float
+    name: str,
+    columns: Sequence[str],
+    time_s: Floats,
+    a: Floats,
+    b: Floats,
+    tolerance: float,
+    valid: Bools | None,
 ) -> Difference:
     rows = min(len(a), len(b))
     if a.shape[1:] != b.shape[1:]:
         first_s = float(time_s[0]) if rows else 0.0
         return Difference(name, rows, float("inf"), float("inf"), (), first_s, None)
-    gap = np.abs(a[:rows] - b[:rows])
-    gap[np.isnan(a[:rows]) & np.isnan(b[:rows])] = 0.0
-    gap[np.isnan(gap)] = np.inf
-    finite_values = gap[np.isfinite(gap)]
-    rms = float(np.sqrt(np.square(finite_values).mean())) if finite_values.size else 0.0
-    sizes = float(gap.max(initial=0.0)), rms, tuple(gap.max(axis=0, initial=0.0).tolist())
-    bad = np.argwhere(gap > tolerance)
-    if len(bad) == 0:
+    largest = np.zeros(a.shape[1:])
+    squares = known = 0.0
+    row, column = -1, 0
+    for start in range(0, rows, ROWS):
+        part = slice(start, min(start + ROWS, rows))
+        gap = np.abs(a[part] - b[part])
+        gap[np.isnan(a[part]) & np.isnan(b[part])] = 0.0
+        gap[np.isnan(gap)] = np.inf
+        if valid is not None:
+            gap[~valid[part]] = 0.0
+        release([a, b])
+        largest = np.maximum(largest, gap.max(axis=0))
+        finite_values = gap[np.isfinite(gap)]
+        squares += float(np.square(finite_values).sum())
+        known += finite_values.size
+        bad = np.argwhere(gap > tolerance)
+        if len(bad) and row < 0:
+            row, column = start + int(bad[0][0]), int(bad[0][1])
+    rms = float(np.sqrt(squares / max(known, 1.0)))
+    sizes = float(largest.max(initial=0.0)), rms, tuple(map(float, largest))
+    if row < 0:
         return Difference(name, rows, *sizes, None, None, decides=bool(np.isfinite(tolerance)))
-    row, column = bad[0]
-    return Difference(name, rows, *sizes, float(time_s[row]), int(column), columns[column])
+    return Difference(name, rows, *sizes, float(time_s[row]), column, columns[column])
 
 
 def _line(d: Difference) -> str:

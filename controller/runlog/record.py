@@ -274,6 +274,19 @@ class RunRecord:
         stops = [event.time_s for event in self.events if event.kind == "stop"]
         return (stops[-1] if stops else self.end_s) - self.torque_on_s
 
+    def between(self, first_s: float, last_s: float) -> Self:
+        """Return the record with the rows of its tables from one time to another."""
+        parts: dict[str, Any] = {}
+        for entry in fields(self):
+            table = getattr(self, entry.name)
+            if isinstance(table, Table):
+                past_s = np.nextafter(last_s, np.inf)
+                rows = slice(*np.searchsorted(table.time_s, (first_s, past_s)))
+                names = table.topic.columns
+                columns = {name: getattr(table, name)[rows] for name in names}
+                parts[entry.name] = table.with_columns(**columns)
+        return replace(self, **parts)
+
     def from_torque_on(self) -> Self:
         """Return the record with times that count from the moment torque was switched on.
 

@@ -5,19 +5,25 @@ on the servos' clock, the arrival of its datagram (null: never), and the place o
 """
 
 import json
+import math
+from array import array
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json, read_text
+from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.runlog.record import MotorEnergy
 
 FORMAT = 1
+_LINE_MAX = 1_000_000
+_NUMBERS = 20
+"""Numbers of a line."""
 
 
 class TruthLog:
@@ -88,35 +94,54 @@ def read_truth(path: Path) -> Truth:
         InputError: the file is missing, or contains no truth.
 
     """
+    header: dict[str, Any] = {}
+    numbers = array("d")
+    damaged = 0
     try:
-        lines = read_text(path).splitlines()
+        with path.open(encoding="utf-8-sig") as file:
+            for count, line in enumerate(iter(partial(file.readline, _LINE_MAX), ""), start=1):
+                if damaged:
+                    raise InputError(f"{path}: line {damaged} is damaged")
+                try:
+                    row = parse_json(line)
+                except ValueError:
+                    damaged = count
+                    continue
+                if count > 1:
+                    numbers.extend(_numbers(row))
+                elif isinstance(row, dict) and row.get("snakewalk_truth") == FORMAT:
+                    header = row
+                else:
+                    break
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    rows = []
-    for number, line in enumerate(lines):
-        try:
-            rows.append(parse_json(line))
-        except ValueError:
-            if number < len(lines) - 1:
-                raise InputError(f"{path}: line {number + 1} is damaged") from None
-    if not rows or not isinstance(rows[0], dict) or rows[0].get("snakewalk_truth") != FORMAT:
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
+    if not header:
         raise InputError(
             f"{path}: contains no truth of a served robot; give the file of bus serve --truth"
         )
-    header = rows[0]
-    poses = rows[1:]
-    if not poses:
+    if not numbers:
         raise InputError(f"{path}: the served robot was never measured")
-    try:
-        return Truth(
-            header,
-            np.array([row["sequence"] for row in poses], np.int64),
-            np.array([row["time_s"] for row in poses], float),
-            np.array([np.nan if row["sent_s"] is None else row["sent_s"] for row in poses], float),
-            np.array([row["head_m"] for row in poses], float).reshape(-1, 3),
-            np.array([row["rotation"] for row in poses], float).reshape(-1, 3, 3),
-            np.array([row["centre_m"] for row in poses], float).reshape(-1, 3),
-            np.array([row.get("energy_j", [np.nan, np.nan]) for row in poses], float),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
+    table = np.frombuffer(numbers).reshape(-1, _NUMBERS)
+    return Truth(
+        header,
+        table[:, 0].astype(np.int64),
+        table[:, 1],
+        table[:, 2],
+        table[:, 3:6],
+        table[:, 6:15].reshape(-1, 3, 3),
+        table[:, 15:18],
+        table[:, 18:],
+    )
+
+
+def _numbers(row: Mapping[str, Any]) -> list[float]:
+    """Numbers of a line; NaN if unknown."""
+    cells = [row["sequence"], row["time_s"], row["sent_s"]]
+    for name in ("head_m", "rotation", "centre_m"):
+        cells += row[name]
+    cells += row.get("energy_j", (None, None))
+    if len(cells) != _NUMBERS:
+        raise ValueError(f"{len(cells)} numbers instead of {_NUMBERS}")
+    return [math.nan if cell is None else float(cell) for cell in cells]

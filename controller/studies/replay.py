@@ -5,12 +5,10 @@ and the ground; a log of the simulator must not differ.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
@@ -122,7 +120,6 @@ def differences(
     pose was reckoned from the joints or measured by a camera. Angles that the original failed to
     read are left out.
     """
-    valid = original.cycle.valid
     header = original.header
     measured = header.backend == "sim" and header.run.pose_is_true
     reported_only = dict.fromkeys(("velocity_rad_s", "current_a"), float("inf"))
@@ -130,19 +127,7 @@ def differences(
         "measured_rad": tolerance_rad,
         "head_m": tolerance_m if measured else float("inf"),
     }
-    return compare(_valid_record(original, valid), _valid_record(again, valid), tolerances=limits)
-
-
-def _valid_record(record: RunRecord, valid: NDArray[np.bool_]) -> RunRecord:
-    cycle = record.cycle
-    rows = len(record.cycle.time_s)
-    measured_cycle = replace(
-        cycle,
-        measured_rad=np.where(valid[:rows], cycle.measured_rad, np.nan),
-        velocity_rad_s=np.where(valid[:rows], cycle.velocity_rad_s, np.nan),
-        current_a=np.where(valid[:rows], cycle.current_a, np.nan),
-    )
-    return replace(record, cycle=measured_cycle)
+    return compare(original, again, tolerances=limits, valid=original.cycle.valid)
 
 
 def _backend(record: RunRecord) -> Backend:

@@ -11,8 +11,9 @@ from viser import uplot
 from snakewalk.config import colours
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.ground_slope import carrier_share, ground_slope
+from snakewalk.controller.metrics.path_error import ground_speed_m_s
 from snakewalk.controller.metrics.verdict import RunVerdict
-from snakewalk.controller.runlog.column import Panel
+from snakewalk.controller.runlog.column import Curve, Panel
 from snakewalk.controller.runlog.panels import CurveValues, panel_curves
 from snakewalk.controller.runlog.record import POSE_CHECK, Event, Header, RunRecord
 from snakewalk.controller.runlog.topics import TABLES
@@ -26,6 +27,7 @@ _EVENTS: Final = 7
 _AMBIENT_C: Final = 20.0
 _LATE_CYCLES: Final = 3.0
 """Readings that are this number of cycles old are shown in another colour (ours)."""
+_SPEED: Final = Curve(Panel.SPEED, "centre of mass, mean of 2 s", "blue")
 _GOOD, _WARN, _BAD_COLOUR, _INK = colours.MEASURED, colours.WARNING, colours.FAULT, "#666"
 _LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD_COLOUR}
 
@@ -45,6 +47,7 @@ class Dashboard:
         self._limit_c = safety.temperature_limit_c
         self._volts = safety.voltage_limits_v(header.robot.servo)
         self._stale_s = safety.stale_limit_s
+        self._speed_m_s = np.nan
         self._names = [header.robot.joint_label(k) for k in range(header.robot.joint_count)]
         self._gui = gui = server.gui
         self._picture: viser.GuiImageHandle | None = None
@@ -110,8 +113,8 @@ class Dashboard:
         facts = []
         if waypoints:
             facts.append(f"waypoint {min(reached + 1, waypoints)} of {waypoints}")
-        if np.isfinite(where.speed_m_s[pose]):
-            facts.append(f"{where.speed_m_s[pose]:.2f} m/s")
+        if np.isfinite(self._speed_m_s):
+            facts.append(f"{self._speed_m_s:.2f} m/s")
         if self._ground is not None:
             ahead_rad, steepest_rad = ground_slope(self._ground, where.links_m[pose][None])
             if np.isfinite(ahead_rad[0]) and not self.checks_pose:
@@ -182,9 +185,10 @@ class Dashboard:
         """Show the last seconds up to a row; a check of a pose has no curves."""
         if self.checks_pose:
             return
+        last_s = float(record.cycle.time_s[cycle])
+        record = record.between(last_s - SPAN_S, last_s)
         rows = record.cycle
-        first = int(np.searchsorted(rows.time_s, rows.time_s[cycle] - SPAN_S))
-        pick = _spread(first, cycle)
+        pick = _spread(0, len(rows.time_s) - 1)
         time_s = rows.time_s[pick]
         joint = self._names.index(self.joint.value)
         self._angle.data = (time_s, rows.sent_rad[pick, joint], rows.measured_rad[pick, joint])
@@ -192,8 +196,12 @@ class Dashboard:
         if len(record.shadow.time_s):
             self._apart.visible = True
             self._apart.data = (time_s, *_current_difference_a(record, pick).T)
+        speed = CurveValues(_SPEED, record.pose.time_s, ground_speed_m_s(record.pose))
+        self._speed_m_s = float(speed.values[-1])
         for panel, plot in self._panels.items():
             curves = panel_curves(record, panel)
+            if panel is Panel.SPEED and np.isfinite(speed.values).any():
+                curves.append(speed)
             if curves:
                 plot.visible = True
                 plot.data = (time_s, *_newest_values(panel, curves, time_s))
@@ -205,7 +213,8 @@ class Dashboard:
         self._events.content = "".join(
             "<div style='padding:.15em .8em;font-size:12px;"
             f"color:{_LEVELS.get(event.level, _INK)}'>"
-            f"{event.time_s:.1f} s &nbsp;{escape(event.kind)}: {escape(event.text)}</div>"
+            f"{event.time_s:.1f} s &nbsp;{escape(event.kind.replace('stop', 'end'))}: "
+            f"{escape(event.text)}</div>"
             for event in reversed(events[-_EVENTS:])
         )
 
@@ -274,6 +283,7 @@ def _curve_colours(panel: Panel) -> dict[str, str]:
     """Names of all curves of a panel with their colours, which the report shares."""
     columns = [column for table in TABLES for column in table.topic.columns.values()]
     curves = [curve for column in columns for curve in column.curves if curve.panel == panel]
+    curves += [_SPEED] if panel is Panel.SPEED else []
     return {curve.name: colours.COLOURS[curve.colour] for curve in curves}
 
 

@@ -20,6 +20,8 @@ _EVERY_S: Final = 0.2
 """A slider that is drawn along commands no more often (ours)."""
 _SETTLING_S: Final = 1.0
 """An input shows the run's value this time after its last change: also a refusal (ours)."""
+_LAST: Final = 1e9
+"""Place in the tab below all inputs: no slip of the finger ends the run."""
 _BUTTONS: Final = {"halt, go on": "space", "defaults": "d"}
 """Keys of an ``Operator``."""
 
@@ -45,7 +47,7 @@ class GaitPanel:
             self._gait = self._gui.add_dropdown("gait", names)
             self._limit = self._gui.add_html("")
             buttons = self._gui.add_button_group("", tuple(_BUTTONS))
-            end = self._gui.add_button("end the run", color="gray")
+            end = self._gui.add_button("end the run", color="gray", order=_LAST)
         end.on_click(lambda event: self._moved.put(("q", "")))
         self._gait.on_update(self._command_of("gait"))
         buttons.on_click(lambda event: self._moved.put((_BUTTONS[event.target.value], "")))

@@ -16,6 +16,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from html import escape
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
 from typing import Any, Final, Protocol
 from urllib.parse import parse_qs, urlsplit
 
@@ -35,6 +36,9 @@ _ASK: Final = (
 )
 _CHECK_S: Final = 5.0
 _PAGES: Final = ("/", "/index.html")
+_WORKER: Final = "/stop.js"
+_WORKER_SCRIPT: Final = Path(__file__).with_name("end_worker.js").read_text(encoding="utf-8")
+"""Program of the browser that shows the end of a run without its server."""
 Serve = Callable[..., Any]
 
 
@@ -114,7 +118,10 @@ class Gate:
                 refusal = self.answer(request, port)
                 if refusal is not None or process_request is None:
                     return refusal
-                has_script = bool(inserts) and urlsplit(request.path).path in _PAGES
+                path = urlsplit(request.path).path
+                if path == _WORKER:
+                    return _response(http.HTTPStatus.OK, _WORKER_SCRIPT, "text/javascript")
+                has_script = bool(inserts) and path in _PAGES
                 if has_script:  # the page is changed, so it must come as it is
                     _ask_for_plain(request)
                 passed: Response | None = process_request(connection, request)
@@ -202,11 +209,11 @@ def _cookie(request: Request, name: str) -> str:
     return cookies[name].value if name in cookies else ""
 
 
-def _response(status: http.HTTPStatus, text: str) -> Response:
-    body = text.encode()
+def _response(status: http.HTTPStatus, text: str, kind: str = "text/html") -> Response:
+    body = text.encode(errors="replace")
     headers = Headers(
         [
-            ("Content-Type", "text/html; charset=utf-8"),
+            ("Content-Type", f"{kind}; charset=utf-8"),
             ("Content-Length", str(len(body))),
             ("Connection", "close"),
         ]

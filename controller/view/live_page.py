@@ -110,6 +110,7 @@ class _LivePage:
         self._collected_s = freshness.now_s()
         self._button: PressedButton | None = None
         self._rows: dict[str, deque[dict[str, Any]]] = defaultdict(lambda: deque(maxlen=_ROWS))
+        server.gui.add_html("")  # keeps viser's own settings away until there are panels
         self._header: Header | None = None
         self._scene: BodyScene | None = None
         self._dashboard: Dashboard | None = None

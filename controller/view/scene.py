@@ -73,7 +73,7 @@ class BodyScene:
         self._paths = 0
         self._reached = -1
         self._waypoints_m: Floats = np.zeros((0, 2))
-        self._waypoints: list[viser.IcosphereHandle] = []
+        self._waypoints: list[viser.MeshHandle] = []
         self._axes = self._draw_axes() if header.backend == POSE_CHECK else None
         self._scene.set_up_direction("+z")
         self._draw_ground()
@@ -303,30 +303,31 @@ class BodyScene:
             self._draw_waypoints()
         if reached != self._reached:
             self._reached = reached
-            for number, sphere in enumerate(self._waypoints):
-                sphere.color = _REACHED_COLOUR if number < reached else _WAYPOINT
+            for number, waypoint in enumerate(self._waypoints):
+                waypoint.color = _REACHED_COLOUR if number < reached else _WAYPOINT
 
     def _draw_waypoints(self) -> None:
-        for sphere in self._waypoints:
-            sphere.remove()
+        for waypoint in self._waypoints:
+            waypoint.remove()
         self._waypoints = []
         radius_m = self._header.plan.waypoint_radius_m
+        disc = trimesh.creation.cylinder(radius_m, _LINE_HEIGHT_M)
         heights_m = self._height_m(self._waypoints_m)
         for number, (point_m, z_m) in enumerate(zip(self._waypoints_m, heights_m, strict=True)):
             position = (float(point_m[0]), float(point_m[1]), float(z_m))
             name = f"{self._root}/waypoints/{number}"
             self._waypoints.append(
-                self._scene.add_icosphere(
+                self._scene.add_mesh_simple(
                     name,
-                    radius_m,
+                    np.asarray(disc.vertices),
+                    np.asarray(disc.faces),
                     color=_WAYPOINT,
-                    subdivisions=3 if self._is_measured else 2,
                     opacity=0.35,
                     wireframe=not self._is_measured,
                     position=position,
                 )
             )
-            self._scene.add_label(f"{name}/label", str(number + 1), position=(0.0, 0.0, radius_m))
+            self._scene.add_label(f"{name}/label", str(number + 1), position=(0.0, 0.0, 0.02))
 
     def _line(self, name: str, points_m: Floats, color: tuple[int, int, int], width: float) -> None:
         flat = points_m[:, :2]

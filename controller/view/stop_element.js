@@ -24,7 +24,11 @@
         padding: 2px 8px; border-radius: 6px; background: #fff; color: #22303c; box-shadow: 0 1px 4px #0003;
         font: 13px system-ui, sans-serif; pointer-events: none; }
       output:empty { display: none; }
-      #age { background: #d55e00; color: #fff; font-weight: 700; }
+      #age { background: #b34700; color: #fff; font-weight: 700; }
+      @media (prefers-color-scheme: dark) {
+        output { background: #22303c; color: #f1f3f5; }
+        button:focus-visible { outline-color: #fff; }
+      }
     </style><button type="button" disabled>E-STOP <small>(Esc)</small></button>
     <output id="age" role="alert"></output><output id="state" role="status">waiting for the run</output><output id="verdict"></output>`;
   const button = root.querySelector("button");
@@ -32,6 +36,13 @@
   const look_of_page = document.createElement("style");
   look_of_page.textContent = `
     html.snakewalk-old body > :not(#snakewalk-stop) { filter: grayscale(1) opacity(.6) }
+    .mantine-Notifications-root { margin-top: 120px }  /* viser's notices: below the E-STOP */
+    @media (prefers-color-scheme: dark) {  /* viser draws its panels in one scheme for all browsers */
+      html { background: #000 }
+      body > :not(#snakewalk-stop) { filter: invert(1) hue-rotate(180deg) }
+      html.snakewalk-old body > :not(#snakewalk-stop) { filter: invert(1) grayscale(1) opacity(.6) }
+      body canvas, body img { filter: invert(1) hue-rotate(180deg) }
+    }
     @media (max-width: 600px) {  /* viser's panel of a phone: at its full width, below the body */
       .mantine-Paper-root[style*="position: fixed"] { width: 100% !important; max-height: 45% !important }
       .mantine-Paper-root[style*="position: fixed"] .mantine-ScrollArea-content > * { width: 100% !important }
@@ -44,6 +55,11 @@
     text.style.color = color || "";
     button.disabled = !isArmed;
   };
+  const name_page = () => {
+    const title = isOver ? "snakewalk: the run has ended" : "snakewalk";
+    if (document.title !== title) document.title = title;
+  };
+
   const send = (message) => {
     if (!socket || socket.readyState !== WebSocket.OPEN) return false;
     socket.send(message);
@@ -56,10 +72,25 @@
     if (state.pressed || isOver) isPressed = false;
     if (!isPressed) show(state.text, state.color);
     root.querySelector("#verdict").textContent = state.verdict;
-    if (isOver) document.title = "snakewalk: the run has ended";
+    if (isOver) keep_end(state);
     look();
   };
+  // The end is also shown when the page is loaded again and nothing is served any more.
+  const workers = navigator.serviceWorker;  // undefined on an address that is not this machine's
+  if (workers) workers.register("/stop.js").catch(() => {});
+  const keep_end = async (state) => {
+    if (!workers || !window.caches) return;
+    const text = (line) => Object.assign(document.createElement("p"), {textContent: line}).outerHTML;
+    const page = `<!doctype html><meta charset="utf-8"><title>snakewalk: the run has ended</title>`
+      + `<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">`
+      + `<body style="font: 16px system-ui, sans-serif; max-width: 36em; margin: 3em auto; padding: 0 1em">`
+      + text(state.text) + text(state.verdict)
+      + text(`Nothing is served here since ${new Date().toLocaleString()}. The newest run prints its own address.`);
+    const kept = new Response(page, {headers: {"Content-Type": "text/html; charset=utf-8"}});
+    await (await caches.open("snakewalk")).put("/end", kept);
+  };
   const look = () => {  // also while nothing comes
+    name_page();
     const ageMs = performance.now() - newestMs;
     const isOld = !isOver && newestMs !== null && ageMs > SILENT_MS;
     const line = isOld ? `no data for ${(ageMs / 1000).toFixed(1)} s: E-STOP may not arrive; `

@@ -31,16 +31,15 @@ class WaypointPanel:
                 (NEXT, "go there next", "the next click on the ground is the only waypoint left"),
             ):
                 gui.add_button(label, hint=what).on_click(self._arming(word))
-            for word, label, what in (
-                (
-                    CLEAR,
-                    "omit the remaining waypoints",
-                    "the body comes to rest, and waits for a waypoint",
-                ),
-                (END, "end the run", "the body comes to rest, then torque goes off"),
-            ):
-                gui.add_button(label, hint=what).on_click(self._commanding(word))
+            gui.add_button(
+                "omit the remaining waypoints",
+                hint="the body comes to rest, and waits for a waypoint",
+            ).on_click(self._commanding(CLEAR))
             self._text = gui.add_html("")
+            gui.add_divider()
+            gui.add_button(
+                "end the run", color="gray", hint="the body comes to rest, then torque goes off"
+            ).on_click(self._commanding(END))
         self._show(_HINT)
         server.scene.on_click()(self._on_click)
         server.scene.on_click(modifier="shift")(self._on_click)

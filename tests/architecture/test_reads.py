@@ -24,6 +24,8 @@ OPENINGS: Final = {
     "controller/mapping/geo_raster.py": "asks the system for a fault; GDAL reads blocks",
     "controller/report/page.py": "reads a film that the run has just written",
     "controller/runlog/reader.py": "reads a log row by row",
+    "controller/runlog/truth.py": "reads a truth line by line, each up to a size",
+    "controller/view/gate.py": "reads the package's own page",
     "controller/view/stop_element.py": "reads the package's own page",
     "drivers/port/network_port.py": "opens ports by the schemes of config.robot.ports",
     "drivers/port/port_holders.py": "reads the system's tables of processes",

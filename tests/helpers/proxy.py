@@ -1,4 +1,4 @@
-"""A proxy for a browser's connections, which stall or end on request."""
+"""A proxy for a browser's connections, which stall, delay, drop, duplicate or end on request."""
 
 import asyncio
 import threading
@@ -19,17 +19,38 @@ class Proxy:
         self.back.set()
         self.waiting = asyncio.Event()
         """Set when bytes are held back."""
+        self.delay_s = 0.0
+        self.drops = self.duplicates = 0
+        """Pieces of bytes to the browser that are still to be dropped, or sent twice."""
 
     async def pass_on(self, reader: Any, writer: Any) -> None:
-        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.port)
-        await asyncio.gather(
-            self._copy(reader, far_writer, self.flows),
-            self._copy(far_reader, writer, self.back),
-            return_exceptions=True,
-        )
+        try:
+            far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self.port)
+        except OSError:  # the server is gone
+            writer.close()
+            return
+        try:
+            await asyncio.gather(
+                self._copy(reader, far_writer, self.flows),
+                self._copy(far_reader, writer, self.back, to_browser=True),
+                return_exceptions=True,
+            )
+        finally:
+            writer.close()
+            far_writer.close()
 
-    async def _copy(self, reader: Any, writer: Any, passes: asyncio.Event) -> None:
+    async def _copy(
+        self, reader: Any, writer: Any, passes: asyncio.Event, *, to_browser: bool = False
+    ) -> None:
         while data := await reader.read(1 << 16):
+            if self.delay_s:
+                await asyncio.sleep(self.delay_s)
+            if to_browser and self.drops:
+                self.drops -= 1
+                continue
+            if to_browser and self.duplicates:
+                self.duplicates -= 1
+                data += data
             if not passes.is_set():
                 self.waiting.set()
                 await passes.wait()
@@ -66,6 +87,23 @@ class Proxied:
     def _go_on(self) -> None:
         self._proxy.flows.set()
         self._proxy.back.set()
+
+    def delay(self, seconds: float) -> None:
+        """Delay each piece of bytes in both directions."""
+        self._proxy.delay_s = seconds
+
+    def drop(self, pieces: int) -> None:
+        """Drop the next pieces of bytes to the browser."""
+        self._proxy.drops = pieces
+
+    def duplicate(self, pieces: int) -> None:
+        """Send the next pieces of bytes to the browser twice."""
+        self._proxy.duplicates = pieces
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all pieces were dropped or sent twice."""
+        return not self._proxy.drops and not self._proxy.duplicates
 
     def wait_for_a_message(self) -> None:
         """Wait until the browser has sent something that does not pass."""

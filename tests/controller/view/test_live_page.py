@@ -25,7 +25,6 @@ from snakewalk.config.arrays import Image
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.gaits.registry import make_gait
-from snakewalk.controller.motion.command import Refused
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.hands import Hands
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
@@ -34,24 +33,20 @@ from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.row_line import ObserverEnd, RunEnd
+from snakewalk.controller.runlog.row_line import RunEnd
 from snakewalk.controller.runtime.drive import Progress
-from snakewalk.controller.view.browser_gamepad import BrowserGamepad
-from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dashboard import Dashboard
 from snakewalk.controller.view.dead_man import DeadMan
-from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gait_panel import GaitPanel
-from snakewalk.controller.view.live_page import _LivePage
 from snakewalk.controller.view.live_view import LiveView
 from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.controller.view.scene import BodyScene
-from snakewalk.controller.view.stop_element import StopElement
 from snakewalk.controller.view.waypoint_panel import WaypointPanel
 from snakewalk.sim.serve.servo_bus import ServoBus
 from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
 from tests.helpers.bus import PATIENT
+from tests.helpers.page_view import PageView
 from tests.helpers.proxy import Proxied
 
 ROOT = Path(__file__).parents[3]
@@ -104,61 +99,12 @@ def end_of_run(page: Any) -> str:
     return str(state.inner_text()).removeprefix("the run has ended: ")
 
 
-class View:
-    """The page of a run, in the same thread."""
-
-    def __init__(self) -> None:
-        ours, far = socket.socketpair()
-        self.end = RunEnd(ours)
-        self._picture: bytes | None = None
-        self._picture_s = -1.0
-        self.now_s = 100.0
-        freshness = Freshness(lambda: self.now_s)
-        stop = StopElement(freshness)
-        server, self.url = open_page("127.0.0.1", 0, stop, freshness=freshness)
-        self.gamepad = BrowserGamepad(lambda: self.now_s)
-        self.dead_man = DeadMan(lambda: self.now_s)
-        self.page = _LivePage(server, ObserverEnd(far), self.gamepad, stop, freshness)
-
-    def on_row(self, topic: str, row: bytes) -> None:
-        LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
-
-    def on_button(self, path: Path) -> None:
-        LiveView.on_button(self, path)  # type: ignore[arg-type]
-
-    def on_gait(self, name: str, parameters: dict[str, float], limit: str = "") -> None:
-        LiveView.on_gait(self, name, parameters, limit)  # type: ignore[arg-type]
-
-    def on_picture(self, image: Image, time_s: float) -> None:
-        LiveView.on_picture(self, image, time_s)  # type: ignore[arg-type]
-
-    is_enabled = property(lambda self: self.dead_man.is_enabled)
-
-    def pressed(self) -> list[str | Refused]:
-        return fresh_commands(self.end.commands(), self.dead_man, lambda: self.now_s)
-
-    _end = property(lambda self: self.end)
-
-    def close(self) -> None:
-        self.page._server.stop()
-
-    def sent(self) -> Iterator[tuple[str, Any]]:
-        """Rows that the page receives when it asks."""
-        end = self.page._end
-        end.ask()
-        self.end.pump()
-        return end.rows(1.0)
-
-    def shown(self, what: str) -> str:
-        return re.sub("<[^>]*>", " ", getattr(self.page._dashboard, what).content)
-
-
 def test_a_page_shows_a_run_and_its_e_stop_latches_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    view, seen = View(), []
+    view, seen = PageView(), []
 
     def on_progress(progress: Progress) -> None:
         view.page.step()
@@ -197,7 +143,7 @@ def test_what_is_set_in_the_page_changes_the_gait(
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    view = View()
+    view = PageView()
     hands = Hands([view], view)  # type: ignore[list-item, arg-type]
 
     def on_progress(progress: Progress) -> None:
@@ -229,7 +175,7 @@ def test_a_gamepad_in_the_browser_is_held_steers_and_stops(
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    view, cycles = View(), count()
+    view, cycles = PageView(), count()
     hands = Hands([view], view)  # type: ignore[list-item, arg-type]
     texts: list[str] = []
     script = {
@@ -286,7 +232,7 @@ def test_the_body_walks_to_where_the_ground_was_clicked(
 ) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    view = View()
+    view = PageView()
     LiveView.on_course(view)  # type: ignore[arg-type]
     at: dict[str, float] = {}
     cycles = count()
@@ -390,7 +336,7 @@ def test_a_click_finds_the_ground_that_it_falls_on(record: RunRecord) -> None:
 
 def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     cv2 = pytest.importorskip("cv2")
-    view = View()
+    view = PageView()
     view.page._dashboard = Dashboard(view.page._server, record.header)
     colour = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)  # red first
 
@@ -415,7 +361,7 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
 
 def test_a_picture_is_sent_once_before_the_next_pose() -> None:
     pytest.importorskip("cv2")
-    view = View()
+    view = PageView()
     view.on_picture(np.zeros((48, 64, 3), dtype=np.uint8), 1.0)
     sent = []
     for _ in range(2):
