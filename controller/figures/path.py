@@ -20,6 +20,8 @@ _BODY_SPACING = 1.3  # body lengths between the bodies drawn
 _MARGIN_M = 0.35
 _POINTS = 20_000
 """Most points of a track (ours)."""
+_CURSOR_POINTS = 120
+"""Points of the track on which the page moves a cursor; matplotlib thins a line of 128."""
 _BODIES = 200
 """Most bodies drawn (ours)."""
 
@@ -52,6 +54,10 @@ def path_figure(record: RunRecord) -> Figure | None:
         linestyle="-" if is_measured else (0, (3, 2)),
     )
     axes.plot(*pose.head_m[::step, :2].T, color=HEAD, linewidth=0.9, label="head")
+    rows = np.flatnonzero(np.isfinite(pose.centre_m[:, 0]))
+    rows = rows[np.linspace(0, len(rows) - 1, _CURSOR_POINTS).astype(int)] if len(rows) else rows
+    times = " ".join(f"{time_s:.2f}" for time_s in pose.time_s[rows])
+    axes.plot(*pose.centre_m[rows, :2].T, alpha=0.0, gid=f"track {times}")
     axes.set_xlabel("x (m)")
     axes.set_ylabel("y (m)")
     legend_above(axes, 3)

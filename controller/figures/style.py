@@ -182,6 +182,10 @@ def data_uri(figure: Figure) -> str:
     """Figure as an SVG image for an HTML page; the same figure gives the same bytes."""
     buffer = BytesIO()
     _lay_out(FigureCanvasSVG(figure), FigureCanvasSVG.fixed_dpi)
+    times = {axes.get_xlim() for axes in figure.axes if axes.get_xlabel().startswith("time")}
+    for axes in figure.axes:
+        if axes.get_xlim() in times:  # the page moves a cursor over them
+            axes.set_gid("time {} {}".format(*axes.get_xlim()))
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 

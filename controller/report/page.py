@@ -232,8 +232,8 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
             )
         )
     if n.waypoints == 0:  # a gait has no path, and its shape need not go along the body
-        return [("Travelled", f"{_fmt(n.travelled_m, 2)} m", duration_text), *tiles[5:]]
-    return tiles
+        tiles = [("Travelled", f"{_fmt(n.travelled_m, 2)} m", duration_text), *tiles[5:]]
+    return [tile for tile in tiles if not tile[1].startswith("–")]
 
 
 def film_on_page(film: Path, out_dir: Path, start_s: float = 0.0, speed_up: float = 1.0) -> Film:

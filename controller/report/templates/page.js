@@ -1,14 +1,94 @@
 const film = document.querySelector("video");
 const plot = document.getElementById("plot");
-let mark = null;
 const toFilm = t => (t - film.dataset.start) / film.dataset.speed;
 const toRun = t => +film.dataset.start + t * film.dataset.speed;
-document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("click", () => {
-  const t = +b.dataset.time;
+// One cursor: film, curves, map and heat maps show the same time, and each of them sets it.
+const cursors = [];
+const clock = document.getElementById("clock");
+const show = t => {
+  cursors.forEach(draw => draw(t));
+  if (clock) clock.textContent = `${t.toFixed(2)} s`;
+};
+const seek = t => {
   if (film) { film.pause(); film.currentTime = Math.max(toFilm(t), 0); }
-  if (mark) mark(t);
+  show(t);
+};
+document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("click", () => {
+  seek(+b.dataset.time);
   (film || plot || b).scrollIntoView({ behavior: "smooth", block: "center" });
 }));
+if (film) {
+  let shown = -1;
+  const follow = () => {
+    if (film.currentTime !== shown) show(toRun(shown = film.currentTime));
+    requestAnimationFrame(follow);
+  };
+  film.addEventListener("loadeddata", follow, { once: true });
+}
+// Pictures: "time FROM TO" names a panel over time, "track T1 T2 ..." the points of the way.
+const numbers = text => (text.match(/-?\d+(\.\d+)?(e-?\d+)?/g) || []).map(Number);
+const overlay = (img, svg) => {
+  const [, , width, height] = numbers(svg.documentElement.getAttribute("viewBox"));
+  const box = document.createElement("div");
+  box.className = "picture";
+  img.replaceWith(box);
+  box.append(img);
+  const put = (kind, x, y, h) => {
+    const line = document.createElement("i");
+    line.className = kind;
+    Object.assign(line.style, { left: `${100 * x / width}%`, top: `${100 * y / height}%` });
+    if (h) line.style.height = `${100 * h / height}%`;
+    box.append(line);
+    return line;
+  };
+  const pick = act => {
+    const at = event => {
+      if (event.type === "pointermove" && !event.buttons) return;
+      const rect = img.getBoundingClientRect();
+      act((event.clientX - rect.left) / rect.width * width,
+        (event.clientY - rect.top) / rect.height * height);
+    };
+    box.addEventListener("pointerdown", at);
+    box.addEventListener("pointermove", at);
+  };
+  svg.querySelectorAll("g[id^='time ']").forEach(panel => {
+    const [from, to] = numbers(panel.id);
+    const edges = numbers(panel.querySelector("path").getAttribute("d"));
+    const xs = edges.filter((_, k) => k % 2 === 0), ys = edges.filter((_, k) => k % 2);
+    const left = Math.min(...xs), right = Math.max(...xs), top = Math.min(...ys);
+    const line = put("cursor", left, top, Math.max(...ys) - top);
+    cursors.push(t => {
+      const share = (t - from) / (to - from);
+      line.hidden = !(share >= 0 && share <= 1);
+      line.style.left = `${100 * (left + share * (right - left)) / width}%`;
+    });
+    pick((x, y) => {
+      if (x >= left && x <= right && y >= top && y <= Math.max(...ys))
+        seek(from + (x - left) / (right - left) * (to - from));
+    });
+  });
+  svg.querySelectorAll("g[id^='track ']").forEach(way => {
+    const times = numbers(way.id), points = numbers(way.querySelector("path").getAttribute("d"));
+    if (points.length !== 2 * times.length) return;
+    const dot = put("dot", points[0], points[1]);
+    cursors.push(t => {
+      const k = Math.max(times.findLastIndex(s => s <= t), 0), n = Math.min(k + 1, times.length - 1);
+      const share = n === k ? 0 : Math.min((t - times[k]) / (times[n] - times[k] || 1), 1);
+      const at = c => points[2 * k + c] + Math.max(share, 0) * (points[2 * n + c] - points[2 * k + c]);
+      dot.style.left = `${100 * at(0) / width}%`;
+      dot.style.top = `${100 * at(1) / height}%`;
+    });
+    pick((x, y) => {
+      const far = times.map((_, k) => Math.hypot(points[2 * k] - x, points[2 * k + 1] - y));
+      seek(times[far.indexOf(Math.min(...far))]);
+    });
+  });
+};
+document.querySelectorAll("img[src^='data:image/svg+xml;base64,']").forEach(img => {
+  const text = new TextDecoder().decode(
+    Uint8Array.from(atob(img.src.split(",")[1]), c => c.charCodeAt(0)));
+  overlay(img, new DOMParser().parseFromString(text, "image/svg+xml"));
+});
 (async () => {
   if (!plot) return;
   const unpacked = id => {
@@ -28,9 +108,22 @@ document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("
   spec.layout.shapes = [...shapes, now];
   await Plotly.newPlot(plot, spec.traces, spec.layout, { responsive: true,
     displaylogo: false, displayModeBar: innerWidth > 640 && "hover" });
-  mark = t => Plotly.relayout(plot, { [`shapes[${shapes.length}].x0`]: t,
-    [`shapes[${shapes.length}].x1`]: t });
-  if (film) film.addEventListener("timeupdate", () => mark(toRun(film.currentTime)));
+  let isDrawing = false, next = null;
+  const mark = async t => {  // no more often than it can be drawn
+    next = t;
+    if (isDrawing) return;
+    isDrawing = true;
+    while (next !== null) {
+      const at = next;
+      next = null;
+      await Plotly.relayout(plot, { [`shapes[${shapes.length}].x0`]: at,
+        [`shapes[${shapes.length}].x1`]: at });
+    }
+    isDrawing = false;
+  };
+  cursors.push(mark);
+  plot.on("plotly_click", event => seek(event.points[0].x));
+  if (!film) show(spec.mark_s);
   document.getElementById("joint").addEventListener("change", change => {
     const rows = spec.joints[+change.target.value];
     Plotly.restyle(plot, { y: rows }, rows.map((_, k) => spec.first + k));

@@ -31,7 +31,7 @@ def test_the_plan_is_strong_and_paths_that_were_laid_again_are_pale(record: RunR
     lines = [
         line for line in drawn if any(np.array_equal(line.get_xydata(), p[:, :2]) for _, p in paths)
     ]
-    assert len(drawn) == len(lines) + 2, "beside the tracks of the head and of the centre"
+    assert len(drawn) == len(lines) + 3, "beside the tracks of head and centre, and the cursor's"
     assert [line.get_color() for line in lines] == [PATH, GREY, GREY]
     named = [str(line.get_label()) for line in lines]
     assert named[:2] == ["planned path", "laid again"]

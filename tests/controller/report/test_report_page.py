@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -185,6 +186,23 @@ def test_the_curves_are_the_logs_and_their_library_is_on_the_page(record: RunRec
     )
 
 
+def shared_cursor(page: Any, share: float) -> tuple[float, str, list[float]]:
+    """Click into a map of the joint angles; time of the curves, place on the map, cursors."""
+    angles = page.locator("section", has=page.get_by_role("heading", name="Joint angles"))
+    box = angles.locator(".picture").bounding_box()
+    angles.locator(".picture").click(
+        position={"x": share * box["width"], "y": 0.15 * box["height"]}
+    )
+    return (
+        page.evaluate("document.querySelector('#plot').layout.shapes.at(-1).x0"),
+        page.evaluate("document.querySelector('.dot').style.left"),
+        page.evaluate(
+            "[...document.querySelectorAll('.cursor')].filter((line) => !line.hidden)"
+            ".map((line) => parseFloat(line.style.left))"
+        ),
+    )
+
+
 @pytest.mark.slow
 @IN_A_BROWSER
 def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_page(
@@ -223,6 +241,16 @@ def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_p
         span = whole[1] - whole[0]
         assert first == pytest.approx(whole[0] + 0.5 * span, abs=0.02 * span)
         assert last == pytest.approx(whole[0] + 0.75 * span, abs=0.02 * span)
+
+        shown = [shared_cursor(page, share) for share in (0.3, 0.6)]
+        assert shown[0][0] < shown[1][0] - 1.0  # the time in the curves
+        assert shown[0][1] != shown[1][1]  # the place on the map
+        assert len(shown[0][2]) == len(shown[1][2]) >= 3
+        assert all(before < after for before, after in zip(shown[0][2], shown[1][2], strict=True))
+        page.emulate_media(color_scheme="dark")
+        look = "getComputedStyle(document.body).backgroundColor"
+        assert page.evaluate(look) == "rgb(20, 25, 30)"
+        page.emulate_media(color_scheme="light")
 
         page.set_viewport_size({"width": 400, "height": 800})
         page.wait_for_function("document.documentElement.scrollWidth <= 400")
