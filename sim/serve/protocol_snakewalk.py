@@ -41,7 +41,9 @@ class Serial(SerialBase):
         try:
             line = LINES.get(url) or ServedLine(url, self.baudrate)
         except PortError as error:
-            raise SerialException(f"{error}; or open bus.url during its test") from error
+            raise SerialException(
+                f"{url}: no bus has this URL; open bus.url during its test; {error}"
+            ) from error
         if not line.openPort():
             raise SerialException(f"{self.port}: the port has vanished")
         self._line = line
