@@ -36,7 +36,6 @@ class WaypointPanel:
                 hint="the body comes to rest, and waits for a waypoint",
             ).on_click(self._commanding(CLEAR))
             self._text = gui.add_html("")
-            gui.add_divider()
             gui.add_button(
                 "end the run", color="gray", hint="the body comes to rest, then torque goes off"
             ).on_click(self._commanding(END))
