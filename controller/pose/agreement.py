@@ -185,7 +185,7 @@ class Agreement:
         is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
         agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
         if named is None and not is_alike and (self._named or not self.has_agreed):
-            if agrees and self._named is None and self.is_cautious:
+            if agrees and self._named is None and self.is_cautious and not self._is_level:
                 return  # hills may hide the swing for a while
             named = self._named  # a window without a swing clears nothing
             agrees = False
