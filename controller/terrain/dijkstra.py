@@ -6,7 +6,7 @@ from snakewalk.config.arrays import Floats, Indices, Ints
 from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.drivers.compiling import compiled
 
-_SETTLED_IN_STEP = 400
+_SETTLED_IN_STEP = 1500
 """Nodes whose distance becomes final in a step; each has up to sixteen arcs."""
 _UNITS = 1000
 

@@ -7,22 +7,28 @@ points are therefore joined by safe ground if and only if edges of cells join th
 between opposite corners of a cell.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import dijkstra
 
-from snakewalk.config.arrays import Bools, Floats, Indices
+from snakewalk.config.arrays import Bools, Floats, Indices, Ints
+from snakewalk.controller.terrain.dijkstra import shortest_tree
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.relief import Relief
-from snakewalk.controller.terrain.safe_graph import SafeGraph
+from snakewalk.controller.terrain.safe_graph import SAMPLE_M, SafeGraph
 
 SAFE_RISK = 1.0 - 1e-9
 """Risk of nodes and saddles; the reserve covers the rounding of interpolated values."""
-_CHUNK = 200_000
+_SAMPLES_IN_STEP = 10_000
+_UNITS = 1000
+_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Rows and columns from a node to the neighbours with higher numbers."""
 
 
-def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats) -> Floats | None:
+def exact_route(
+    relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
+) -> Steps[Floats | None]:
     """(n, 2) corners of the cheapest safe path along cells, both ends included, or None.
 
     Straight safe pieces join the corners. An unsafe start is joined straight to the nearest safe
@@ -38,54 +44,69 @@ def exact_route(relief: Relief, graph: SafeGraph, start_m: Floats, end_m: Floats
     cells = _cells(relief, start_m, end_m)
     if cells is None:
         return None
-    edges = _edges(cells)
-    width = len(cells.x_m)
-    index = np.arange(cells.safe.size)
-    nodes_m = np.stack([cells.x_m[index % width], cells.y_m[index // width]], axis=-1)
+    for rows in cells.bands():
+        yield _UNITS
+        cells.risk[rows] = relief.risk(*np.meshgrid(cells.x_m, cells.y_m[rows]))
+        cells.safe[rows] = cells.risk[rows] <= SAFE_RISK
+    for end, point in zip(cells.ends, (start_m, end_m), strict=True):
+        cells.safe.flat[end] |= bool(relief.safe(*point))
+    ends, weights = yield from _arcs(cells, graph)
     start, end = cells.ends
-    score, towards = _tree(nodes_m, edges, graph, end)
-    lead = [start_m]
+    starts = np.arange(0, ends.size + 1, ends.shape[1])
+    score, towards = yield from shortest_tree(starts, ends.ravel(), weights.ravel(), end)
+    yield _UNITS
     if not relief.safe(*start_m):
-        gap = np.where(np.isfinite(score), np.hypot(*(nodes_m - start_m).T), np.inf)
-        start = int(np.argmin(gap))
+        gap = np.hypot(*np.meshgrid(cells.x_m - start_m[0], cells.y_m - start_m[1])).ravel()
+        start = int(np.argmin(np.where(np.isfinite(score), gap, np.inf)))
     if not np.isfinite(score[start]):
         return None
-    saddles = {
-        (int(a), int(b)): float(x)
-        for a, b, x in zip(*(part[~np.isnan(edges.saddle_x_m)] for part in edges), strict=True)
-    }
-    current = start
-    corners = [*lead, nodes_m[start]]
-    while current != end:
-        onward = int(towards[current])
-        x = saddles.get((current, onward), saddles.get((onward, current)))
-        if x is not None:
-            corners += [np.array([x, nodes_m[node][1]]) for node in (current, onward)]
-        corners.append(nodes_m[onward])
-        current = onward
+    corners = [start_m, *cells.corners(start, end, towards)]
     return _distinct(np.array(corners))
 
 
 class _Cells(NamedTuple):
-    """Lines (w,) and (h,), risk and safety (h, w) of crossings, and the numbers of both ends."""
+    """Lines (w,) and (h,) between cells, whose crossings are the nodes."""
 
     x_m: Floats
     y_m: Floats
     risk: Floats
+    """(h, w)"""
     safe: Bools
-    ends: tuple[int, int]
-
-
-class _Edges(NamedTuple):
-    """Joined nodes (k,) and (k,), and (k,) x of the saddle between them or NaN."""
-
-    a: Indices
-    b: Indices
+    """(h, w)"""
     saddle_x_m: Floats
+    """(h - 1, w - 1) x of the safe saddle between two safe corners of a cell, or NaN."""
+    ends: tuple[int, int]
+    """Numbers of the nodes at start and end."""
+
+    def bands(self) -> list[slice]:
+        """Rows of nodes, cut into pieces for a step."""
+        height, width = self.safe.shape
+        samples = 2.0 + self.longest_m / SAMPLE_M
+        rows = max(1, int(_SAMPLES_IN_STEP / samples / width))
+        return [slice(row, min(row + rows, height)) for row in range(0, height, rows)]
+
+    @property
+    def longest_m(self) -> float:
+        """Longest diagonal of a cell."""
+        return float(np.hypot(np.diff(self.x_m).max(), np.diff(self.y_m).max()))
+
+    def corners(self, start: int, end: int, towards: Indices) -> Iterator[Floats]:
+        """Places (2,) of nodes and saddles from one node to another."""
+        width = len(self.x_m)
+        row, column = divmod(start, width)
+        yield np.array([self.x_m[column], self.y_m[row]])
+        while row * width + column != end:
+            next_row, next_column = divmod(int(towards[row * width + column]), width)
+            if row != next_row and column != next_column:
+                x = self.saddle_x_m[min(row, next_row), min(column, next_column)]
+                if not np.isnan(x):
+                    yield from (np.array([x, self.y_m[r]]) for r in (row, next_row))
+            row, column = next_row, next_column
+            yield np.array([self.x_m[column], self.y_m[row]])
 
 
 def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
-    """Cells of the ground within the margin, or None."""
+    """Cells of the ground within the margin, or None; their risk is not computed yet."""
     ground = relief.ground
     margin = relief.config.edge_margin_m
     lines = []
@@ -100,76 +121,72 @@ def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
         through = np.clip(points[:, axis], near, far)
         lines.append(np.unique(np.concatenate([[near, far], inside, through])))
     x, y = lines
-    risk = relief.risk(*np.meshgrid(x, y))
-    safe = risk <= SAFE_RISK
-    numbers = []
-    for point in points:
-        column = int(np.argmin(np.abs(x - point[0])))
-        row = int(np.argmin(np.abs(y - point[1])))
-        safe[row, column] |= bool(relief.safe(*point))
-        numbers.append(row * len(x) + column)
-    return _Cells(x, y, risk, safe, (numbers[0], numbers[1]))
+    shape = len(y), len(x)
+    columns = np.abs(x - points[:, :1]).argmin(axis=1)
+    rows = np.abs(y - points[:, 1:]).argmin(axis=1)
+    first, last = (rows * len(x) + columns).tolist()
+    saddle_x_m = np.empty((shape[0] - 1, shape[1] - 1))
+    return _Cells(x, y, np.empty(shape), np.empty(shape, bool), saddle_x_m, (first, last))
 
 
-def _edges(cells: _Cells) -> _Edges:
-    """Sides of cells between safe corners, diagonals of safe cells, and paths over saddles."""
-    safe = cells.safe
-    number = np.arange(cells.safe.size).reshape(cells.safe.shape)
-    corners = safe[:-1, :-1], safe[:-1, 1:], safe[1:, :-1], safe[1:, 1:]
-    all_safe = corners[0] & corners[1] & corners[2] & corners[3]
-    lower_left, lower_right = number[:-1, :-1], number[:-1, 1:]
-    upper_left, upper_right = number[1:, :-1], number[1:, 1:]
-    across, along = safe[:, :-1] & safe[:, 1:], safe[:-1, :] & safe[1:, :]
-    pairs = [
-        (number[:, :-1][across], number[:, 1:][across]),
-        (number[:-1, :][along], number[1:, :][along]),
-        (lower_left[all_safe], upper_right[all_safe]),
-        (lower_right[all_safe], upper_left[all_safe]),
-    ]
-    plain = sum(len(pair[0]) for pair in pairs)
-    x_m = _saddles_m(cells)
-    rising = ~np.isnan(x_m) & corners[0] & corners[3] & ~corners[1] & ~corners[2]
-    falling = ~np.isnan(x_m) & corners[1] & corners[2] & ~corners[0] & ~corners[3]
-    pairs += [
-        (lower_left[rising], upper_right[rising]),
-        (lower_right[falling], upper_left[falling]),
-    ]
-    return _Edges(
-        np.concatenate([pair[0] for pair in pairs]),
-        np.concatenate([pair[1] for pair in pairs]),
-        np.concatenate([np.full(plain, np.nan), x_m[rising], x_m[falling]]),
-    )
+def _arcs(cells: _Cells, graph: SafeGraph) -> Steps[tuple[Ints, Floats]]:
+    """Ends (n, 8) and weights (n, 8) of the arcs of each node; infinite where there is none.
+
+    An arc leads against the direction of travel, as the tree grows from the target.
+    """
+    width = len(cells.x_m)
+    shape = cells.safe.size, 2 * len(_NEIGHBOURS)
+    ends, weights = np.empty(shape, np.int64), np.empty(shape)
+    for rows in cells.bands():
+        yield _UNITS
+        nodes = slice(rows.start * width, rows.stop * width)
+        ends[nodes] = np.arange(nodes.start, nodes.stop)[:, None]
+        weights[nodes] = np.inf
+    for rows in cells.bands():
+        _add_saddles(cells, rows)
+        for k in range(len(_NEIGHBOURS)):
+            yield _UNITS
+            a, b, there, back = _joined(cells, graph, rows, *_NEIGHBOURS[k])
+            ends[a, k], weights[a, k] = b, back
+            ends[b, ~k], weights[b, ~k] = a, there
+    return ends, weights
 
 
-def _saddles_m(cells: _Cells) -> Floats:
-    """(h - 1, w - 1) x of each cell's saddle if it is in the cell and safe, else NaN."""
-    f = cells.risk
-    a, b, c = f[:-1, :-1], f[:-1, 1:] - f[:-1, :-1], f[1:, :-1] - f[:-1, :-1]
-    d = f[1:, 1:] - f[1:, :-1] - b
+def _add_saddles(cells: _Cells, band: slice) -> None:
+    """Write the saddles of the cells above the rows of a band."""
+    some = slice(band.start, min(band.stop, len(cells.y_m) - 1))
+    above = slice(some.start + 1, some.stop + 1)
+    f, g = cells.risk[some], cells.risk[above]
+    safe, over = cells.safe[some], cells.safe[above]
+    a, b, c = f[:, :-1], f[:, 1:] - f[:, :-1], g[:, :-1] - f[:, :-1]
+    d = g[:, 1:] - g[:, :-1] - b
     with np.errstate(all="ignore"):
         u, v = -c / d, -b / d
-        safe = (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1) & (a - b * c / d <= SAFE_RISK)
-    return np.where(safe, cells.x_m[:-1] + u * np.diff(cells.x_m), np.nan)
+        joins = (u >= 0) & (u <= 1) & (v >= 0) & (v <= 1) & (a - b * c / d <= SAFE_RISK)
+        joins &= (safe[:, :-1] == over[:, 1:]) & (safe[:, 1:] == over[:, :-1])
+        joins &= safe[:, :-1] != safe[:, 1:]
+        cells.saddle_x_m[some] = np.where(joins, cells.x_m[:-1] + u * np.diff(cells.x_m), np.nan)
 
 
-def _tree(nodes_m: Floats, edges: _Edges, graph: SafeGraph, target: int) -> tuple[Floats, Indices]:
-    """Cost (n,) to the target and the next node (n,) towards it."""
-    there = np.empty(len(edges.a))
-    back = np.empty(len(edges.a))
-    for begin in range(0, len(edges.a), _CHUNK):
-        piece = slice(begin, begin + _CHUNK)
-        from_m, to_m = nodes_m[edges.a[piece]], nodes_m[edges.b[piece]]
-        there[piece], back[piece], _ = graph.edge_cost(from_m, to_m)
-    n = len(nodes_m)
-    weight = np.maximum(np.concatenate([there, back]), 1e-12)  # a sparse zero would be no edge
-    ends = np.concatenate([edges.b, edges.a]), np.concatenate([edges.a, edges.b])
-    score, towards = dijkstra(
-        csr_array(coo_array((weight, ends), shape=(n, n))),
-        directed=True,
-        indices=[target],
-        return_predecessors=True,
-    )
-    return score[0], towards[0].astype(np.intp)
+def _joined(
+    cells: _Cells, graph: SafeGraph, band: slice, up: int, right: int
+) -> tuple[Indices, Indices, Floats, Floats]:
+    """Nodes (k,) of a band's rows, neighbours (k,) that safe ground joins to them, and costs."""
+    height, width = cells.safe.shape
+    rows = np.arange(band.start, min(band.stop, height - up))[:, None]
+    columns = np.arange(max(0, -right), width - max(0, right))
+    joined = cells.safe[rows, columns] & cells.safe[rows + up, columns + right]
+    if up and right:
+        sides = cells.safe[rows, columns + right] & cells.safe[rows + up, columns]
+        joined &= sides | ~np.isnan(cells.saddle_x_m[rows, columns + min(0, right)])
+    row, column = np.nonzero(joined)
+    row += band.start
+    column += columns[0]
+    a, b = row * width + column, (row + up) * width + column + right
+    from_m = np.stack([cells.x_m[column], cells.y_m[row]], axis=-1)
+    to_m = np.stack([cells.x_m[column + right], cells.y_m[row + up]], axis=-1)
+    there, back, _ = graph.edge_cost(from_m, to_m, cells.longest_m)
+    return a, b, there, back
 
 
 def _distinct(points: Floats) -> Floats:

@@ -3,6 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Bools, Floats
@@ -35,7 +36,11 @@ class TerrainPlanner:
     """
 
     def __init__(
-        self, ground: HeightField | None, config: PlannerConfig, *, exact: bool = True
+        self,
+        ground: HeightField | None,
+        config: PlannerConfig,
+        *,
+        exact: bool = True,
     ) -> None:
         """Build fields and graph.
 
@@ -53,6 +58,7 @@ class TerrainPlanner:
         self._waypoint_turns = WaypointTurns(
             self._turn_cost_per_m, self._least_per_m, self._all_safe, config.bend_radius_m
         )
+        scipy.interpolate.CubicSpline  # noqa: B018 - loads before a control cycle needs it
         self._numbers = [0]
         """Number of each point of a call, for messages; 0 is the start."""
         self._planned: tuple[Floats, SplinePath] | None = None
@@ -85,7 +91,10 @@ class TerrainPlanner:
                 within a centimetre of the first point.
 
         """
-        return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
+        try:
+            return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
+        except _NoRouteError as error:
+            raise InputError(f"{error}; {route_advice(error.relief, error.ends_m)}") from None
 
     def in_steps(
         self,
@@ -95,7 +104,7 @@ class TerrainPlanner:
         avoid_m: ArrayLike = (),
         number: int = 1,
     ) -> Steps[SplinePath]:
-        """Plan as a call does, in steps."""
+        """Plan as a call does, in steps, without advice where no route exists."""
         points = np.asarray(points_m, float)
         avoid = np.asarray(avoid_m, float).reshape(-1, 2)
         kept = _distinct_points(points)
@@ -133,29 +142,30 @@ class TerrainPlanner:
 
     def _path_through(self, points: Floats, graph: SafeGraph, relief: Relief) -> Steps[SplinePath]:
         """Path through safe points: by the graph's nodes, or else by all safe ground."""
-        fault = ""
         try:
             corners = yield from self._polygon(points, graph)
             return (yield from self._spline(corners, points, relief))
         except InputError as error:
             if not self._exact:
                 raise
-            fault = str(error)
+            fault = error
         legs = []
         for k in range(1, len(points)):
-            yield _EXACT_STEP
-            leg = exact_route(relief, graph, points[k - 1], points[k])
+            leg = yield from exact_route(relief, graph, points[k - 1], points[k])
             if leg is None:
-                raise InputError(self._blocked_message(k, points))
+                raise self._no_route(k, points)
             legs.append(leg)
         for shorten in (True, False):
-            shown = [_shortened_path(leg, graph) if shorten else leg for leg in legs]
-            corners = np.vstack([shown[0], *(leg[1:] for leg in shown[1:])])
+            corners = points[:1]
+            for leg in legs:
+                shown = (yield from _shortened_path(leg, graph)) if shorten else leg
+                corners = np.vstack([corners, shown[1:]])
             free = ~(corners[:, None] == points[None]).all(axis=-1).any(axis=1)
-            path = rounded(corners, free, lambda places: relief.safe(*places.T))
+            path = yield from rounded(corners, free, lambda places: relief.safe(*places.T))
+            yield 500
             if not len(self._unsafe(path, points[0], relief)):
                 return path
-        raise InputError(fault)
+        raise fault
 
     def _path_from_elsewhere(self, points: Floats, avoid: Floats) -> Steps[SplinePath]:
         """Path from elsewhere: a new leg to the next waypoint, then the previous plan.
@@ -225,7 +235,7 @@ class TerrainPlanner:
         pieces = [points[:1]]
         for k in range(1, len(points)):
             nearest, there = anchors[k - 1], anchors[k]
-            if there is not None and graph is not self.graph:
+            if there is not None:
                 yield from graph.tree_in_steps(there)
             yield 300
             if k == 1 and there is not None:  # the nearest node may be on an island of safe nodes
@@ -234,7 +244,7 @@ class TerrainPlanner:
                 None if nearest is None or there is None else graph.cheapest_path(nearest, there)
             )
             if nodes is None:
-                raise InputError(self._blocked_message(k, points))
+                raise self._no_route(k, points)
             nodes = np.vstack([points[k - 1], nodes, points[k]])
             corners = yield from straighten_in_steps(nodes, graph)
             pieces.append(corners[1:])
@@ -277,15 +287,16 @@ class TerrainPlanner:
             safe[: int(np.argmax(safe))] = True
         return s[~safe]
 
-    def _blocked_message(self, k: int, points: Floats) -> str:
+    def _no_route(self, k: int, points: Floats) -> "_NoRouteError":
         assert self.relief is not None
         config = self.relief.config
-        advice = route_advice(self.relief, points[k - 1 : k + 1])
-        return (
+        return _NoRouteError(
             f"{self._name(k, points[k])} cannot be reached from "
             f"{self._name(k - 1, points[k - 1])}: no way "
             f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
-            f"variance of {config.variance_limit_m2:.2g} m2; {advice}"
+            f"variance of {config.variance_limit_m2:.2g} m2",
+            self.relief,
+            points[k - 1 : k + 1],
         )
 
     def _fault(self, k: int, point: Floats) -> list[str]:
@@ -307,6 +318,15 @@ class TerrainPlanner:
         if k == 0:
             return f"start {where}" if self._numbers[0] == 0 else where
         return f"waypoint {self._numbers[k]} {where}"
+
+
+class _NoRouteError(InputError):
+    """No safe ground joins two points; a search for advice needs more time than a cycle has."""
+
+    def __init__(self, fault: str, relief: Relief, ends_m: Floats) -> None:
+        super().__init__(fault)
+        self.relief = relief
+        self.ends_m = ends_m
 
 
 def _distinct_points(points: Floats) -> list[int]:
@@ -365,12 +385,11 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
 
 _REACH = 14  # largest number of nodes that a straight piece may skip, besides the whole leg
 _SAMPLES_IN_STEP = 6000
-_EXACT_STEP = 50_000  # a search of all safe ground is one step; it is rare
 _CORNER_M = 1.0  # cost of a corner, as metres of path: few corners make wide bends
 
 
-def _shortened_path(corners_m: Floats, graph: SafeGraph) -> Floats:
-    while len(shorter := at_once(straighten_in_steps(corners_m, graph))) < len(corners_m):
+def _shortened_path(corners_m: Floats, graph: SafeGraph) -> Steps[Floats]:
+    while len(shorter := (yield from straighten_in_steps(corners_m, graph))) < len(corners_m):
         corners_m = shorter
     return corners_m
 
@@ -381,11 +400,12 @@ def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:
     Consecutive points count as joined; any other piece must be safe along its length.
     """
     last = len(nodes_m) - 1
-    pairs = [(i, j) for j in range(1, last + 1) for i in range(max(0, j - _REACH), j)]
+    b = np.repeat(np.arange(1, last + 1), _REACH)
+    a = b - np.tile(np.arange(_REACH, 0, -1), last)
+    a, b = a[a >= 0], b[a >= 0]
     if last > _REACH:
-        pairs.append((0, last))
-    a, b = np.array(pairs).T
-    yield 200 + 2 * len(a)
+        a, b = np.append(a, 0), np.append(b, last)
+    yield 300
     longest_m = float(np.hypot(*(nodes_m[b] - nodes_m[a]).T).max())
     samples = 1 + longest_m / SAMPLE_M
     costs = list[Floats]()
@@ -398,7 +418,7 @@ def straighten_in_steps(nodes_m: Floats, graph: SafeGraph) -> Steps[Floats]:
         safes.append(is_safe)
     cost = np.concatenate(costs)
     safe = np.concatenate(safes)
-    yield 200 + len(a)
+    yield 200 + len(a) // 4
     cost = np.where(safe | (b - a == 1), cost, np.inf) + _CORNER_M * graph.length_weight
     best = np.full(last + 1, np.inf)
     back = np.zeros(last + 1, dtype=int)

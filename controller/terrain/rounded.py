@@ -4,21 +4,22 @@ A cubic through points overshoots. Here a parabola between points of two sides r
 and stays inside their triangle.
 """
 
-import itertools
 from collections.abc import Callable
 
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 
 _STEP_M = 0.01
 _LONGEST_SIDE_M = 1.0
 """Longest part of a side that a bend uses (ours)."""
 _HALVINGS = 10
+_CORNER_UNITS = 500
 
 
-def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> SplinePath:
+def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> Steps[SplinePath]:
     """Path along a polygon whose free corners are rounded as widely as ``safe`` allows.
 
     Args:
@@ -34,6 +35,7 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
         pieces.append(corners_m[k : k + 1])
         if not free[k]:
             continue
+        yield _CORNER_UNITS
         back = -sides[k - 1] / length[k - 1]
         onward = sides[k] / length[k]
         reach = min(0.5 * length[k - 1], 0.5 * length[k], _LONGEST_SIDE_M)
@@ -44,6 +46,7 @@ def rounded(corners_m: Floats, free: Bools, safe: Callable[[Floats], Bools]) -> 
                 break
             reach *= 0.5
     pieces.append(corners_m[-1:])
+    yield _CORNER_UNITS
     return SplinePath.tabulated(_with_even_points(np.vstack(pieces)))
 
 
@@ -56,11 +59,10 @@ def _bend(corner: Floats, back: Floats, onward: Floats) -> Floats:
 
 def _with_even_points(points: Floats) -> Floats:
     """Insert points into (n, 2) so that none are over a centimetre apart."""
-    out = [points[:1]]
-    for before, point in itertools.pairwise(points):
-        gap = float(np.hypot(*(point - before)))
-        if gap < 1e-9:
-            continue
-        count = max(1, int(np.ceil(gap / _STEP_M - 1e-6)))
-        out.append(before + (np.arange(1, count + 1) / count)[:, None] * (point - before))
-    return np.ascontiguousarray(np.vstack(out))
+    gap = np.hypot(*np.diff(points, axis=0).T)
+    count = np.where(gap < 1e-9, 0, np.ceil(gap / _STEP_M - 1e-6).clip(1.0)).astype(int)
+    piece = np.repeat(np.arange(len(gap)), count)
+    step = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
+    part = (step / count[piece])[:, None]
+    between = points[piece] + part * (points[piece + 1] - points[piece])
+    return np.ascontiguousarray(np.vstack([points[:1], between]))

@@ -18,7 +18,7 @@ from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.dijkstra import shortest_tree
-from snakewalk.controller.terrain.in_steps import Steps
+from snakewalk.controller.terrain.in_steps import Steps, at_once
 from snakewalk.controller.terrain.relief import (
     EDGE_TOLERANCE_M,
     Relief,
@@ -177,7 +177,10 @@ class SafeGraph:
         return np.isfinite(self.costs_to(target))
 
     def tree_in_steps(self, target: int) -> Steps[None]:
-        """Prepare ``can_reach`` and ``cheapest_path`` for a target."""
+        """Prepare ``can_reach`` and ``cheapest_path`` for a target.
+
+        Cached: replanning keeps the waypoints and changes the start.
+        """
         if target in self._trees:
             return
         edges = self._edges
@@ -188,7 +191,8 @@ class SafeGraph:
 
     def costs_to(self, target: int) -> Floats:
         """(n,) cost of the cheapest path to ``target``; infinite without a path."""
-        return self._tree(target)[0]
+        at_once(self.tree_in_steps(target))
+        return self._trees[target][0]
 
     def costs_from(self, point_m: Floats, reach_m: float) -> Floats:
         """(n,) cost of the cheapest path to each node from a point, safe or not.
@@ -209,9 +213,9 @@ class SafeGraph:
 
     def cheapest_path(self, start: int, target: int) -> Floats | None:
         """(m, 2) nodes of the cheapest path, both ends included, or None."""
-        score, towards = self._tree(target)
-        if not np.isfinite(score[start]):
+        if not np.isfinite(self.costs_to(target)[start]):
             return None
+        towards = self._trees[target][1]
         nodes = [start]
         while nodes[-1] != target:
             nodes.append(int(towards[nodes[-1]]))
@@ -276,18 +280,6 @@ class SafeGraph:
         )
         more = self.length_weight * self._detour_cost(points_m) if len(self._avoid_m) else 0.0
         return there.reshape(shape) + more, back.reshape(shape) + more, risk.reshape(shape)
-
-    def _tree(self, target: int) -> tuple[Floats, Indices]:
-        """Score to ``target`` and the next node towards it, from every node.
-
-        Cached: replanning keeps the waypoints and changes the start.
-        """
-        if target not in self._trees:
-            score, towards = dijkstra(
-                self._edges, directed=True, indices=[target], return_predecessors=True
-            )
-            self._trees[target] = score[0], towards[0].astype(np.intp)
-        return self._trees[target]
 
     def _joined_costs(self, index: Indices) -> csr_array:
         """Sparse costs: rows are targets, columns sources, as trees grow from the target."""

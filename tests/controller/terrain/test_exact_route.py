@@ -11,6 +11,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.exact_route import exact_route
+from snakewalk.controller.terrain.in_steps import at_once
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.rounded import rounded
@@ -102,7 +103,7 @@ def test_exact_routes_agree_with_brute_force() -> None:
     joined = refused = 0
     for seed in range(60):
         relief, graph, points = random_risk(seed)
-        route = exact_route(relief, graph, *points)
+        route = at_once(exact_route(relief, graph, *points))
         if route is None:
             assert not are_joined(relief, points, step_m=0.002)
             refused += 1
@@ -119,10 +120,10 @@ def test_exact_routes_agree_with_brute_force() -> None:
 def test_a_rounded_polygon_stays_on_its_side_of_a_line_and_passes_fixed_corners() -> None:
     corners = np.array([(0.0, 1.0), (1.0, 0.0), (3.0, 0.0), (4.0, 1.0), (4.0, 3.0)])
     free = np.array([False, True, True, False, False])
-    path = rounded(corners, free, lambda at: at[:, 1] >= 0.0)
+    path = at_once(rounded(corners, free, lambda at: at[:, 1] >= 0.0))
     at = path.piece_m(0.0, path.length_m)
     assert at[:, 1].min() >= 0.0
     assert np.hypot(*(at - corners[3]).T).min() < 1e-2
     assert np.hypot(*(at - corners[1]).T).min() > 0.05
-    sharp = rounded(corners, free, lambda at: np.zeros(len(at), bool))
+    sharp = at_once(rounded(corners, free, lambda at: np.zeros(len(at), bool)))
     assert np.hypot(*(sharp.piece_m(0.0, sharp.length_m) - corners[1]).T).min() < 1e-2
