@@ -14,13 +14,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
+from benchmarks.search_cost import search_cost
 from snakewalk.config.ground import build_ground
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.crowd_film import SIZE_PX, CrowdScene
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
-from snakewalk.controller.repertoire.repertoire_planning import plan_route, search_cost
+from snakewalk.controller.repertoire.repertoire_planning import plan_route
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
 from snakewalk.sim.rendering.crowd_film import CrowdShot, CrowdView
 

@@ -3,8 +3,12 @@
 import math
 from typing import Annotated, Literal, Self
 
+import numpy as np
+import scipy  # scipy.spatial loads when it is first used
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.base import Name, Strict
 from snakewalk.config.friction_law import LAWS, LawName
 
@@ -56,7 +60,21 @@ class FlatGround(Strict):
     size_m: float = Field(12.0, gt=0.5, description="edge of the drawn floor, centred at 0, 0")
 
 
-class ElevationGround(Strict):
+_HEIGHTS = {"vertical_scale", "height_m", "depth_m", "rise_m"}
+_SLOPES = {"slope_rad", "rms_slope_rad"}
+
+
+class _Relief(Strict):
+    """Ground with heights."""
+
+    def with_relief(self, factor: float) -> Self:
+        """Return the ground with its heights times ``factor``."""
+        update = {key: factor * value for key, value in self if key in _HEIGHTS}
+        update |= {key: math.atan(factor * math.tan(v)) for key, v in self if key in _SLOPES}
+        return self.model_copy(update=update)
+
+
+class ElevationGround(_Relief):
     """A crop of a real elevation model, scaled to the robot."""
 
     kind: Literal["elevation"] = "elevation"
@@ -73,24 +91,16 @@ class ElevationGround(Strict):
     )
     refine: int = Field(1, ge=1, le=8, description="cubic subdivision of each cell")
 
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
 
-
-class MapGround(Strict):
+class MapGround(_Relief):
     """Real ground as measured, with holes where nothing was: written by `snakewalk world`."""
 
     kind: Literal["map"] = "map"
     source: str = Field(description="an .npz with z_m, known, spacing_m, x0_m, y0_m")
     vertical_scale: float = Field(1.0, gt=0.0, le=100.0, description="factor on the file's heights")
 
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        return self.model_copy(update={"vertical_scale": self.vertical_scale * factor})
 
-
-class RampGround(Strict):
+class RampGround(_Relief):
     """A plane that rises along x, between a level run-in and a level top; its middle at x = 0."""
 
     kind: Literal["ramp"] = "ramp"
@@ -107,13 +117,8 @@ class RampGround(Strict):
     width_m: float = Field(8.0, gt=0.5, le=50.0, description="width of the ground along y")
     spacing_m: float = Field(0.1, ge=0.005, le=0.5, description="distance between samples")
 
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        slope_rad = math.atan(factor * math.tan(self.slope_rad))
-        return self.model_copy(update={"slope_rad": slope_rad})
 
-
-class RandomGround(Strict):
+class RandomGround(_Relief):
     """Isotropic Gaussian hills and hollows, drawn from a seed of their own.
 
     The heights' autocorrelation falls as ``exp(-(r / correlation_m)**2)``. The made field is scaled
@@ -137,13 +142,17 @@ class RandomGround(Strict):
             raise ValueError("correlation_m must be at least 3 spacing_m, or the hills are spikes")
         return self
 
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        slope_rad = math.atan(factor * math.tan(self.rms_slope_rad))
-        return self.model_copy(update={"rms_slope_rad": slope_rad})
+
+class _LevelEnds(_Relief):
+    """Ground with edges across x between level ends."""
+
+    level_m: float = Field(
+        2.0, ge=0.1, le=50.0, description="length of the level ground at each end"
+    )
+    spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
 
 
-class StepsGround(Strict):
+class StepsGround(_LevelEnds):
     """Steps across x, the middle of them at x = 0, between two level ends.
 
     A height field has no vertical face: a riser is a flank one sample wide, inclined by
@@ -158,11 +167,7 @@ class StepsGround(Strict):
         "up-down",
         description="arrangement of the steps: a staircase, or one up and one down in turn",
     )
-    level_m: float = Field(
-        2.0, ge=0.1, le=50.0, description="length of the level ground at each end"
-    )
     width_m: float = Field(3.0, gt=0.5, le=50.0, description="width of the ground along y")
-    spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
 
     @model_validator(mode="after")
     def _treads_are_resolved(self) -> Self:
@@ -170,12 +175,8 @@ class StepsGround(Strict):
             raise ValueError("tread_m must be at least 2 spacing_m, or the steps are a ramp")
         return self
 
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        return self.model_copy(update={"height_m": self.height_m * factor})
 
-
-class GapsGround(Strict):
+class GapsGround(_LevelEnds):
     """Trenches across x, the middle of them at x = 0, in a level floor.
 
     A trench is ``width_m`` wide between its upper edges; its walls are flanks one sample wide, as
@@ -189,11 +190,7 @@ class GapsGround(Strict):
         gt=0.0, le=10.0, description="distance between the middles of neighbouring trenches"
     )
     count: int = Field(ge=1, le=100, description="number of trenches")
-    level_m: float = Field(
-        2.0, ge=0.1, le=50.0, description="length of the level ground at each end"
-    )
     across_m: float = Field(3.0, gt=0.5, le=50.0, description="extent of the ground along y")
-    spacing_m: float = Field(0.01, ge=0.005, le=0.1, description="distance between samples")
 
     @model_validator(mode="after")
     def _trenches_are_resolved_and_apart(self) -> Self:
@@ -202,10 +199,6 @@ class GapsGround(Strict):
         if self.distance_m < self.width_m + self.spacing_m:
             raise ValueError("distance_m must be over width_m plus spacing_m, or trenches merge")
         return self
-
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        return self.model_copy(update={"depth_m": self.depth_m * factor})
 
 
 class Water(Strict):
@@ -250,7 +243,7 @@ class WaterGround(Water):
     size_m: float = Field(12.0, gt=0.5, description="edge of the drawn bottom, centred at 0, 0")
 
 
-class ShoreGround(Water):
+class ShoreGround(_Relief, Water):
     """A pool whose bottom rises along x to level land; the waterline is x = 0."""
 
     kind: Literal["shore"] = "shore"
@@ -264,12 +257,6 @@ class ShoreGround(Water):
     rise_m: float = Field(0.05, ge=0.0, le=5.0, description="height of the land above the water")
     width_m: float = Field(6.0, gt=0.5, le=50.0, description="width of the ground along y")
     spacing_m: float = Field(0.05, ge=0.005, le=0.5, description="distance between samples")
-
-    def with_relief(self, factor: float) -> Self:
-        """Return the ground with its heights times ``factor``."""
-        heights = {"depth_m": factor * self.depth_m, "rise_m": factor * self.rise_m}
-        slope_rad = math.atan(factor * math.tan(self.slope_rad))
-        return self.model_copy(update={"slope_rad": slope_rad, **heights})
 
 
 class _RoundObstacle(Strict):
@@ -288,9 +275,13 @@ class _RoundObstacle(Strict):
         description="friction coefficient of the obstacle, equal in all directions",
     )
 
-    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
-        """Whether no body can be at this place of the floor: nothing enters a pipe from outside."""
-        return self.upright and math.dist(self.at_m, (x_m, y_m)) <= self.radius_m
+    def gap_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Distance of places on the floor from the obstacle; negative inside it, a pipe included.
+
+        Infinite under a level obstacle.
+        """
+        gap_m = np.hypot(np.subtract(x_m, self.at_m[0]), np.subtract(y_m, self.at_m[1]))
+        return np.asarray(gap_m - self.radius_m if self.upright else gap_m + np.inf)
 
 
 class PoleObstacle(_RoundObstacle):
@@ -309,12 +300,24 @@ class PipeObstacle(_RoundObstacle):
     at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
 
 
-class PegsObstacle(Strict):
+class _StandingObstacle(Strict):
+    """An obstacle that stands on the floor."""
+
+    height_m: float = Field(0.15, gt=0.01, le=5.0, description="height above z = 0")
+    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
+    friction: float = Field(
+        0.3,
+        ge=0.0,
+        le=5.0,
+        description="friction coefficient of the obstacle, equal in all directions",
+    )
+
+
+class PegsObstacle(_StandingObstacle):
     """A board of upright pegs to push off: rows across x, as far apart as pegs in a row."""
 
     kind: Literal["pegs"] = "pegs"
     radius_m: float = Field(0.03, gt=0.002, le=1.0, description="radius of a peg")
-    height_m: float = Field(0.15, gt=0.01, le=5.0, description="height above z = 0")
     spacing_m: float = Field(
         gt=0.0, le=10.0, description="distance from peg to peg in a row along y"
     )
@@ -324,13 +327,6 @@ class PegsObstacle(Strict):
         "hexagonal",
         description="arrangement of the pegs; hexagonal: every other row is "
         "shifted by half a spacing",
-    )
-    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the board's middle")
-    friction: float = Field(
-        0.3,
-        ge=0.0,
-        le=5.0,
-        description="friction coefficient of the obstacle, equal in all directions",
     )
 
     @model_validator(mode="after")
@@ -352,35 +348,30 @@ class PegsObstacle(Strict):
                 places.append((x_m, self.at_m[1] + along * self.spacing_m))
         return tuple(places)
 
-    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
-        """Whether a peg is at this place of the floor."""
-        return any(math.dist(peg_m, (x_m, y_m)) <= self.radius_m for peg_m in self.places_m())
+    def gap_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Distance of places on the floor from the nearest peg; negative inside it."""
+        places_m = np.stack(np.broadcast_arrays(x_m, y_m), axis=-1)
+        return np.asarray(scipy.spatial.KDTree(self.places_m()).query(places_m)[0]) - self.radius_m
 
 
 WALL_M = 0.04
 """Thickness of a corridor's wall."""
 
 
-class CorridorObstacle(Strict):
+class CorridorObstacle(_StandingObstacle):
     """Two upright walls along x with a way between them."""
 
     kind: Literal["corridor"] = "corridor"
     width_m: float = Field(gt=0.01, le=50.0, description="distance between the walls")
     length_m: float = Field(4.0, gt=0.1, le=50.0, description="length of the walls")
-    height_m: float = Field(0.15, gt=0.01, le=5.0, description="height above z = 0")
-    at_m: tuple[float, float] = Field((0.0, 0.0), description="x and y of the obstacle's middle")
-    friction: float = Field(
-        0.3,
-        ge=0.0,
-        le=5.0,
-        description="friction coefficient of the obstacle, equal in all directions",
-    )
 
-    def is_blocked_at(self, x_m: float, y_m: float) -> bool:
-        """Whether a wall is at this place of the floor."""
-        along_m, across_m = abs(x_m - self.at_m[0]), abs(y_m - self.at_m[1])
-        inner_m = 0.5 * self.width_m
-        return along_m <= 0.5 * self.length_m and inner_m <= across_m <= inner_m + WALL_M
+    def gap_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
+        """Distance of places on the floor from the nearer wall; negative inside it."""
+        along_m = np.abs(np.subtract(x_m, self.at_m[0])) - 0.5 * self.length_m
+        middle_m = 0.5 * (self.width_m + WALL_M)
+        across_m = np.abs(np.abs(np.subtract(y_m, self.at_m[1])) - middle_m) - 0.5 * WALL_M
+        outside_m = np.hypot(np.maximum(along_m, 0.0), np.maximum(across_m, 0.0))
+        return np.asarray(outside_m + np.minimum(np.maximum(along_m, across_m), 0.0))
 
 
 class PlannerConfig(Strict):
@@ -450,6 +441,9 @@ ReliefGround = (
 """Grounds with a height field; the others are level."""
 
 
+Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
+
+
 class WorldConfig(Strict):
     """One world."""
 
@@ -458,13 +452,9 @@ class WorldConfig(Strict):
         FlatGround(), description="shape of the ground; its kind selects the other keys"
     )
     friction: FrictionConfig = FrictionConfig()
-    obstacle: (
-        Annotated[
-            PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle,
-            Field(discriminator="kind"),
-        ]
-        | None
-    ) = Field(None, description="object on the ground; its kind selects the other keys")
+    obstacle: Annotated[Obstacle, Field(discriminator="kind")] | None = Field(
+        None, description="object on the ground; its kind selects the other keys"
+    )
     planner: PlannerConfig = PlannerConfig()
 
     def with_relief(self, factor: float) -> Self:

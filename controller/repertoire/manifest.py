@@ -8,6 +8,6 @@ PLUGINS = (
     ("command", "gait repertoire record", "Simulate forward, left and right actions, and record a settled cycle of each.", "snakewalk.controller.repertoire.commands.repertoire_record:record"),
     ("command", "gait repertoire run", "Run a plan on servos or in the simulator, and compare predicted with measured poses.", "snakewalk.controller.repertoire.commands.repertoire_run:run_plan"),
     ("command", "gait repertoire show", "Show the actions of a repertoire: speed, turn and closure error of a cycle.", "snakewalk.controller.repertoire.commands.repertoire_show:show_file"),
-    ("planner", "repertoire", "Search over recorded actions; show, and where asked save, time on the physics, and run.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire"),
+    ("planner", "repertoire", "Search over recorded actions; show the plan, and where asked save and run it.", "snakewalk.controller.repertoire.commands.plan_route:plan_with_repertoire"),
     ("run", "repertoire", "Recorded actions played by a schedule of speeds and turns.", "snakewalk.controller.repertoire.prepare_schedule:prepare_repertoire"),
 )

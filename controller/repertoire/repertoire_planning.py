@@ -1,12 +1,6 @@
-"""Plans from a run and a repertoire, their files, and the cost of the search.
-
-The cost of the same search on the physics is extrapolated from a few candidates.
-"""
+"""Plans from a run and a repertoire, and their files."""
 
 import json
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +12,12 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.controller.console.result_files import write_result
-from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import load_repertoire
-from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.repertoire_run import (
     RepertoireRun,
     initial_frame,
     pose_of_action,
 )
-from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import (
     AIM_SHARE,
     MotionPrimitives,
@@ -177,89 +168,3 @@ def load_plan(path: Path, *, replan: bool = True) -> RepertoireRun:
     world = checked(WorldConfig, parts[2], str(path))
     repertoire.check(robot)
     return RepertoireRun(run, robot, world, repertoire, file, route, replan)
-
-
-TRIES = 5
-
-
-@dataclass(frozen=True, slots=True)
-class SearchCost:
-    """CPU time, s."""
-
-    candidate_s: float
-    """A candidate of the search on the repertoire: one more cycle, all book-keeping included."""
-    physics_candidate_s: float
-    """CPU time of a cycle on the simulated robot, mean over the cycles that were run."""
-    ran: int
-    """Candidates run on the physics."""
-    candidates: int
-    """Number of candidates that the search scored."""
-
-    @property
-    def ratio(self) -> float:
-        """How many times the repertoire is quicker."""
-        return self.physics_candidate_s / self.candidate_s
-
-    @property
-    def physics_search_s(self) -> float:
-        """Time to simulate all candidates, extrapolated from the simulated ones."""
-        return self.candidates * self.physics_candidate_s
-
-    def to_dict(self) -> dict[str, object]:
-        """Numbers for a command's answer."""
-        return {
-            "search_s": round(self.candidates * self.candidate_s, 4),
-            "physics_candidates_run": self.ran,
-            "physics_search_s_extrapolated": round(self.physics_search_s, 1),
-            "times_quicker": round(self.ratio),
-        }
-
-
-def search_cost(
-    job: RepertoireRun,
-    candidates: int,
-    *,
-    beam: int = 400,
-    on_progress: Callable[[int], None] = lambda done: None,
-) -> SearchCost:
-    """Time the search, and ``candidates`` random cycles of at most four actions on the physics."""
-    run = job.run
-    start = job.route.pose[0]
-    aimed_m = AIM_SHARE * run.waypoint_radius_m
-    best = float("inf")
-    route = job.route
-    for _ in range(TRIES):
-        begun = time.process_time()
-        route = search(job.primitives, start, run.waypoints_m, aimed_m, beam=beam)
-        best = min(best, time.process_time() - begun)
-    random = np.random.default_rng(0)
-    spent = 0.0
-    ran = 0
-    while ran < candidates:
-        count = min(4, candidates - ran)
-        actions = tuple(int(k) for k in random.choice(job.primitives.tried, size=count))
-        spent += physics_route(job, actions)[0]
-        ran += count
-        on_progress(ran)
-    return SearchCost(best / route.candidates, spent / ran, ran, route.candidates)
-
-
-def physics_route(job: RepertoireRun, actions: tuple[int, ...]) -> tuple[float, RouteFollower]:
-    """Run a sequence on the simulated robot open loop; return its CPU time and its follower."""
-    pose = [job.route.pose[0]]
-    for action in actions:
-        pose.append(job.primitives.after(pose[-1], action))
-    route = Route(actions, np.array(pose), 0, 0.0, 1)
-    run = job.run
-    follower = RouteFollower(
-        job.primitives, route, run.waypoints_m, run.waypoint_radius_m, replan=False
-    )
-    motion = RepertoireMotion(job.repertoire, job.robot, actions[0], follower.choose)
-    pose_rad = pose_of_action(run, job.robot, job.repertoire, actions[0]).joint_rad
-    with PhysicsBody(job.robot, job.world, pose_rad, run.start_m, job.start_heading_rad) as body:
-        begun = time.process_time()
-        while not motion.stopping:
-            view = body.view()
-            follower.count_waypoints(view)
-            body.frame(motion.step(FRAME_S, view))
-        return time.process_time() - begun, follower

@@ -77,6 +77,8 @@ class _Cells(NamedTuple):
     """(h - 1, w - 1) x of the safe saddle between two safe corners of a cell, or NaN."""
     ends: tuple[int, int]
     """Numbers of the nodes at start and end."""
+    longest_m: float
+    """Length that no diagonal of a cell exceeds."""
 
     def bands(self) -> list[slice]:
         """Rows of nodes, cut into pieces for a step."""
@@ -84,11 +86,6 @@ class _Cells(NamedTuple):
         samples = 2.0 + self.longest_m / SAMPLE_M
         rows = max(1, int(_SAMPLES_IN_STEP / samples / width))
         return [slice(row, min(row + rows, height)) for row in range(0, height, rows)]
-
-    @property
-    def longest_m(self) -> float:
-        """Longest diagonal of a cell."""
-        return float(np.hypot(np.diff(self.x_m).max(), np.diff(self.y_m).max()))
 
     def corners(self, start: int, end: int, towards: Indices) -> Iterator[Floats]:
         """Places (2,) of nodes and saddles from one node to another."""
@@ -126,11 +123,19 @@ def _cells(relief: Relief, start: Floats, end: Floats) -> _Cells | None:
     rows = np.abs(y - points[:, 1:]).argmin(axis=1)
     first, last = (rows * len(x) + columns).tolist()
     saddle_x_m = np.empty((shape[0] - 1, shape[1] - 1))
-    return _Cells(x, y, np.empty(shape), np.empty(shape, bool), saddle_x_m, (first, last))
+    return _Cells(
+        x,
+        y,
+        np.empty(shape),
+        np.empty(shape, bool),
+        saddle_x_m,
+        (first, last),
+        1.5 * ground.spacing_m,
+    )
 
 
 def _arcs(cells: _Cells, graph: SafeGraph) -> Steps[tuple[Ints, Floats]]:
-    """Ends (n, 8) and weights (n, 8) of the arcs of each node; infinite where there is none.
+    """Ends (n, 8) and weights (n, 8) of the arcs of each node; infinite without an arc.
 
     An arc leads against the direction of travel, as the tree grows from the target.
     """

@@ -15,7 +15,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
-from snakewalk.controller.terrain.in_steps import Steps, at_once
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief
@@ -47,22 +47,6 @@ class MapPlanner:
         """Use this map from now on."""
         self._on = _Knowledge(ground, self._config)
 
-    def __call__(
-        self,
-        points_m: ArrayLike,
-        heading_rad: float | None = None,
-        *,
-        avoid_m: ArrayLike = (),
-        number: int = 1,
-    ) -> SplinePath:
-        """Plan through (n, 2) points in order, as far as the map allows.
-
-        Raises:
-            InputError: no safe ground is known.
-
-        """
-        return at_once(self.in_steps(points_m, heading_rad, avoid_m=avoid_m, number=number))
-
     def in_steps(
         self,
         points_m: ArrayLike,
@@ -71,7 +55,12 @@ class MapPlanner:
         avoid_m: ArrayLike = (),
         number: int = 1,
     ) -> Steps[SplinePath]:
-        """Plan as a call does, in steps, on the map at the first step."""
+        """Plan through (n, 2) points in order, as far as the map at the first step allows.
+
+        Raises:
+            InputError: no safe ground is known.
+
+        """
         points = np.asarray(points_m, float)
         knowledge = self._on
         if knowledge is None:

@@ -14,6 +14,7 @@ from snakewalk.controller.terrain.bends import widen_in_steps
 from snakewalk.controller.terrain.dubins import PathTurns
 from snakewalk.controller.terrain.exact_route import exact_route
 from snakewalk.controller.terrain.in_steps import Steps, at_once
+from snakewalk.controller.terrain.keep_off import KeepOff
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.relief import Relief
 from snakewalk.controller.terrain.rounded import rounded
@@ -25,6 +26,7 @@ _TABLE_STEP_M = 0.01
 """Step of a path's table: a path passes a waypoint within this distance of the point before it."""
 _CHECK_STEP_M = 0.02  # spacing of the safety check of a spline
 _UNSAFE = 30.0  # cost of a metre of unsafe ground in a turn, as metres of level path
+_TURN_RADIUS_M = 0.5  # smallest turning radius of the body
 _ROUNDS = 7  # halvings: the last pieces have a hundredth of a side's length
 
 
@@ -41,6 +43,7 @@ class TerrainPlanner:
         config: PlannerConfig,
         *,
         exact: bool = True,
+        keep_off: KeepOff | None = None,
     ) -> None:
         """Build fields and graph.
 
@@ -49,10 +52,11 @@ class TerrainPlanner:
             config: limits of safe ground.
             exact: search all safe ground if the graph's nodes give no smooth path; else reject such
                 points, which is faster.
+            keep_off: obstacle on the ground.
 
         """
         self._exact = exact
-        self.relief = None if ground is None else Relief(ground, config)
+        self.relief = None if ground is None else Relief(ground, config, keep_off=keep_off)
         self.graph = None if self.relief is None else SafeGraph(self.relief)
         self._least_per_m = 1.0 if self.graph is None else self.graph.length_weight
         self._waypoint_turns = WaypointTurns(
@@ -64,15 +68,14 @@ class TerrainPlanner:
         self._planned: tuple[Floats, SplinePath] | None = None
         """Points and path of the last plan that began in any direction."""
 
-    def __call__(
+    def in_steps(
         self,
         points_m: ArrayLike,
         heading_rad: float | None = None,
-        turn_radius_m: float = 0.5,
         avoid_m: ArrayLike = (),
         number: int = 1,
-    ) -> SplinePath:
-        """Plan a path from the head's position through (n, 2) waypoints.
+    ) -> Steps[SplinePath]:
+        """Plan a path from the head's position through (n, 2) waypoints, in steps.
 
         From an unsafe start the path leads straight to the nearest safe node. With a heading, the
         path begins in that direction and turns onto the planned one by a Dubins curve before the
@@ -81,7 +84,6 @@ class TerrainPlanner:
         Args:
             points_m: the first is the position of the head.
             heading_rad: direction of the body there; None for any.
-            turn_radius_m: smallest turning radius of the body.
             avoid_m: (k, 2) places where the body could not continue; paths avoid them by a
                 footprint if possible.
             number: number of the first waypoint, for messages.
@@ -91,20 +93,6 @@ class TerrainPlanner:
                 within a centimetre of the first point.
 
         """
-        try:
-            return at_once(self.in_steps(points_m, heading_rad, turn_radius_m, avoid_m, number))
-        except _NoRouteError as error:
-            raise InputError(f"{error}; {route_advice(error.relief, error.ends_m)}") from None
-
-    def in_steps(
-        self,
-        points_m: ArrayLike,
-        heading_rad: float | None = None,
-        turn_radius_m: float = 0.5,
-        avoid_m: ArrayLike = (),
-        number: int = 1,
-    ) -> Steps[SplinePath]:
-        """Plan as a call does, in steps, without advice where no route exists."""
         points = np.asarray(points_m, float)
         avoid = np.asarray(avoid_m, float).reshape(-1, 2)
         kept = _distinct_points(points)
@@ -124,7 +112,7 @@ class TerrainPlanner:
         yield 300
         until_m = path.first_pass(points[1])
         turns = PathTurns(
-            path, heading_rad, turn_radius_m, until_m, self._turn_cost_per_m, self._least_per_m
+            path, heading_rad, _TURN_RADIUS_M, until_m, self._turn_cost_per_m, self._least_per_m
         )
         turn = yield from turns.cheapest_in_steps()
         yield 300
@@ -203,10 +191,10 @@ class TerrainPlanner:
         return onward
 
     def plan(self, points_m: ArrayLike) -> SplinePath:
-        """Plan as a call does, but reject a start that is off the world or unsafe.
+        """Plan in one piece, but reject a start that is off the world or unsafe.
 
         Raises:
-            InputError: as for a call, and for the first point.
+            InputError: as for steps, and for the first point; with advice where no route exists.
 
         """
         points = np.asarray(points_m, float)
@@ -214,7 +202,10 @@ class TerrainPlanner:
         faults = [f for k in range(len(points)) for f in self._fault(k, points[k])]
         if faults:
             raise InputError(faults)
-        return self(points)
+        try:
+            return at_once(self.in_steps(points))
+        except _NoRouteError as error:
+            raise InputError(f"{error}; {route_advice(error.relief, error.ends_m)}") from None
 
     def _turn_cost_per_m(self, points_m: Floats) -> Floats:
         """Cost (..., k) of a metre of path at (..., k, 2), with a penalty on unsafe ground."""
@@ -373,6 +364,8 @@ def _unsafe_because(relief: Relief, point: Floats) -> str:
     if not relief.known(*point):
         reach = relief.config.slope_window_m
         return f"is within {reach:g} m of ground that the world's map does not know"
+    if relief.is_obstructed(*point):
+        return "is in the world's obstacle, or nearer to it than the radius of the body"
     slope = np.degrees(float(relief.slope_rad(*point)))
     variance = float(relief.variance_m2(*point))
     most = relief.config.variance_limit_m2

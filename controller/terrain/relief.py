@@ -12,6 +12,7 @@ from scipy.ndimage import binary_dilation
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
+from snakewalk.controller.terrain.keep_off import KeepOff
 from snakewalk.drivers.compiling import compiled, readonly_array
 
 EDGE_TOLERANCE_M = 1e-9
@@ -27,17 +28,23 @@ class Relief:
     """
 
     def __init__(
-        self, ground: HeightField, config: PlannerConfig, *, unknown_risk: float = _UNKNOWN_RISK
+        self,
+        ground: HeightField,
+        config: PlannerConfig,
+        *,
+        unknown_risk: float = _UNKNOWN_RISK,
+        keep_off: KeepOff | None = None,
     ) -> None:
         """Give samples next to an unknown one the risk ``unknown_risk``; 0 makes them passable."""
+        self._obstacle_risk, self.obstacle_cost = np.zeros((2, *ground.z_m.shape))
+        if keep_off is not None:
+            self._obstacle_risk, self.obstacle_cost = keep_off.layers(ground)
         self.ground = ground
         self.config = config
         self._variance = elevation_variance_m2(ground, config.variance_window_m)
         self._slope = fitted_slope_rad(ground, config.slope_window_m)
         # The maximum, interpolated, is never below either one interpolated: it keeps both limits.
-        self._risk = np.maximum(
-            self._variance / config.variance_limit_m2, self._slope / config.slope_limit_rad
-        )
+        self._risk = self._ground_risk(1.0, 1.0)
         self._unknown = np.zeros(ground.z_m.shape)
         if ground.known is not None:
             # A slope is known if its whole window is: filled samples prove nothing.
@@ -57,12 +64,13 @@ class Relief:
 
         With ``filled``, filled samples count as measured.
         """
-        config = self.config
-        risk = np.maximum(
-            self._variance / (variance_factor * config.variance_limit_m2),
-            self._slope / (slope_factor * config.slope_limit_rad),
-        )
+        risk = self._ground_risk(slope_factor, variance_factor)
         return risk if filled else np.where(self._unknown > 0.0, self._risk, risk)
+
+    def _ground_risk(self, slope_factor: float, variance_factor: float) -> Floats:
+        variance = self._variance / (variance_factor * self.config.variance_limit_m2)
+        slope = self._slope / (slope_factor * self.config.slope_limit_rad)
+        return np.asarray(np.maximum(np.maximum(variance, slope), self._obstacle_risk))
 
     def variance_m2(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation variance within ``variance_window_m`` of each point."""
@@ -80,6 +88,10 @@ class Relief:
     def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points keep both limits and the margin."""
         return np.asarray(self.risk(x_m, y_m) <= 1.0)
+
+    def is_obstructed(self, x_m: float, y_m: float) -> bool:
+        """Whether an obstacle is nearer than the radius of the body."""
+        return bool(self._field_at(self._obstacle_risk, x_m, y_m) > 1.0)
 
     def known(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether the slope window around points is fully measured."""

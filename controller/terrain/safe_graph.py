@@ -131,6 +131,7 @@ class SafeGraph:
         """Safe nodes over all nodes inside the margin."""
         self._avoid_m = np.empty((0, 2))
         self._layers = np.concatenate([relief.layers, self.footprint.layers], axis=-1)
+        self._layers[..., -1] += relief.obstacle_cost
         self._edges = self._joined_costs(index)
         self._trees: dict[int, tuple[Floats, Indices]] = {}
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.terrain.bends import sharpest_bend
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 
@@ -34,18 +33,12 @@ class PathRelief:
     """Steepest climb: slope of the footprint's plane along the path."""
     max_side_slope_rad: float
     """Largest root mean square of the slope across the path over a footprint."""
-    median_surface_slope_rad: float
-    """Median inclination of the surface itself, with no window."""
     world_median_slope_rad: float
     """Median over the whole world, for comparison."""
-    mean_variance_m2: float
-    """Mean elevation variance in the planner's variance window."""
     safe_node_share: float
     """Safe nodes over all nodes inside the margin; 1 on a flat floor."""
     climb_m: float
     """Highest less lowest elevation."""
-    min_radius_m: float
-    """Least radius of curvature; infinite on a straight path."""
 
 
 def slopes_rad(planner: TerrainPlanner, path: SplinePath) -> Floats:
@@ -59,15 +52,13 @@ def slopes_rad(planner: TerrainPlanner, path: SplinePath) -> Floats:
 def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
     """Summarise a path on the planner's ground."""
     slope = slopes_rad(planner, path)
-    surface = variance = z = world = strip = np.zeros(1)
+    z = world = strip = np.zeros(1)
     steepest = np.zeros(2)
     share = 1.0
     if planner.relief is not None and planner.graph is not None:
         ground = planner.relief.ground
         points = path.position(_samples(path))
-        surface = ground.slope_rad(*points.T)
         z = ground.elevation_m(*points.T)
-        variance = planner.relief.variance_m2(*points.T)
         strip = ground.slope_rad(*(points[:, None] + _disc_m(planner.relief.config.footprint_m)).T)
         ahead = np.gradient(points, axis=0)
         ahead = ahead / np.hypot(*ahead.T)[:, None]
@@ -82,12 +73,9 @@ def path_relief(planner: TerrainPlanner, path: SplinePath) -> PathRelief:
         max_footprint_slope_rad=float(strip.max()),
         max_up_slope_rad=max(float(steepest[0]), 0.0),
         max_side_slope_rad=float(steepest[1]),
-        median_surface_slope_rad=float(np.median(surface)),
         world_median_slope_rad=float(np.median(world)),
-        mean_variance_m2=float(variance.mean()),
         safe_node_share=share,
         climb_m=float(np.ptp(z)),
-        min_radius_m=sharpest_bend(path)[0],
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.rotations import wrap
+from snakewalk.controller.terrain.in_steps import at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.replanning import PathPlanner, PathRequest, Replanning
 
@@ -140,6 +141,8 @@ class Course:
         """Number of waypoints reached."""
         self.missed = 0
         """Number of times that another path was laid to a waypoint."""
+        self.stalls = 0
+        """Number of stalls within a body length of the last one, itself included."""
         self.replanned: str | None = None
         """Reason for another path in the last step, or None."""
         self.path: SplinePath
@@ -240,6 +243,7 @@ class Course:
                 return
             if self._body_is_stalled:
                 self._stalls_m.append(np.array(head_m))
+                self.stalls = sum(math.dist(m, head_m) < self.length_m for m in self._stalls_m)
             self._request(why, heading_rad, is_miss=True)
 
     @property
@@ -364,9 +368,9 @@ class Course:
         avoid_m = np.array(self._stalls_m).reshape(-1, 2)
         heading = path.heading_rad(max(join_m - 0.05, 0.0))
         number = len(behind) + 1
-        more = self._plan(points_m, None, avoid_m=avoid_m, number=number)
+        more = at_once(self._plan(points_m, None, avoid_m=avoid_m, number=number))
         if abs(wrap(more.heading_rad(0.05) - heading)) > _BEND_RAD:
-            more = self._plan(points_m, heading, avoid_m=avoid_m, number=number)
+            more = at_once(self._plan(points_m, heading, avoid_m=avoid_m, number=number))
         more_m = more.piece_m(0.0, more.length_m)
         passes = [pass_m + join_m for pass_m in self._passes(more, left_m)]
         gaps_m = [more_m[-1], *left_m[np.isinf(passes)]]
@@ -424,7 +428,8 @@ class Course:
         stalls_m = np.array(self._stalls_m).reshape(-1, 2)
         number = self.reached + 1
         self._replanning = None
-        self._follow_path(self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number))
+        plan = self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number)
+        self._follow_path(at_once(plan))
 
     def _follow_path(self, path: SplinePath) -> None:
         """Put a path in force that begins at the head."""

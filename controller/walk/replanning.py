@@ -1,7 +1,7 @@
 """Planning of a new path, spread over control cycles."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -17,23 +17,12 @@ class PathPlanner(Protocol):
 
     def __call__(
         self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
-    ) -> SplinePath:
-        """Plan through (n, 2) points in order, from a heading if one is given.
+    ) -> Steps[SplinePath]:
+        """Plan in steps through (n, 2) points in order, from a heading if one is given.
 
         The path avoids places ``avoid_m`` (k, 2) if possible. ``number`` is the second point's, for
-        messages.
+        messages. Each step lasts about a millisecond at most.
         """
-        ...
-
-
-@runtime_checkable
-class PlansInSteps(Protocol):
-    """Optional extension of a ``PathPlanner``."""
-
-    def in_steps(
-        self, points_m: Floats, heading_rad: float | None, *, avoid_m: Floats, number: int = 1
-    ) -> Steps[SplinePath]:
-        """Plan like a call; each step lasts about a millisecond at most."""
         ...
 
 
@@ -71,13 +60,10 @@ class Replanning:
 
 
 def _steps(request: PathRequest, plan: PathPlanner) -> Steps[SplinePath | None]:
-    points_m = request.points_m
-    heading_rad = request.heading_rad
-    avoid_m = request.avoid_m
-    number = request.number
+    heading_rad, number = request.heading_rad, request.number
     try:
-        if isinstance(plan, PlansInSteps):
-            return (yield from plan.in_steps(points_m, heading_rad, avoid_m=avoid_m, number=number))
-        return plan(points_m, heading_rad, avoid_m=avoid_m, number=number)
+        return (
+            yield from plan(request.points_m, heading_rad, avoid_m=request.avoid_m, number=number)
+        )
     except InputError:
         return None

@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import (
     WALL_M,
     CorridorObstacle,
+    Obstacle,
     PegsObstacle,
     PipeObstacle,
     PoleObstacle,
@@ -23,8 +24,6 @@ CLEAR_M = 0.2
 WOOD = (0.55, 0.42, 0.30, 1.0)
 GLASS = (0.55, 0.68, 0.78, 0.22)
 """Red, green, blue, opacity (ours)."""
-
-Obstacle = PoleObstacle | PipeObstacle | PegsObstacle | CorridorObstacle
 
 
 @dataclass(frozen=True, slots=True)

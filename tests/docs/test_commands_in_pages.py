@@ -166,5 +166,5 @@ def test_the_pages_print_many_commands_and_a_wrong_one_is_found() -> None:
         take("snakewalk plan --nosuch")
     with pytest.raises(UsageError, match="No such command"):
         take("snakewalk nosuch")
-    with pytest.raises(UsageError, match="must be at least 0"):
-        take("snakewalk plan --physics -1")
+    with pytest.raises(UsageError, match="must be at least 1"):
+        take("snakewalk plan --beam 0")

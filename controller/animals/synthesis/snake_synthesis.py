@@ -38,6 +38,7 @@ from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.run.kinds.walk_run import POINTS, WalkRun
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.shape.states import to_states
+from snakewalk.controller.terrain.in_steps import at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.bone_motion import BoneMotion, from_points
@@ -235,7 +236,7 @@ class SnakeSynthesis:
             run.waypoint_radius_m,
             how.target_spacing_m,
             run.walk.carrot_m,
-            self.prepared.planner,
+            lambda *points: at_once(self.prepared.planner.in_steps(*points)),
         )
         curves = _Curves(
             self._values_along_body(how.sliding, how.sliding_along, most),

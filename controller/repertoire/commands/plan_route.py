@@ -5,7 +5,6 @@ from pathlib import Path
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.console.options import show
-from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.repertoire.commands.repertoire_run import run_route
@@ -13,7 +12,6 @@ from snakewalk.controller.repertoire.repertoire_planning import (
     plan_facts,
     plan_route,
     save_plan,
-    search_cost,
 )
 
 
@@ -25,24 +23,19 @@ def plan_with_repertoire(
     robot: str | None,
     world: str | None,
     beam: int,
-    physics: int,
     out: Path | None,
     carry: bool,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Search over recorded actions; show, and where asked save, time on the physics, and run."""
+    """Search over recorded actions; show the plan, and where asked save and run it."""
     refuse_to_overwrite([out], force)
-    if physics or carry:
-        require_extra("candidates and runs on the physics need", "mujoco")
+    if carry:
+        require_extra("runs on the physics need", "mujoco")
     job = plan_route(run, repertoire, robot=robot, world=world, beam=beam)
     facts = plan_facts(job)
     if not as_json:
         facts["actions"] = ", ".join(job.action_names)
-    if physics:
-        with ProgressBar("candidates on the physics", physics) as bar:
-            cost = search_cost(job, physics, beam=beam, on_progress=bar.update)
-        facts |= cost.to_dict()
     if out is not None:
         save_plan(job, out)
         facts["plan"] = str(out)

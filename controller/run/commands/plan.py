@@ -63,12 +63,6 @@ def plan(
             help="number of action sequences that the search keeps per round; default: 400",
         ),
     ] = None,
-    physics: Annotated[
-        int,
-        typer.Option(
-            min=0, help="number of candidate plans to simulate, to compare computing times"
-        ),
-    ] = 0,
     out: Annotated[
         Path | None, typer.Option("-o", "--out", help="write the planned actions here as JSON")
     ] = None,
@@ -94,17 +88,14 @@ def plan(
             robot=robot,
             world=world,
             beam=beam or 400,
-            physics=physics,
             out=out,
             carry=carry,
             force=force,
             as_json=as_json,
         )
         return
-    if repertoire is not None or beam is not None or out is not None or carry or physics:
-        raise InputError(
-            "--repertoire, --beam, --out, --run and --physics belong to --with repertoire"
-        )
+    if repertoire is not None or beam is not None or out is not None or carry:
+        raise InputError("--repertoire, --beam, --out and --run belong to --with repertoire")
 
     prepared = prepare_walk(
         run,
@@ -173,6 +164,8 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         output = parse_stop_output(safety.stop_output)
         if isinstance(output, StopCommand) and output.fault is not None:
             warnings.append(f"{output.fault}, or plan on the computer of the robot")
+    if prepared.keep_off is not None:
+        plan_facts["obstacle"] = prepared.keep_off.distance_text(prepared.path)
     if prepared.ground_ahead is not None:
         facts, more = _ground_facts(prepared)
         plan_facts |= facts

@@ -62,7 +62,7 @@ class SteeredRun(PathRun, GaitRun):
         """Return a fresh motion."""
         run = self.run
         course = Course(
-            self.planner,
+            self.planner.in_steps,
             run.waypoints_m,
             start_m=np.array(run.start_m),
             radius_m=run.waypoint_radius_m,

@@ -24,6 +24,7 @@ from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_fau
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
 from snakewalk.controller.terrain.climb import CLIMBED_RAD, SteepSection, steep_sections
 from snakewalk.controller.terrain.growing_map import GrowingMap
+from snakewalk.controller.terrain.keep_off import KeepOff, level_ground
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
@@ -33,7 +34,6 @@ from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.controller.walk.map_walk import MapWalk
 from snakewalk.controller.walk.pilot import Aimed, Pilot, PitchControl, ShapeChooser
 from snakewalk.controller.walk.predictive_walker import PredictiveWalker
-from snakewalk.controller.walk.replanning import PathPlanner
 from snakewalk.controller.walk.roll_planner import RollPlanner
 from snakewalk.controller.walk.serpenoid import Serpenoid
 from snakewalk.controller.walk.shape_filters import MADE, passes_all, shape_filters
@@ -41,6 +41,9 @@ from snakewalk.controller.walk.side_roll import SideRolls
 from snakewalk.controller.walk.steering import Steering
 from snakewalk.controller.walk.time_law import TimeLaw
 from snakewalk.controller.walk.walker import Walker
+
+_HALF_WAVE = 0.14
+"""Half width of a wave, body lengths: 90 % of the shapes of the default recording are narrower."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,20 @@ class PathRun(GroundedRun):
     @cached_property
     def planner(self) -> TerrainPlanner:
         """Plans paths over safe ground."""
-        return TerrainPlanner(self.ground_ahead, self.world.planner)
+        ground = self.ground_ahead
+        if self.keep_off is not None and self.ground is None:
+            points_m = np.vstack([self.run.start_m, self.run.waypoints_m])
+            ground = level_ground(self._map_size_m[0], points_m)
+        return TerrainPlanner(ground, self.world.planner, keep_off=self.keep_off)
+
+    @property
+    def keep_off(self) -> KeepOff | None:
+        """Obstacle that paths avoid, if the run does not map its ground."""
+        obstacle = self.world.obstacle
+        if obstacle is None or self.run.mapping is not None:
+            return None
+        radius_m = self.robot.body_radius_m
+        return KeepOff(obstacle, radius_m, _HALF_WAVE * self.robot.length_m + radius_m)
 
     @cached_property
     def path(self) -> SplinePath:
@@ -76,7 +92,7 @@ class PathRun(GroundedRun):
                 f"{where} is outside the world, {wide_m[0]:.1f} m by {wide_m[1]:.1f} m"
             )
         obstacle = self.world.obstacle
-        if obstacle is not None and obstacle.is_blocked_at(x_m, y_m):
+        if obstacle is not None and obstacle.gap_m(x_m, y_m) <= 0.0:
             raise InputError(f"{where} is in the world's obstacle, the {obstacle.kind}")
 
     def on_map(self, points_m: Floats) -> Bools:
@@ -199,7 +215,7 @@ class WalkRun(PathRun):
         chooser: ShapeChooser,
         *,
         level: bool = False,
-        planner: PathPlanner | None = None,
+        planner: MapPlanner | None = None,
         fitter: PitchFitter | None = None,
     ) -> Pilot:
         run = self.run
@@ -215,7 +231,7 @@ class WalkRun(PathRun):
             time_law,
             pace=Pace.limit(robot),
             course=Course(
-                planner or self.planner,
+                (planner or self.planner).in_steps,
                 run.waypoints_m,
                 start_m=np.array(run.start_m),
                 radius_m=run.waypoint_radius_m,

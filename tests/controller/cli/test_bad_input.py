@@ -146,7 +146,7 @@ ROWS = [
     ("trials run rolling --seeds 1 --track worm-like", "--track worm-like: is of walks"),
     ("trials run flat-slalom --seeds 1 --seconds 9", "--seconds 9: is of gaits"),
     ("plan flat-square --set run.start_m=[1e9,0]", "start_m.0: must be at most 1000"),
-    ("plan flat-square --beam 4", "--beam, --out, --run and --physics belong to --with"),
+    ("plan flat-square --beam 4", "--beam, --out and --run belong to --with"),
     ("run flat-square --view --view-at 192.0.2.1", "192.0.2.1 is not an address of this machine"),
     ("run flat-square --view-at 127.0.0.1:99", "--view-at: is of the page: add --view"),
     ("run flat-square --no-film --look snake", "--look: is of the film, which --no-film leaves"),

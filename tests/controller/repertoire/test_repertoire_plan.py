@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.search_cost import physics_route, search_cost
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.kinematics.frame import Frame
@@ -16,10 +17,8 @@ from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S
 from snakewalk.controller.repertoire.repertoire_planning import (
     load_plan,
-    physics_route,
     plan_route,
     save_plan,
-    search_cost,
 )
 from snakewalk.controller.repertoire.repertoire_run import RouteMotion
 from snakewalk.controller.repertoire.replay import replay

@@ -10,6 +10,7 @@ from snakewalk.controller.terrain.dubins import PathTurns, dubins_curves
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from tests.controller.terrain.test_planner import field, hill
+from tests.helpers.planned import whole_path
 
 PI = np.pi
 
@@ -107,7 +108,7 @@ def heading_at(path: SplinePath, s: float) -> float:
 @pytest.mark.parametrize("ground", [None, field(lambda x, y: 0.0 * x)], ids=["floor", "level"])
 def test_a_path_begins_with_the_body_and_passes_its_waypoints(ground, heading: float) -> None:
     points = np.array([(0.0, 0.0), (1.2, 0.3), (1.2, 1.2)])
-    path = TerrainPlanner(ground, PlannerConfig())(points, heading, 0.4)
+    path = whole_path(TerrainPlanner(ground, PlannerConfig()), points, heading)
     np.testing.assert_allclose(path.position(0.0), points[0], atol=1e-12)
     assert abs(np.angle(np.exp(1j * (heading_at(path, 0.0) - heading)))) < 0.02
     at = path.position(np.arange(0.0, path.length_m, 0.005))
@@ -117,7 +118,7 @@ def test_a_path_begins_with_the_body_and_passes_its_waypoints(ground, heading: f
     np.testing.assert_allclose(path.position(path.length_m), points[-1], atol=1e-9)
     step = np.diff(path.position(np.arange(0.0, 1.0, 0.02)), axis=0)
     direction = step[:, 0] + 1j * step[:, 1]
-    assert np.abs(np.angle(direction[1:] / direction[:-1])).max() <= 0.02 / 0.4 * 1.05
+    assert np.abs(np.angle(direction[1:] / direction[:-1])).max() <= 0.02 / 0.5 * 1.05
     assert (np.hypot(*np.diff(at, axis=0).T) < 0.0051).all()  # no jump where they join
 
 
@@ -138,9 +139,9 @@ def test_a_turn_joins_as_soon_as_it_pays() -> None:
 def test_a_turn_stays_on_safe_ground_where_one_does() -> None:
     """The body stands beside a hill; the shortest turn back leads over the foot of it."""
     planner = TerrainPlanner(field(hill), PlannerConfig(edge_margin_m=0.1))
-    points, heading = np.array([(-0.9, 0.4), (-1.5, -1.2)]), np.radians(30.0)
-    level = turned_onto(planner(points), heading, 0.35, 9.0)
-    aware = planner(points, heading, 0.35)
+    points, heading = np.array([(-1.0, 0.5), (-1.5, -1.2)]), np.radians(30.0)
+    level = turned_onto(whole_path(planner, points), heading, 0.5, 9.0)
+    aware = whole_path(planner, points, heading)
     unsafe = [
         float((~planner.relief.safe(*path.position(np.arange(0.0, path.length_m, 0.01)).T)).mean())
         for path in (level, aware)

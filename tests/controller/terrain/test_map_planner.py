@@ -9,6 +9,7 @@ from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.map_planner import MapPlanner
 from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.relief import Relief
+from tests.helpers.planned import whole_path
 
 CONFIG = PlannerConfig()
 SIDE = np.linspace(-3.0, 3.0, 121)
@@ -24,13 +25,13 @@ def ground(known: np.ndarray, z: np.ndarray | None = None) -> HeightField:
 def planned(field: HeightField, points: np.ndarray) -> np.ndarray:
     planner = MapPlanner(CONFIG)
     planner.update(field)
-    path = planner(points)
+    path = whole_path(planner, points)
     return path.piece_m(0.0, path.length_m)
 
 
 def test_before_there_is_a_map_it_goes_straight() -> None:
     planner = MapPlanner(CONFIG)
-    path = planner([START, GOAL])
+    path = whole_path(planner, [START, GOAL])
     assert path.length_m == pytest.approx(4.0)
     assert not planner.safe(START)
     assert planner.clear(np.array([START, GOAL]))
@@ -40,7 +41,7 @@ def test_on_a_whole_map_it_is_the_planner() -> None:
     z = 0.4 * np.exp(-(X**2 + (Y - 0.2) ** 2) / (2 * 0.3**2))
     field = ground(np.ones(X.shape, bool), z)
     found = planned(field, np.array([START, GOAL]))
-    path = TerrainPlanner(field, CONFIG)([START, GOAL])
+    path = whole_path(TerrainPlanner(field, CONFIG), [START, GOAL])
     np.testing.assert_allclose(found, path.piece_m(0.0, path.length_m))
 
 
@@ -82,4 +83,4 @@ def test_without_any_safe_ground_it_says_so() -> None:
     planner = MapPlanner(CONFIG)
     planner.update(ground(np.zeros(X.shape, bool)))
     with pytest.raises(InputError, match="no safe ground"):
-        planner(np.array([START, GOAL]))
+        whole_path(planner, np.array([START, GOAL]))

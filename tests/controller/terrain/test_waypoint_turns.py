@@ -11,6 +11,7 @@ from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.terrain.waypoint_turns import WaypointTurns
 from tests.controller.terrain.test_dubins import heading_at, level_cost
 from tests.controller.terrain.test_planner import field
+from tests.helpers.planned import whole_path
 
 BACK_AND_FORTH = np.array([(0.0, 0.0), (2.0, 0.0), (0.2, 0.05)])
 BEND_M = PlannerConfig().bend_radius_m
@@ -44,7 +45,7 @@ def valley(half_width_m: float) -> TerrainPlanner:
 def test_a_path_that_turns_back_swings_out(ground) -> None:  # type: ignore[no-untyped-def]
     points = BACK_AND_FORTH - [1.0, 0.0]
     assert sharpest_bend(SplinePath(points))[0] < 0.1
-    path = TerrainPlanner(ground, PlannerConfig())(points)
+    path = whole_path(TerrainPlanner(ground, PlannerConfig()), points)
     assert sharpest_bend(path)[0] > 0.95 * RADIUS_M
     assert_passes(path, points)
 
@@ -53,11 +54,13 @@ def test_a_waypoint_behind_the_body_gets_a_turn_that_the_body_can_follow() -> No
     """A turn of 128 degrees at 0.19 m was left; a corner of 90 degrees at 0.2 m is followed."""
     points = np.array([(0.0, 0.0), (1.5, 0.0), (1.5, -0.8), (0.0, -0.8), (0.8, 0.2)])
     assert 0.45 * BEND_M < sharpest_bend(SplinePath(points))[0] < 0.25
-    path = TerrainPlanner(None, PlannerConfig())(points)
+    path = whole_path(TerrainPlanner(None, PlannerConfig()), points)
     assert sharpest_bend(path)[0] > BEND_M
     assert_passes(path, points)
     corners = np.array([(0.0, 0.0), (1.2, 0.0), (1.2, 1.2), (2.4, 1.2)])
-    assert sharpest_bend(TerrainPlanner(None, PlannerConfig())(corners))[0] < 0.75 * BEND_M
+    assert (
+        sharpest_bend(whole_path(TerrainPlanner(None, PlannerConfig()), corners))[0] < 0.75 * BEND_M
+    )
 
 
 def test_round_bends_stay_as_they_are() -> None:
@@ -91,14 +94,14 @@ def test_the_direction_at_the_waypoint_is_the_cheapest_of_all() -> None:
 
 def test_a_turn_is_tighter_where_the_ground_leaves_no_room_and_none_where_it_has_none() -> None:
     points = BACK_AND_FORTH - [1.0, 0.0]
-    roomy, narrow, slot = (valley(half)(points) for half in (1.6, 0.4, 0.2))
+    roomy, narrow, slot = (whole_path(valley(half), points) for half in (1.6, 0.4, 0.2))
     for path in (roomy, narrow, slot):
         assert_passes(path, points)
     assert sharpest_bend(roomy)[0] > 0.95 * RADIUS_M
     assert 0.7 * BEND_M < sharpest_bend(narrow)[0] < 0.8 * BEND_M
     assert sharpest_bend(slot)[0] < 0.1
     planner = valley(0.4)
-    along = planner(points).position(np.arange(0.0, narrow.length_m, 0.01))
+    along = whole_path(planner, points).position(np.arange(0.0, narrow.length_m, 0.01))
     assert planner.relief is not None
     assert planner.relief.safe(*along.T).all()
     assert not planner.relief.safe(*roomy.position(np.arange(0.0, roomy.length_m, 0.01)).T).all()
@@ -117,8 +120,8 @@ def test_the_start_may_turn_only_where_the_body_may_begin_in_any_direction() -> 
 def test_from_elsewhere_the_planned_path_is_kept_beyond_the_next_waypoint() -> None:
     points = np.vstack([BACK_AND_FORTH, [(-1.0, 1.0)]]) - [0.5, 0.0]
     planner = TerrainPlanner(None, PlannerConfig())
-    planned = planner(points)
-    again = planner(np.vstack([[(0.4, 0.9)], points[1:]]), 2.0, 0.4)
+    planned = whole_path(planner, points)
+    again = whole_path(planner, np.vstack([[(0.4, 0.9)], points[1:]]), 2.0)
     assert heading_at(again, 0.0) == pytest.approx(2.0, abs=0.02)
     assert_passes(again, points[1:])
     assert sharpest_bend(again)[0] > 0.45 * BEND_M

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.course import Course
 
@@ -19,7 +20,8 @@ class Plans:
         self.reach_m = reach_m
         self.asked: list[np.ndarray] = []
 
-    def __call__(self, points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
+    def __call__(self, points_m, heading_rad=None, *, avoid_m=(), number=1) -> Steps[SplinePath]:
+        yield 1
         points = np.asarray(points_m, float)
         self.asked.append(points)
         within = points[points[:, 0] <= self.reach_m]
@@ -30,7 +32,7 @@ class Plans:
         return SplinePath(within)
 
 
-def course(plan: Callable[..., SplinePath]) -> Course:
+def course(plan: Callable[..., Steps[SplinePath]]) -> Course:
     return Course(
         plan, WAYPOINTS, start_m=np.zeros(2), radius_m=0.3, length_m=1.2, travel_per_body=100.0
     )

@@ -10,9 +10,15 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.motion.path_progress import OpenWaypoints, PathProgress
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.walk.course import Course, OnCourse
 from snakewalk.controller.walk.live_course import WAYPOINTS_MAX, LiveCourse
+
+
+def straight(points_m, heading_rad, *, avoid_m, number=1) -> Steps[SplinePath]:
+    yield 1
+    return SplinePath(points_m)
 
 
 class Walker(OnCourse):
@@ -23,7 +29,7 @@ class Walker(OnCourse):
     def __init__(self) -> None:
         super().__init__(
             Course(
-                lambda points_m, heading_rad=None, *, avoid_m=(), number=1: SplinePath(points_m),
+                straight,
                 [(1.0, 0.0)],
                 start_m=np.zeros(2),
                 radius_m=0.2,

@@ -1,10 +1,13 @@
 """When a pilot lays another path, and what it says of it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.controller.run.factory import prepare_walk
+from snakewalk.controller.terrain.in_steps import Steps
 from snakewalk.controller.terrain.path import SplinePath
 
 STEP_S = 0.04
@@ -14,11 +17,11 @@ def test_a_body_that_stands_still_gets_a_path_that_keeps_off_the_place() -> None
     prepared = prepare_walk("jacksboro-traverse", motion="serpenoid")
     planner, asked = prepared.planner, []
 
-    def plan(points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
+    def plan(points_m, heading_rad=None, *, avoid_m=(), number=1) -> Steps[SplinePath]:
         asked.append(np.array(avoid_m))
-        return planner(points_m, heading_rad, avoid_m=avoid_m)
+        return planner.in_steps(points_m, heading_rad, avoid_m=avoid_m)
 
-    prepared.__dict__["planner"] = plan
+    prepared.__dict__["planner"] = SimpleNamespace(in_steps=plan)
     pilot, robot = prepared.pilot(level=True), prepared.robot
     view = body_in_world(
         robot, pose_at(np.array(prepared.run.start_m), 0.0), np.zeros(robot.joint_count)

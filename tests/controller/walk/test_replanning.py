@@ -17,6 +17,7 @@ from snakewalk.controller.terrain.planner import TerrainPlanner
 from snakewalk.controller.walk.course import Course
 from snakewalk.controller.walk.pilot import Pilot
 from snakewalk.controller.walk.replanning import UNITS_PER_CYCLE
+from tests.helpers.planned import whole_path
 
 WAYPOINTS = [(2.0, 0.0), (4.0, 1.0)]
 _prepared = cache(prepare_job)
@@ -28,9 +29,6 @@ class SlowPlans:
     def __init__(self) -> None:
         self.has_way = True
 
-    def __call__(self, points_m, heading_rad=None, *, avoid_m=(), number=1) -> SplinePath:
-        return at_once(self.in_steps(points_m, heading_rad, avoid_m=avoid_m, number=number))
-
     def in_steps(self, points_m, heading_rad=None, *, avoid_m=(), number=1) -> Steps[SplinePath]:
         for _ in range(10):
             yield UNITS_PER_CYCLE
@@ -41,7 +39,12 @@ class SlowPlans:
 
 def course(plan: SlowPlans) -> Course:
     return Course(
-        plan, WAYPOINTS, start_m=np.zeros(2), radius_m=0.3, length_m=1.2, travel_per_body=100.0
+        plan.in_steps,
+        WAYPOINTS,
+        start_m=np.zeros(2),
+        radius_m=0.3,
+        length_m=1.2,
+        travel_per_body=100.0,
     )
 
 
@@ -112,7 +115,7 @@ def test_planned_in_steps_it_is_the_path_of_one_piece(job: str) -> None:
     assert isinstance(run, WalkRun)
     planner, waypoints_m = run.planner, np.array(run.run.waypoints_m)
     for points_m, heading_rad, avoid_m in requests(planner, run.path, waypoints_m):
-        whole = planner(points_m, heading_rad, avoid_m=avoid_m)
+        whole = whole_path(planner, points_m, heading_rad, avoid_m=avoid_m)
         part = Unfinished(planner.in_steps(points_m, heading_rad, avoid_m=avoid_m))
         cycles = 1
         while not part.carry_on(UNITS_PER_CYCLE):

@@ -29,7 +29,7 @@ SWING = [len(ROBOT.joint_axes) + 2 * leg for leg in range(4)]
 def steered(name: str = "trot", **values: object) -> SteeredGait:
     planner = TerrainPlanner(None, prepare_job("salamander-square").world.planner)
     course = Course(
-        planner,
+        planner.in_steps,
         [(4.0, 0.0), (8.0, 0.0)],
         start_m=np.zeros(2),
         radius_m=0.3,
