@@ -16,7 +16,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.gaits.gait import Needs
 from snakewalk.controller.kinematics.links import BodyView
-from snakewalk.controller.kinematics.roll_compensation import RollCompensation
+from snakewalk.controller.kinematics.roll_compensation import RollCompensation, body_roll_rad
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import (
@@ -45,6 +45,16 @@ _RECENT_SEGMENTS = 30
 """Length of track behind the head, besides the body, for a twin in another process."""
 _PITCH_SMOOTHING_S = 0.1
 
+_STALLS_TO_REST = 3
+"""Stalls in one place after which the body rests (ours); before the last attempt it backs out."""
+_ON_SIDE_RAD = 1.3
+"""Roll of a body that lies on its side (ours); it rests at its first stall."""
+_BACK_BODIES = 1.5
+"""Distance by which it backs out, body lengths (ours)."""
+
+_JOIN_S = 0.4
+"""Time constant with which the goals leave the last shape after backing out (ours)."""
+
 # Shorter steps are accumulated: they are too short to measure a speed.
 _SHORTEST_STEP_S = 1e-5
 
@@ -67,6 +77,10 @@ class ShapeChooser(Protocol):
         """Append the next piece, prepared by ``think`` if there was time."""
         ...
 
+    def restart(self, body_rad: Floats) -> None:
+        """Continue from a body (N,) that did not follow the track."""
+        ...
+
 
 class AimedChooser(Protocol):
     """A chooser that uses only the direction of an aim."""
@@ -84,6 +98,7 @@ class Aimed:
     def __init__(self, chooser: AimedChooser) -> None:
         self._chooser = chooser
         self.track = chooser.track
+        self.restart = chooser.track.restart
 
     def think(self, look: Callable[[], PathPose]) -> bool:
         """Return False: the chooser decides at once."""
@@ -165,13 +180,20 @@ class Pilot(OnCourse):
         self._decides = True
         self._has_thought = False
         self._coasts = False
+        self._stalls = 0
+        self._is_stuck = False
+        self._back_to: float | None = None
+        self._offset_rad = np.zeros(len(self._goal_rad))
+        self.on_event: Callable[[str, str], None] = lambda kind, text: None
+        """Receives the kind of an event, and a line of text."""
         self.decision: Decision | None = None
         """Decision of the last step, if there was one."""
 
     @property
     def done(self) -> bool:
-        """Whether every waypoint has been reached and the shape is at rest."""
-        return self.course.complete and self._time_law.speed_segments_s == 0.0
+        """Whether every waypoint has been reached, or the body is stuck, and the shape rests."""
+        ends = self.course.complete or self._is_stuck
+        return ends and self._time_law.speed_segments_s == 0.0
 
     @property
     def head(self) -> float:
@@ -250,7 +272,12 @@ class Pilot(OnCourse):
         if self._saved_s < _SHORTEST_STEP_S:
             return self._goal_rad
         dt_s, self._saved_s = self._saved_s, 0.0
-        goal = self._move(dt_s, view) if self._coasts else self._steer(dt_s, view)
+        if self._back_to is not None and self._time_law.speed_segments_s <= 0.0:
+            goal = self._back_out(dt_s, view)
+        else:
+            goal = self._move(dt_s, view) if self._coasts else self._steer(dt_s, view)
+        goal = goal + self._offset_rad
+        self._offset_rad = max(0.0, 1.0 - dt_s / _JOIN_S) * self._offset_rad
         self._earlier_rad, self._last_rad, self._goal_rad = self._last_rad, self._goal_rad, goal
         self._earlier_s, self._last_s = self._last_s, dt_s
         return goal
@@ -268,14 +295,45 @@ class Pilot(OnCourse):
             self._fall_back,
         )
         self.decision = None
+        stalls = self.course.stalls
+        if stalls != self._stalls:
+            self._stalls = stalls
+            self._meet_stall(abs(body_roll_rad(view)))
         self._has_thought = self._prepare_decision(view)
         if not self._has_thought:
             self.course.continue_planning(self._fall_back)
-        if self.course.complete:
+        if self.course.complete or self._is_stuck or self._back_to is not None:
             self._time_law.stop()
         else:
             self._time_law.go_on()
         return self._move(dt_s, view)
+
+    def _meet_stall(self, roll_rad: float) -> None:
+        """Rest if the body lies on its side, or stalls often in one place; first back out."""
+        self._is_stuck = roll_rad > _ON_SIDE_RAD or self._stalls >= _STALLS_TO_REST
+        if self._is_stuck:
+            self.on_event(
+                "stuck",
+                f"no advance in {self._stalls} attempts at this place, "
+                f"{np.degrees(roll_rad):.0f} degrees off upright: the body rests, and the run ends",
+            )
+        elif self._stalls == _STALLS_TO_REST - 1:
+            self._back_to = self.head - _BACK_BODIES * self._chooser.track.points
+            self.on_event("stuck", "no advance again: the body backs out the way it came")
+
+    def _back_out(self, dt_s: float, view: BodyView) -> Floats:
+        """Step back along the track; at its end continue from the shape there."""
+        chooser = self._chooser
+        assert self._back_to is not None
+        self.watch(view)
+        if self._time_law.back(self._back_to, dt_s):
+            self._back_to = None
+            shape_rad, before_rad = chooser.track.body_rad(self.head), self._goal_rad
+            self.restart(view, lambda measured_rad: chooser.restart(shape_rad))
+            self._offset_rad = before_rad - self._goal_rad
+            self.course.lay_from_here("backed out", lambda: view.heading_rad)
+            return self._goal_rad
+        return self._on_ground(self._time_law.goal_rad(), dt_s, view)
 
     def _prepare_decision(self, view: BodyView) -> bool:
         """Prepare the next piece of track, or decide; return whether that fills the cycle.

@@ -15,6 +15,9 @@ from snakewalk.controller.walk.joint_track import JointTrack
 from snakewalk.drivers.compiling import compiled
 
 _LEAST_BEND = 1e-9
+_CLOSE_SEGMENTS = 0.2
+_BACK_SHARE = 0.3
+"""Share of the usual gain in speed with which a head turns back (ours)."""
 
 
 class TimeLaw:
@@ -93,6 +96,20 @@ class TimeLaw:
         )
         self.head = min(self._first + travelled, float(self.joints.last))
         return self.head
+
+    def back(self, to_head: float, dt_s: float) -> bool:
+        """Move the head back along its track by ``dt_s``; return whether it rests at ``to_head``.
+
+        The speed is at most the lowest that any place so far allowed.
+        """
+        to_head = max(to_head, float(self.joints.first))
+        left = max(self.head - to_head, 0.0)
+        fastest = max(-self._least, -left)  # the last segments take a second each
+        self.speed_segments_s = max(
+            fastest, self.speed_segments_s - _BACK_SHARE * self._slew * dt_s
+        )
+        self.head = min(self.head + self.speed_segments_s * dt_s, float(self.joints.last))
+        return left < _CLOSE_SEGMENTS
 
     def goal_rad(self) -> Floats:
         """(J,) joint goals at the head."""

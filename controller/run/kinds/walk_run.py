@@ -301,6 +301,7 @@ class WalkRun(PathRun):
             return self._map_walk(self.ground_map)
         chooser = self._chooser()
         pilot = self._pilot(chooser)
+        pilot.on_event = on_event
         if not isinstance(chooser, PredictiveWalker) or self.bridged is None or not self._rolls:
             return pilot
         relief = self.planner.relief
