@@ -104,7 +104,7 @@ class TimeLaw:
         """
         to_head = max(to_head, float(self.joints.first))
         left = max(self.head - to_head, 0.0)
-        fastest = max(-self._least, -left)  # the last segments take a second each
+        fastest = max(-self._least, -left)  # slower with each segment, to rest
         self.speed_segments_s = max(
             fastest, self.speed_segments_s - _BACK_SHARE * self._slew * dt_s
         )

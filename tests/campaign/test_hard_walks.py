@@ -8,7 +8,6 @@ from benchmarks.hard_walks import FAULTS, KINDS, drawn, fault_of, is_false, tabl
 
 
 @pytest.mark.slow
-@pytest.mark.slow_cases(5, "8 s of CPU each; python -m benchmarks.hard_walks walks 1,000")
 @pytest.mark.parametrize("seed", range(9000, 9020))
 def test_a_hard_walk_of_sound_servos_has_no_false_trip(seed: int) -> None:
     row = walked(seed)
