@@ -74,7 +74,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.pose": (8_550, "0243-a-known-motion-calibrates-a-source.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (10_050, "0277-end-of-a-run-in-the-browser.md"),
-    "controller.run": (22_450, "0243-a-known-motion-calibrates-a-source.md"),
+    "controller.run": (22_520, "0251-paths-keep-off-obstacles.md"),
     "controller.exchange": (18_370, "0267-facts-of-a-file-have-sources.md"),
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),
     "controller.metrics": (6_410, "0279-comparison-by-rows.md"),
