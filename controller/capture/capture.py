@@ -22,6 +22,7 @@ from snakewalk.controller.capture.small_body.film_fit import (
     with_tip_errors,
 )
 from snakewalk.controller.capture.verification.film_check import has_faint_continuation, verified
+from snakewalk.controller.capture.verification.steady_tails import with_steady_tails
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -178,9 +179,15 @@ def captured_from(
             f"{len(points)} frames"
         )
     score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)
-    skeletons = [skeleton.reversed() if score < 0.0 else skeleton for skeleton in aligned.skeletons]
+    skeletons, tips_px = with_steady_tails(
+        [skeleton.reversed() if score < 0.0 else skeleton for skeleton in aligned.skeletons],
+        detections.tip_error_px,
+    )
     solved = np.isfinite(coils.expected_px)
     expected = np.where(solved, coils.expected_px, detections.expected_px)
+    for k, tip_px in tips_px.items():
+        # blur moves the head only; the points between share the errors of both ends
+        expected[k] = 0.5 * np.hypot(expected[k], tip_px)
     crops = detections.crops.without(set(np.flatnonzero(solved).tolist()))
     fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
     fitted = with_tip_errors(fitted, detections.ends_px, solved)

@@ -26,8 +26,7 @@ from snakewalk.controller.capture.coil_fit import (
     line_slopes,
     normal_of,
 )
-from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _SAMPLE = 40  # good frames from which the body and its usual residual are learnt
@@ -238,7 +237,7 @@ class _Film:
         return out
 
     def _end(self, k: int, skeletons: Sequence[Skeleton]) -> "_End | None":
-        if not 0 <= k < len(skeletons) or skeletons[k].status is not FrameStatus.GOOD:
+        if k not in self.outlines or skeletons[k].status is not FrameStatus.GOOD:
             return None
         shape = Shape.of(self.outlines[k], self.body.scale)
         first, other = (
@@ -451,14 +450,12 @@ class _Film:
         return FrameStatus.COIL, float(np.hypot(frame_error_px, best.apart[n]))
 
     def _skeleton(self, line_px: Floats) -> Skeleton:
-        place = np.linspace(0.0, len(self.body.half_width) - 1.0, SEGMENTS + 1)
-        radius = np.interp(place, np.arange(len(self.body.half_width)), self.body.half_width)
-        try:
-            points = equipartition(line_px, SEGMENTS).points
-        except (NoEquipartitionError, ValueError):
-            points = line_px[:: (len(line_px) - 1) // SEGMENTS]
-        length = float(np.hypot(*np.diff(points, axis=0).T).sum())
-        return Skeleton(points, radius / self.body.scale, length, FrameStatus.COIL)
+        body = in_equal_chords(line_px, self.body.half_width / self.body.scale)
+        return (
+            no_skeleton(FrameStatus.BLOB)
+            if body is None
+            else replace(body, status=FrameStatus.COIL)
+        )
 
 
 def _unsolved_skeleton(skeleton: Skeleton, status: FrameStatus) -> Skeleton:

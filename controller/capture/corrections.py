@@ -19,8 +19,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.controller.capture.capture import CaptureFile
 from snakewalk.controller.capture.identity import margins
-from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _LONGEST_LINE: Final = 4.0
@@ -152,12 +151,10 @@ def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats
             f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px; "
             "redraw it"
         )
-    try:
-        even = equipartition(line, SEGMENTS)
-    except (NoEquipartitionError, ValueError):
+    body = in_equal_chords(line, radius_px)
+    if body is None:
         raise InputError(
             f"{where}: the line cannot be divided into {SEGMENTS} equal chords; it is folded upon "
             "itself"
-        ) from None
-    status = FrameStatus.BY_HAND
-    return Skeleton(even.points, radius_px.copy(), even.chord * SEGMENTS, status)
+        )
+    return replace(body, status=FrameStatus.BY_HAND)

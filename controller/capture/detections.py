@@ -48,8 +48,8 @@ class Detections:
     body with a faint tail, which no coil's outline shows."""
     faint_error_px: dict[int, float] = field(default_factory=dict)
     """By frame: least expected error of bodies with faint parts, apart from hidden bands."""
-    tails: int = 0
-    """Number of bodies whose faint tail was followed to its tip."""
+    tip_error_px: dict[int, float] = field(default_factory=dict)
+    """By frame: error of the tip of a faint tail that was followed."""
     bands_px: list[float] = field(default_factory=list)
     """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
@@ -91,9 +91,8 @@ class Detections:
             ends_px = profile_ends(line, body.radius_px, silhouette.level, blur_px)
             ends_px[:, :2] += first
             if is_tailed:
-                # the edge's blur moves the head only; points between share the errors of both ends
-                axis_px = 0.5 * float(np.hypot(axis_px, detection.tip_error_px))
-                self.tails += 1
+                ends_px = NO_ENDS
+                self.tip_error_px[number] = detection.tip_error_px
             elif detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN_PART * hidden**2 * body.length_px)
@@ -133,7 +132,9 @@ class Detections:
 
     def shows_tips(self, skeletons: Sequence[Skeleton]) -> bool:
         """Whether most tips are those of followed tails: nothing is seen beyond them."""
-        return self.tails > 0.5 * sum(skeleton.status.has_points for skeleton in skeletons)
+        return len(self.tip_error_px) > 0.5 * sum(
+            skeleton.status.has_points for skeleton in skeletons
+        )
 
     @property
     def least_error_px(self) -> dict[int, float]:

@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Bools, DeepImage, Floats
-from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.images.faint_parts import FAINTEST
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, contrast
-from snakewalk.controller.track.frame_status import FrameStatus
 
 _DIRECTION_PX = 9.0  # length of the rays that are compared
 _RADIUS_PX = 9.0  # smallest radius of a bend
@@ -31,10 +29,7 @@ _UNSURE = 2.0  # clearness of a tail that may go on below the limit for stains (
 _SAMPLES = 400  # rays on bare ground
 _LEAST_LENGTH_PX = 4.0  # a shorter extension is ignored
 _THINNEST_PX, _WIDEST_PX = 1.0, 3.0  # half width of a tail
-_MARGIN_LENGTHS, _MARGIN_PX = (
-    1.0,
-    20,
-)  # of the length of the silhouette, and px: where tails are searched
+_MARGIN_LENGTHS, _MARGIN_PX = 2.0, 20  # lengths of the silhouette, and px: where tails lie
 _FREE_DISTANCE_PX = 12.0  # from the silhouette: bare ground, but for the tail
 _END_STATIONS = 10  # of the skeleton: the width at its end
 _SMOOTH = 2.0  # stations
@@ -197,16 +192,12 @@ def with_tails(
     if not added:
         return None
     smooth = gaussian_filter1d(line, _SMOOTH, axis=0, mode="nearest")
-    try:
-        even = equipartition(np.vstack([line[:1], smooth, line[-1:]]), SEGMENTS)
-    except (NoEquipartitionError, ValueError):
-        return None
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    smooth = np.vstack([line[:1], smooth, line[-1:]]) + np.array([x, y])
     shares = np.linspace(0.0, arc[-1], SEGMENTS + 1)
-    length = even.chord * SEGMENTS
-    skeleton = Skeleton(
-        even.points + np.array([x, y]), np.interp(shares, arc, radius), length, FrameStatus.GOOD
-    )
+    skeleton = in_equal_chords(smooth, np.interp(shares, arc, radius))
+    if skeleton is None:
+        return None
     body_level = np.zeros(level.shape, dtype=np.float32)
     body_level[inner] = body.level
     for points in added:

@@ -85,6 +85,17 @@ def no_skeleton(status: FrameStatus) -> Skeleton:
     return Skeleton(nan[:, :2].copy(), nan[:, 2].copy(), float("nan"), status)
 
 
+def in_equal_chords(line: Floats, radius_px: Floats) -> Skeleton | None:
+    """Skeleton along a line (P, 2), with radii (R,) of even steps; None if nothing divides it."""
+    try:
+        even = equipartition(line, SEGMENTS)
+    except (NoEquipartitionError, ValueError):
+        return None
+    shares = np.linspace(0.0, len(radius_px) - 1.0, SEGMENTS + 1)
+    radii = np.interp(shares, np.arange(len(radius_px)), radius_px)
+    return Skeleton(even.points, radii, even.chord * SEGMENTS, FrameStatus.GOOD)
+
+
 def skeleton_of(mask: Bools) -> Skeleton:
     """Skeleton of a body given as a mask (H, W) of one component, with or without holes.
 
@@ -182,16 +193,15 @@ def _in_segments(
     heads: Sequence[_WideEnd],
 ) -> Skeleton:
     """Skeleton along a line (n, 2) in the working picture, as wide as its wide ends there."""
-    try:
-        even = equipartition(line, SEGMENTS)
-    except (NoEquipartitionError, ValueError):
+    even = in_equal_chords(line, np.zeros(1))
+    if even is None:
         return no_skeleton(FrameStatus.BLOB)
-    radius = _sample(depth, even.points) / step
+    radius = _sample(depth, even.points_px) / step
     for head in heads:
-        within = np.hypot(*(even.points - head.place).T) < head.length
+        within = np.hypot(*(even.points_px - head.place).T) < head.length
         radius[within] = np.maximum(radius[within], head.deep / step)
-    points = (even.points - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
-    return Skeleton(points, radius, even.chord * SEGMENTS / step, FrameStatus.GOOD)
+    points = (even.points_px - _MARGIN + 0.5) / step - 0.5 + np.asarray(origin_px)
+    return Skeleton(points, radius, even.length_px / step, FrameStatus.GOOD)
 
 
 def _width(mask: Bools) -> float | None:

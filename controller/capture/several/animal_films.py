@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Bools, DeepImage, SignedInts
@@ -22,12 +23,17 @@ from snakewalk.controller.capture.several.blobs import (
 )
 from snakewalk.controller.capture.several.identities import Identity, identities_of
 from snakewalk.controller.capture.several.tracklets import TrackletBuilder
+from snakewalk.controller.images.background import median_background
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DIRT = 0.05  # of the usual area: smaller objects are not mentioned
-_WINDOW_LENGTHS = 1.2  # of the length of a blob, around it: a faint tail goes on beyond the blob
+_WINDOW_LENGTHS = 3.0  # of the length of a blob, around it: a faint tail goes on beyond the blob
 _LEAST_WINDOW_PX = 24
+_COVER_PX = 9  # side of a square: the blurred edge of an animal
+_GAP_PX = 25  # the same, for a part that the first background contains
+_INPAINT_PX = 5.0  # radius from which a ground that is never free is continued
+_FEWEST_FREE = 5  # frames without an animal at a place
 _UNSEEN_FRAME = -1
 _MERGED_FRAME = -2
 _MISSING = {_UNSEEN_FRAME: FrameStatus.NOTHING, _MERGED_FRAME: FrameStatus.MERGED}
@@ -116,6 +122,43 @@ def find_animals(
     return AnimalsFound(
         tuple(kept), len(every) - len(kept), usual, count, smaller=int(np.median(small))
     )
+
+
+def with_bare_ground(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector:
+    """The detector with a background from which the animals are left out with their faint tails.
+
+    A tail that rests in half of the frames would otherwise be a part of the background.
+
+    Args:
+        detector: from ``detector_of_several``, with its own background.
+        frames: (H, W[, C]), spread over the film.
+
+    """
+    first = detector.background
+    if first is None:
+        return detector
+    usual = usual_area([blobs_of(frame, first, detector) for frame in frames])
+    stack = np.stack(frames)
+    covered = np.zeros(stack.shape[:3], dtype=np.uint8)
+    box, gap = (np.ones((side, side), dtype=np.uint8) for side in (_COVER_PX, _GAP_PX))
+    for cover, frame in zip(covered, frames, strict=True):
+        blobs = blobs_of(frame, first, detector, usual)
+        for number in range(len(blobs.area_px)):
+            body = _detected_animal(frame, first, detector, blobs, number)[1].silhouette
+            left, top = (int(v) for v in body.origin_px)
+            rows, columns = body.mask.shape
+            cover[top : top + rows, left : left + columns] |= body.mask
+        cover[:] = cv2.morphologyEx(cv2.dilate(cover, box), cv2.MORPH_CLOSE, gap)
+    free = len(frames) - covered.sum(axis=0, dtype=int)
+    ground = median_background(frames)
+    learnt = (free >= _FEWEST_FREE) & (free < len(frames))
+    levels = stack[:, learnt].astype(np.float32)
+    levels[covered[:, learnt] > 0] = np.nan
+    ground[learnt] = np.nanmedian(levels, axis=0)
+    if ground.dtype == np.uint8:
+        hidden = (free < _FEWEST_FREE).astype(np.uint8)
+        ground = np.asarray(cv2.inpaint(ground, hidden, _INPAINT_PX, cv2.INPAINT_TELEA))
+    return replace(detector, background=ground)
 
 
 def share_of_several(

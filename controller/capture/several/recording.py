@@ -26,6 +26,7 @@ from snakewalk.controller.capture.several.animal_films import (
     capture_animals,
     films_of,
     find_animals,
+    with_bare_ground,
 )
 from snakewalk.controller.capture.several.blobs import SMALLEST, detector_of_several
 from snakewalk.controller.console.messages import LOGGER, stderr_console
@@ -91,6 +92,8 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
             threshold=film.threshold,
             requested_count=requested_count,
         )
+        if film.background is None:
+            detector = with_bare_ground(detector, film.some)
     count = film.footage.count
     scale = 1.0
     if options.review is not None:

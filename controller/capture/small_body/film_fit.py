@@ -30,8 +30,7 @@ from snakewalk.controller.capture.small_body.ribbon import (
     curve_slopes,
 )
 from snakewalk.controller.capture.small_body.tip_profile import beyond_tips_px, tips_error_px
-from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 ROUGH = 0.01
@@ -309,16 +308,12 @@ def _first_body(views: Sequence[View], length: float) -> Floats:
 
 
 def _skeleton(line: Floats, body: FilmBody, space: Workspace, expected_px: float) -> Skeleton:
-    try:
-        even = equipartition(line, SEGMENTS)
-    except (NoEquipartitionError, ValueError):
-        even = None
-    points = line[:: (len(line) - 1) // SEGMENTS] if even is None else even.points
-    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
     place = np.linspace(0.0, 1.0, SEGMENTS + 1)
     radius = np.interp(place, STATIONS, np.exp(body.values[2:BODY])) / space.scale
-    rough = even is None or expected_px > ROUGH * length
-    return Skeleton(points, radius, length, FrameStatus.ROUGH if rough else FrameStatus.GOOD)
+    fitted = in_equal_chords(line, radius)
+    if fitted is None:
+        return no_skeleton(FrameStatus.BLOB)
+    return _with_status(fitted, expected_px, fitted.length_px)
 
 
 @dataclass(frozen=True, slots=True)
