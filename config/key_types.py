@@ -16,10 +16,9 @@ GaitChangeMethod = Annotated[
 ]
 BLEND: Final = "blend"
 LengthUnit = Annotated[
-    Literal["m", "cm", "mm", "km", "ft"],
-    Field(description="unit of the calibration's translation T"),
+    Literal["m", "cm", "mm", "km", "ft"] | None,
+    Field(description="unit of the calibration's translation T if it states none"),
 ]
-METRE: Final = "m"
 Disparities = Annotated[
     int, Field(ge=16, le=2048, description="largest disparity to try in pixels")
 ]

@@ -4,18 +4,24 @@ A reader returns ``Facts`` with its values. Answers to its questions may be stor
 ``FILE.reading.toml`` in the same folder, for later commands.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from pydantic import BaseModel
 
+from snakewalk.config.answers import Answers
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.config.strict_toml import read_toml
 from snakewalk.config.template import plain_toml
 
 M = TypeVar("M", bound=BaseModel)
+A = TypeVar("A", bound=Answers)
+
+
+R = TypeVar("R")
 
 
 class Fact(NamedTuple):
@@ -42,18 +48,48 @@ def texts(facts: Facts) -> dict[str, str]:
     return {name: str(fact) for name, fact in facts.items()}
 
 
-def stated(data: Path, option: str, by_file: str | None, by_user: str | None) -> Fact | None:
+def by_user(option: str, value: str | None) -> Fact | None:
+    """Fact that an option states; None without it."""
+    return None if value is None else Fact(value, "user", option)
+
+
+def by_file(place: str, value: str | None) -> Fact | None:
+    """Fact that a place in a file states; None without it."""
+    return None if value is None else Fact(value, "file", place)
+
+
+def stated(data: Path, option: str, in_file: str | None, answer: str | None) -> Fact | None:
     """Fact that the file or an option of the user states; None if neither does.
 
     Raises:
         InputError: both state one, and they differ.
 
     """
-    if by_user not in (None, by_file) and by_file is not None:
-        raise InputError(f"{option} {by_user}: {data} states {by_file}; leave the option out")
-    if by_file is not None:
-        return Fact(by_file, "file", "the names of its columns")
-    return None if by_user is None else Fact(by_user, "user", option)
+    if answer not in (None, in_file) and in_file is not None:
+        raise InputError(f"{option} {answer}: {data} states {in_file}; leave the option out")
+    return by_file("the names of its columns", in_file) or by_user(option, answer)
+
+
+def decided(
+    where: object, question: str, option: str, readings: Mapping[str, str], given: Fact | None
+) -> Fact:
+    """Return the given fact, else ask for it.
+
+    Args:
+        where: file, for the question.
+        question: the missing statement of the file.
+        option: that answers it.
+        readings: consequence of each possible value.
+        given: stated by the file or the user, or inferred.
+
+    Raises:
+        InputError: the question.
+
+    """
+    if given is not None:
+        return given
+    listed = " or ".join(f"{words} ({option} {value})" for value, words in readings.items())
+    raise InputError(f"{where}: {question}: {listed}")
 
 
 def with_stored(data: Path, answers: M) -> tuple[M, tuple[str, ...]]:
@@ -72,16 +108,30 @@ def with_stored(data: Path, answers: M) -> tuple[M, tuple[str, ...]]:
     return checked(type(answers), stored | given, str(file), text), tuple(lines)
 
 
+def answered(data: Path, answers: A, read: Callable[[A], R]) -> R:
+    """Read a file with the answers of the user and the stored ones; store them if requested.
+
+    Raises:
+        InputError: of ``read``, or the answers cannot be stored.
+        ConfigError: the stored answers have a fault.
+
+    """
+    answers, lines = with_stored(data, answers)
+    result: Any = read(answers)
+    if answers.remember:
+        store(data, answers)
+    noted: R = replace(result, notes=(*lines, *result.notes))
+    return noted
+
+
 def store(data: Path, answers: BaseModel) -> None:
-    """Write answers into the folder of a file.
+    """Write complete answers into the folder of a file.
 
     Raises:
         InputError: no answer is given, or the folder cannot be written.
 
     """
-    answers, _ = with_stored(data, answers)
-    kept = answers.model_copy(update={"remember": False})
-    text = plain_toml(kept, f"Answers about {data.name}")
+    text = plain_toml(answers.model_copy(update={"remember": False}), f"Answers about {data.name}")
     if "=" not in text:
         raise InputError(f"{data}: --remember: no option answers a question; leave it out")
     try:
@@ -91,4 +141,5 @@ def store(data: Path, answers: BaseModel) -> None:
 
 
 def _beside(data: Path) -> Path:
+    data = data if data.name else data.absolute()
     return data.with_name(f"{data.name}.reading.toml")

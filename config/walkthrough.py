@@ -5,7 +5,7 @@ from typing import Self
 from pydantic import Field, model_validator
 
 from snakewalk.config.base import Strict
-from snakewalk.config.key_types import DISPARITIES, METRE, Disparities, LengthUnit
+from snakewalk.config.key_types import DISPARITIES, Disparities, LengthUnit
 
 Pose = tuple[
     tuple[float, float, float, float],
@@ -64,7 +64,7 @@ class WalkthroughConfig(Strict):
         description="calibration of OpenCV's stereoCalibrate (YAML, XML, JSON, NPZ), or a "
         "calib.txt; a path from the folder of this file"
     )
-    unit: LengthUnit = METRE
+    unit: LengthUnit = None
     disparities: Disparities = DISPARITIES
     positions: tuple[PositionConfig, ...] = Field(
         min_length=1, max_length=200, description="positions in the order of the route"

@@ -12,10 +12,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import check_matrices, why_no_file
+from snakewalk.config.archive import why_no_file
 from snakewalk.config.arrays import Floats
-from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
+from snakewalk.controller.images.calibration_storage import read_storage
 
 _MATRICES: Final = "camera_matrix", "distortion_coefficients"
 _ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
@@ -116,26 +116,11 @@ def _stored_matrices(file: Path) -> tuple[list[float], list[Any]]:
     """Width and height, and the two matrices; 0 and None for missing names.
 
     Raises:
-        InputError: OpenCV cannot read the file.
+        InputError: the file cannot be read.
 
     """
-    check_matrices(file)
-    sides = "image_width", "image_height"
-    lists = read_json_lists(file)
-    if lists is not None:
-        size = [lists.get(side) for side in sides]
-        return [
-            float(side.item()) if isinstance(side, np.ndarray) and side.size == 1 else 0.0
-            for side in size
-        ], [lists.get(name) for name in _MATRICES]
-    try:
-        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
-        stored = [store.getNode(side).real() for side in sides]
-        matrices = [store.getNode(name).mat() for name in _MATRICES]
-        store.release()
-    except (cv2.error, SystemError) as error:
-        raise InputError(
-            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
-            "file"
-        ) from None
-    return stored, matrices
+    stored = read_storage(file)
+    size = [_numbers(stored.get(side)) for side in ("image_width", "image_height")]
+    return [float(side.item()) if side.size == 1 else 0.0 for side in size], [
+        stored.get(name) for name in _MATRICES
+    ]

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import Fact, Facts, by_user, texts
 from snakewalk.controller.capture.capture import (
     Capture,
     CaptureFile,
@@ -20,15 +21,16 @@ from snakewalk.controller.capture.capture import (
     save_capture,
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
+from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.film.scale import scale_of_length, scale_of_marker
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
 from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
-from snakewalk.controller.capture.options import CaptureOptions, check_options, settings_of
+from snakewalk.controller.capture.options import check_options, settings_of
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
-from snakewalk.controller.capture.scale import scale_of_length, scale_of_marker
 from snakewalk.controller.capture.verification.film_check import REJECTED
 from snakewalk.controller.capture.verification.remedies import remedy
 from snakewalk.controller.console.messages import LOGGER, stderr_console
@@ -108,6 +110,10 @@ class CaptureFacts:
     """Frames whose finished skeleton their own pixels contradict; ``verdicts`` has the reasons."""
     warning: str | None
     """Doubts about the whole recording."""
+    facts: dict[str, str]
+    """Quantity, unit, order and time base of the film, with their sources."""
+    notes: tuple[str, ...] = ()
+    """Stored answers that were used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +142,10 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
     if options.corrections is None:
         raise ValueError("--corrections: needs a file of corrections")
     plain = CaptureOptions(
-        options.recording, options.output, corrections=options.corrections, force=options.force
+        recording=options.recording,
+        output=options.output,
+        corrections=options.corrections,
+        force=options.force,
     )
     if options != plain:
         raise InputError(
@@ -406,7 +415,27 @@ def facts_of(
         places_recorded=captured.places_recorded,
         frames_rejected=sum(frame_status in REJECTED for frame_status in captured.status),
         warning=warning_of(options, captured),
+        facts=texts(film_facts(options, footage, captured, m_per_px)),
     )
+
+
+def film_facts(
+    options: CaptureOptions, footage: Footage, captured: Capture, m_per_px: float | None
+) -> Facts:
+    """Return the facts about a film, each with its source."""
+    rate = f"{captured.rate_hz:g} Hz"
+    stated = Fact(rate, "file", "the film")
+    if footage.rate_assumed:
+        stated = Fact(rate, "inferred", "the default of films; --rate states another")
+    scale = None if m_per_px is None else f"{m_per_px:.4g} m a pixel"
+    return {
+        "quantity": Fact("silhouettes of an animal", "file", "its pictures"),
+        "unit": by_user("--length-m or --marker", scale)
+        or Fact("px", "inferred", "no scale is given"),
+        "order": by_user("--head", options.head and "head first")
+        or Fact("head first", "inferred", f"{captured.head_by}, sure by {captured.head_sure:.2f}"),
+        "time": by_user("--rate", rate if options.rate_hz else None) or stated,
+    }
 
 
 def warning_of(options: CaptureOptions, captured: Capture) -> str | None:

@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from snakewalk.controller.capture.capture import Capture, CaptureFile
+from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.capture.image_file import scaled
 from snakewalk.controller.capture.opened_film import OpenedFilm
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.plots.capture import contact_sheet, overlay_film
 from snakewalk.controller.capture.review import review_page
 from snakewalk.controller.console.progress import ProgressBar

@@ -8,7 +8,8 @@ import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.options import CaptureOptions, place_of
+from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.options import place_of
 from snakewalk.controller.images.region import WHOLE, Region, region_of
 from snakewalk.controller.images.silhouette import as_deep_as
 from snakewalk.controller.images.video import Footage, frame_times, open_footage

@@ -1,11 +1,11 @@
-"""Options of ``snakewalk animal capture``, and their checks before any work."""
+"""Checks of the options of ``snakewalk animal capture`` before any work."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.console.result_files import refuse_to_overwrite
 from snakewalk.controller.track.readers.writers import SUFFIXES
 
@@ -15,37 +15,6 @@ _SHEETS = (".png", ".jpg", ".jpeg")
 AUTO = "auto"
 """Value of ``animals`` that follows all animals that persist."""
 MOST_ANIMALS = 200
-
-
-@dataclass(frozen=True, slots=True)
-class CaptureOptions:
-    """The options of ``snakewalk animal capture``; see its help."""
-
-    recording: Path
-    output: Path
-    background: Path | None = None
-    length_m: float | None = None
-    marker: str | None = None
-    rate_hz: float | None = None
-    head: str | None = None
-    cropped: bool = False
-    roi: str | None = None
-    mask: Path | None = None
-    threshold: float | None = None
-    overlay: Path | None = None
-    sheet: Path | None = None
-    steps: Path | None = None
-    trail: Path | None = None
-    """Picture of the brightest, or of the darkest, value of each pixel over the film."""
-    review: Path | None = None
-    corrections: Path | None = None
-    animals: str | None = None
-    """A number, or ``auto``; None: one animal."""
-    wide: bool = False
-    """A table with one row a frame."""
-    resume: bool = False
-    """Continue after the finished parts of an interrupted capture."""
-    force: bool = False
 
 
 def check_options(options: CaptureOptions) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from snakewalk.config.answers import LISTED, Answers
+from snakewalk.config.key_types import LengthUnit
 from snakewalk.controller.console.option import Flag
 
 _Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
@@ -49,3 +50,9 @@ class ElevationChoice(Answers):
     assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
         {}, description="KEY=VALUE: a value that the file does not state; may be repeated"
     )
+
+
+class CalibrationChoice(Answers):
+    """Facts that a calibration of two cameras may not state."""
+
+    unit: LengthUnit = None

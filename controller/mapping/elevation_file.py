@@ -1,7 +1,6 @@
 """Elevation map in the robot's world from a file of real ground."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,16 +10,11 @@ from snakewalk.config.archive import ending
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.config.reading import Fact, Facts, store, with_stored
+from snakewalk.config.file_units import unit_m
+from snakewalk.config.reading import Fact, Facts, answered, by_user
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.geo_raster import read_geo_raster
 from snakewalk.controller.mapping.las_file import in_metres, read_las
-from snakewalk.controller.mapping.length_units import (
-    DEGREE,
-    UNSTATED_HEIGHTS,
-    UNSTATED_UNIT,
-    unit_m,
-)
 from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.mapping.point_cloud import read_pcd, read_ply
 from snakewalk.controller.mapping.point_units import points_in_metres
@@ -106,7 +100,6 @@ def _question(finite: Floats, value: float, per_value_m: float, why: str, key: s
     )
 
 
-_UNSTATED = (UNSTATED_UNIT, UNSTATED_HEIGHTS)
 _FEW_SHARE = 0.2
 """Share of points that may be outliers (ours)."""
 _SAME_PLACE = 1e-7
@@ -182,7 +175,10 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
         OSError: the file cannot be opened.
 
     """
-    choice, lines = with_stored(file, options.choice)
+    return answered(file, options.choice, lambda choice: _checked_map(file, choice, options))
+
+
+def _checked_map(file: Path, choice: ElevationChoice, options: MapOptions) -> FileMap:
     assumed = Assumptions(choice.assume)
     elevation_file = _read(file, replace(options, choice=choice, assumed=assumed))
     assumed.check_used("keys: lowest_m, highest_m")
@@ -192,9 +188,7 @@ def read_elevation(file: Path, options: MapOptions) -> FileMap:
             f"{file}: a map of {size_m:.3g} m at a scale of {options.scale:g}; the most is "
             f"{_MOST_SIZE_M:g} m: a smaller --scale, or --crop a part"
         )
-    if choice.remember:
-        store(file, choice)
-    return replace(elevation_file, notes=(*lines, *elevation_file.notes, *assumed.lines))
+    return replace(elevation_file, notes=(*elevation_file.notes, *assumed.lines))
 
 
 def _read(file: Path, options: MapOptions) -> FileMap:
@@ -208,8 +202,9 @@ def _read(file: Path, options: MapOptions) -> FileMap:
         names: list[str] = []
         table = read_numbers(file, notes, names)
         if table.shape[1] == 3:
-            points_m = points_in_metres(file, table, names, options.choice, notes)
-            return _of_points(file, _upright(file, points_m, options), None, options, notes)
+            points_m, facts = points_in_metres(file, table, names, options.choice)
+            upright_m = _upright(file, points_m, options)
+            return _of_points(file, upright_m, None, options, facts, notes)
     if kind in GEO_RASTERS:
 
         def spacing_of(dx_m: float, dy_m: float) -> float:
@@ -231,21 +226,16 @@ def _of_raster(file: Path, raster: Raster, options: MapOptions) -> FileMap:
     _check_heights(file, raster.z_m, raster.per_value_m, options)
     elevation = ElevationMap.of_raster(raster.z_m * rise, dx_m, dy_m, spacing_m)
     size_m = (columns - 1) * raster.dx_m, (rows - 1) * raster.dy_m
-    facts = _facts("raster", "rows from the north", options.choice, raster.notes)
+    facts = _facts("raster", "rows from the north", options.choice, raster.facts)
     relief_m = _relief(raster.z_m)
     return FileMap(elevation.centred(), size_m, relief_m, "raster", facts, raster.notes)
 
 
-def _facts(kind: str, order: str, choice: ElevationChoice, notes: Sequence[str]) -> Facts:
-    stated = Fact("as stated", "file", "its format, coordinate system or columns")
-    unit = Fact(choice.unit or "m", "user", "--unit, --cell")
-    assumed = [Fact("m", "inferred", note) for note in notes if note in _UNSTATED]
+def _facts(kind: str, order: str, choice: ElevationChoice, units: Facts) -> Facts:
     return {
         "quantity": Fact(f"heights ({kind})", "file", "its format"),
-        "unit": unit if choice.unit or choice.cell else [*assumed, stated][0],
-        "order": Fact(
-            order, "user" if choice.up else "file", "--up" if choice.up else "its format"
-        ),
+        **units,
+        "order": by_user("--up", choice.up and order) or Fact(order, "file", "its format"),
     }
 
 
@@ -284,16 +274,16 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
         mesh = read_mesh(file, "+x", "+z").mesh
         points = mesh.vertices
         faces = mesh.faces
-    points_m = points_in_metres(file, points, names, options.choice, notes)
-    return _of_points(file, _upright(file, points_m, options), faces, options, notes)
+    points_m, facts = points_in_metres(file, points, names, options.choice)
+    return _of_points(file, _upright(file, points_m, options), faces, options, facts, notes)
 
 
 def _of_laser(file: Path, options: MapOptions) -> FileMap:
     choice = options.choice
     laser_points = read_las(file, choice.classes, options.crop, choice.unit)
-    points_m, notes = in_metres(file, laser_points, choice.unit, choice.height_unit)
+    points_m, facts, notes = in_metres(file, laser_points, choice.unit, choice.height_unit)
     left = replace(options, crop=None) if laser_points.cropped else options
-    return _of_points(file, points_m, None, left, [*laser_points.notes, *notes])
+    return _of_points(file, points_m, None, left, facts, [*laser_points.notes, *notes])
 
 
 def _up(file: Path, choice: ElevationChoice) -> str:
@@ -312,6 +302,7 @@ def _of_points(
     points_m: Floats,
     faces: Ints | None,
     options: MapOptions,
+    units: Facts,
     notes: list[str],
 ) -> FileMap:
     choice = options.choice
@@ -324,7 +315,7 @@ def _of_points(
         raise InputError(f"{file}: holds no point")
     if faces is None and choice.classes is None:
         points_m = _without_outliers(file, points_m, options.assumed, notes)
-    _check_heights(file, points_m[:, 2], unit_m(_height_unit(options)), options)
+    _check_heights(file, points_m[:, 2], unit_m(units["height_unit"].value), options)
     placed, low, high = _cropped_points(file, points_m, options.crop, is_mesh=faces is not None)
     size = high - low
     kind = "points" if faces is None else "triangles"
@@ -345,7 +336,7 @@ def _of_points(
         elevation = ElevationMap.of_triangles(scaled, faces, *corners, spacing_m)
     relief_m = _relief(elevation.z_m) / rise
     whole_m = float(size[0]), float(size[1])
-    facts = _facts(kind, f"{_up(file, choice)} up", choice, notes)
+    facts = _facts(kind, f"{_up(file, choice)} up", choice, units)
     return FileMap(elevation.centred(), whole_m, relief_m, kind, facts, tuple(notes))
 
 
@@ -465,12 +456,6 @@ def _check_seen_from_above(file: Path, points_m: Floats, spacing_m: float) -> No
             f"cell whose heights differ by over {100.0 * _STACKED_RELIEF:.0f} % of the relief; "
             "add --up AXIS, or --point lowest, median or highest"
         )
-
-
-def _height_unit(options: MapOptions) -> str:
-    units = options.choice
-    named = units.height_unit or units.unit or "m"
-    return "m" if named == DEGREE else named
 
 
 def _relief(z_m: Floats) -> float:

@@ -16,17 +16,16 @@ from snakewalk.config.archive import ending, read_bytes
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.file_units import DEGREE, named_unit, unit_m, unit_name
 from snakewalk.config.heightfield import MOST_SAMPLES
+from snakewalk.config.reading import Fact, by_file, by_user, decided
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import (
-    DEGREE,
-    UNSTATED_HEIGHTS,
+    SYSTEM,
     UNSTATED_UNIT,
     degree_cell_m,
     ground_lengths,
-    named_unit,
-    unit_m,
-    unit_name,
+    height_fact,
     vertical_unit,
 )
 from snakewalk.controller.mapping.raster_file import (
@@ -121,7 +120,8 @@ def _read(
         raise InputError(
             f"{file}: states no size of its cells; give --cell, the distance between two samples"
         )
-    unit = units.unit or _horizontal_unit(file, opened)
+    unit_fact = by_user("--unit", units.unit) or _horizontal_unit(file, opened)
+    unit = unit_fact.value
     dx, dy = (abs(turn.a), abs(turn.e)) if units.cell is None else (units.cell,) * 2
     full_window = slice(0, opened.height), slice(0, opened.width)
     all_cells = _cells(file, opened, unit, (dx, dy), full_window)
@@ -129,8 +129,9 @@ def _read(
         file, opened.shape, all_cells.dx_m, all_cells.dy_m, crop, turn.e < 0.0, MOST_STRIPPED_CELLS
     )
     cropped_cells = _cells(file, opened, unit, (dx, dy), (rows, columns)) if crop else all_cells
-    height_unit, notes = _height_unit(file, opened, units, unit)
-    notes = [*cropped_cells.notes, *notes]
+    height = _height_unit(file, opened, units, unit_fact)
+    height_unit = height.value
+    notes = cropped_cells.notes
     if opened.count > 1:
         notes.append(f"band 1 of {opened.count} is read")
     scale, offset, words = _band_scale(opened, units)
@@ -158,9 +159,8 @@ def _read(
     if absent:
         notes.append(f"{absent} cells hold no height")
     upright = z[::-1] if turn.e < 0.0 else z
-    if opened.crs is None and units.unit is None:
-        notes.append(UNSTATED_UNIT)
-    return Raster(np.ascontiguousarray(upright), dx_m, dy_m, tuple(notes), per_unit)
+    facts = {"unit": unit_fact, "height_unit": height}
+    return Raster(np.ascontiguousarray(upright), dx_m, dy_m, facts, tuple(notes), per_unit)
 
 
 class _Strips:
@@ -241,7 +241,7 @@ def _column_medians(z: Floats, column_of: Ints, samples: int) -> Floats:
     )
 
 
-def _horizontal_unit(file: Path, opened: Any) -> str:
+def _horizontal_unit(file: Path, opened: Any) -> Fact:
     """Unit of the cells by the coordinate system.
 
     Raises:
@@ -252,9 +252,9 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
     turn = opened.transform
     if crs is not None:
         if crs.is_geographic:
-            return DEGREE
+            return Fact(DEGREE, "file", SYSTEM)
         try:
-            return unit_name(float(crs.linear_units_factor[1]))
+            return Fact(unit_name(float(crs.linear_units_factor[1])), "file", SYSTEM)
         except (ValueError, LookupError, TypeError) as error:
             raise InputError(f"{file}: its system states no unit ({error}): --unit") from None
     west = turn.c
@@ -265,25 +265,17 @@ def _horizontal_unit(file: Path, opened: Any) -> str:
     within = min(west, east) >= -180.0 and max(west, east) <= 360.0
     within &= min(south, north) >= -90.0 and max(south, north) <= 90.0
     if not within or cell > _DEGREES_LIKE:
-        return "m"
+        return Fact("m", "inferred", UNSTATED_UNIT)
     latitude = min(max(0.5 * (north + south), -89.0), 89.0)
     wide_m, deep_m = degree_cell_m(abs(turn.a), abs(turn.e), latitude)
-    likely, other = (DEGREE, "m") if _is_part_of_a_degree(abs(turn.a)) else ("m", DEGREE)
-    raise InputError(
-        f"{file}: states no system; its cells of {abs(turn.a):.6g} may be degrees ({wide_m:.4g} m "
-        f"by {deep_m:.4g} m) or metres; add --unit {likely} (or --unit {other})"
-    )
+    readings = {
+        DEGREE: f"degrees, {wide_m:.4g} m by {deep_m:.4g} m",
+        "m": f"metres, {cell:.4g} m",
+    }
+    return decided(file, "states no system; its cells are", "--unit", readings, None)
 
 
-def _is_part_of_a_degree(cell: float) -> bool:
-    """Whether a degree has a whole number of cells: for 1/3600 or 1/1200, not 0.05."""
-    per_degree = 1.0 / cell
-    return per_degree > 20.5 and abs(per_degree - round(per_degree)) < 1e-3 * per_degree**0.5
-
-
-def _height_unit(
-    file: Path, opened: Any, units: ElevationChoice, horizontal: str
-) -> tuple[str, list[str]]:
+def _height_unit(file: Path, opened: Any, units: ElevationChoice, horizontal: Fact) -> Fact:
     """Unit of heights: by the user, the band, or the vertical part of the system.
 
     Raises:
@@ -291,7 +283,7 @@ def _height_unit(
 
     """
     if units.height_unit is not None:
-        return units.height_unit, []
+        return Fact(units.height_unit, "user", "--height-unit")
     words = (opened.units[0] or "").strip()
     band = named_unit(words) if words else None
     if words and band is None:
@@ -300,25 +292,14 @@ def _height_unit(
     if units.unit is not None and units.unit != DEGREE:
         stated = vertical or band
         differs = stated is not None and not math.isclose(unit_m(stated), unit_m(units.unit))
-        return units.unit, (
-            [f"heights are in {units.unit} by --unit; the file states {stated}"] if differs else []
+        return Fact(
+            units.unit, "user", f"--unit; the file states {stated}" if differs else "--unit"
         )
     if band is not None and vertical is not None and band != vertical:
         raise InputError(
             f"{file}: states heights in {band} (band) and in {vertical} (system): --height-unit"
         )
-    stated = band or vertical
-    if stated is not None:
-        are_equal = horizontal == stated
-        return stated, [] if are_equal and stated == "m" else [
-            f"heights are in {stated}, as it states"
-        ]
-    if horizontal in (DEGREE, "m"):
-        return "m", [UNSTATED_HEIGHTS]
-    raise InputError(
-        f"{file}: its cells are in {horizontal}, and it states no unit of heights: add "
-        f"--height-unit {horizontal} (or --height-unit m)"
-    )
+    return by_file("its band", band) or height_fact(file, horizontal, None, vertical)
 
 
 def _band_scale(opened: Any, units: ElevationChoice) -> tuple[float, float, list[str]]:

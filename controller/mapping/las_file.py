@@ -15,16 +15,16 @@ from snakewalk.config.archive import parse_json, read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.file_units import DEGREE, unit_m, unit_name
+from snakewalk.config.reading import Facts, by_file, by_user, decided
 from snakewalk.controller.console.child_process import run_code
 from snakewalk.controller.mapping.length_units import (
-    DEGREE,
-    UNSTATED_HEIGHTS,
+    SYSTEM,
     VERTICAL_PART,
     WKT_UNIT,
     degree_cell_m,
     ground_lengths,
-    unit_m,
-    unit_name,
+    height_fact,
     vertical_unit,
 )
 from snakewalk.controller.mapping.raster_file import Crop
@@ -87,7 +87,7 @@ class LasPoints:
     points: Floats
     """(n, 3) x, y, z."""
     unit: str | None
-    """Unit of x and y: of ``UNITS_M`` or deg; None: not stated."""
+    """Unit of x and y: of ``LENGTHS_M`` or deg; None: not stated."""
     height_unit: str | None
     """Unit of z; None: not stated."""
     crs: Any = None
@@ -296,36 +296,26 @@ def _system(text_or_number: str | int) -> Any:
 
 def in_metres(
     file: Path, las_points: LasPoints, unit: str | None, height_unit: str | None
-) -> tuple[Floats, list[str]]:
-    """Points in metres, and notes.
+) -> tuple[Floats, Facts, list[str]]:
+    """Points in metres, their units, and notes.
 
     Raises:
         InputError: the unit is unknown (the question).
 
     """
-    plane = unit or las_points.unit
-    if plane is None:
-        raise InputError(
-            f"{file}: states no coordinate system, and so no unit; add --unit m (or ft, us-ft, deg)"
-        )
-    up = height_unit or las_points.height_unit
-    notes = []
-    if up is None:
-        if plane not in ("m", DEGREE) and unit is None:
-            raise InputError(
-                f"{file}: its x and y are in {plane}, and it states no unit of heights: add "
-                f"--height-unit {plane} (or --height-unit m)"
-            )
-        up = "m" if plane == DEGREE else plane
-        if unit is None:
-            notes.append(UNSTATED_HEIGHTS)
-    elif height_unit is None and up != "m":
-        notes.append(f"heights are in {up}, as the file states")
+    given = by_user("--unit", unit) or by_file(SYSTEM, las_points.unit)
+    readings = {"m": "metres", "ft": "feet", "us-ft": "US survey feet", DEGREE: "degrees"}
+    fact = decided(file, "states no coordinate system, and so no unit", "--unit", readings, given)
+    plane = fact.value
+    height = height_fact(file, fact, height_unit, las_points.height_unit)
+    notes: list[str] = []
+    up = height.value
+    facts = {"unit": fact, "height_unit": height}
     points = las_points.points
     if plane == DEGREE:
         middle = float(np.median(points[:, 1])) if len(points) else 0.0
         east_m, north_m = degree_cell_m(1.0, 1.0, middle)
-        return points * [east_m, north_m, unit_m(up)], notes
+        return points * [east_m, north_m, unit_m(up)], facts, notes
     x_m = y_m = unit_m(plane)
     if las_points.crs is not None and unit is None and len(points):
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
@@ -337,4 +327,4 @@ def in_metres(
         except InputError as error:
             raise InputError(f"{file}: {error}") from None
         notes += words
-    return points * [x_m, y_m, unit_m(up)], notes
+    return points * [x_m, y_m, unit_m(up)], facts, notes

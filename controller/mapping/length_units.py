@@ -1,72 +1,24 @@
-"""Units of length in files, in metres: by name, and in coordinate systems."""
+"""Lengths on the ground: units of coordinate systems, degrees and projections."""
 
 import math
 import re
 from collections.abc import Sequence
-from typing import Any, Final
+from pathlib import Path
+from typing import Any
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import DEGREE, unit_name
+from snakewalk.config.reading import Fact, by_file, by_user, decided
 
-FOOT_M = 0.3048
-US_FOOT_M = 1200.0 / 3937.0
-UNITS_M = {
-    "m": 1.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "km": 1000.0,
-    "ft": FOOT_M,
-    "us-ft": US_FOOT_M,
-}
-"""Metres per unit of length, by the names that options accept."""
-DEGREE: Final = "deg"
 UNSTATED_UNIT = "the file states no unit of lengths: metres; --unit states another"
 UNSTATED_HEIGHTS = "the file states no unit of heights: metres"
-_SPELLINGS = {
-    "m": ("m", "metre", "meter", "metres", "meters"),
-    "cm": ("cm", "centimetre", "centimeter", "centimetres", "centimeters"),
-    "mm": ("mm", "millimetre", "millimeter", "millimetres", "millimeters"),
-    "km": ("km", "kilometre", "kilometer", "kilometres", "kilometers"),
-    "ft": ("ft", "foot", "feet", "international foot", "international feet", "foot international"),
-    "us-ft": (
-        "us-ft",
-        "us survey foot",
-        "us survey feet",
-        "foot us",
-        "ftus",
-        "us foot",
-        "sft",
-        "foot us survey",
-        "survey foot",
-        "u s survey foot",
-        "us survey ft",
-        "usft",
-    ),
-}
+SYSTEM = "its coordinate system"
 VERTICAL_PART = re.compile(r"\b(?:VERT_CS|VERTCRS|VERTICALCRS)\[")
 WKT_UNIT = re.compile(r'\b(?:LENGTHUNIT|UNIT)\["([^"]*)",\s*([-+0-9.eE]+)')
 _TRUE_SCALE_TOLERANCE = 0.005
 """Share by which a map's lengths may be off before true lengths are used (ours): UTM is within."""
 _MOST_VARIATION = 0.1
 """Change of a map's scale over a file that is accepted (ours)."""
-
-
-def named_unit(words: str) -> str | None:
-    """Name in ``UNITS_M`` of a unit as spelled in files, or None."""
-    plain = re.sub(r"[^a-z0-9-]+", " ", words.lower()).strip()
-    return next((name for name, spellings in _SPELLINGS.items() if plain in spellings), None)
-
-
-def unit_name(factor_m: float) -> str:
-    """Name of a unit by its length in metres, or that length as a number."""
-    for name, length_m in UNITS_M.items():
-        if math.isclose(length_m, factor_m, rel_tol=1e-8):
-            return name
-    return repr(float(factor_m))
-
-
-def unit_m(unit: str) -> float:
-    """Metres per unit of length, by name or as a number."""
-    return UNITS_M[unit] if unit in UNITS_M else float(unit)
 
 
 def vertical_unit(wkt: str) -> str | None:
@@ -81,6 +33,23 @@ def vertical_unit(wkt: str) -> str | None:
         end += 1
     unit = WKT_UNIT.search(wkt[match.end() : end])
     return None if unit is None else unit_name(float(unit[2]))
+
+
+def height_fact(file: Path, unit: Fact, answer: str | None, in_file: str | None) -> Fact:
+    """Unit of heights: by the user, the file, or the user's unit of lengths.
+
+    Raises:
+        InputError: only the unit of lengths is stated, and it is not metric (the question).
+
+    """
+    fact = by_user("--height-unit", answer) or by_file(SYSTEM, in_file)
+    if fact is None and unit.source == "user" and unit.value != DEGREE:
+        fact = unit
+    elif fact is None and unit.value in (DEGREE, "m"):
+        fact = Fact("m", "inferred", UNSTATED_HEIGHTS)
+    question = f"its x and y are in {unit.value}, and it states no unit of heights; they are in"
+    readings = {unit.value: unit.value, "m": "metres"}
+    return decided(file, question, "--height-unit", readings, fact)
 
 
 def degree_cell_m(dx: float, dy: float, latitude: float) -> tuple[float, float]:

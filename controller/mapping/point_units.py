@@ -7,15 +7,13 @@ from typing import Final
 
 import numpy as np
 
+from snakewalk.config.archive import ending
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import DEGREE, unit_m
+from snakewalk.config.reading import Fact, Facts, by_user, decided
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
-from snakewalk.controller.mapping.length_units import (
-    DEGREE,
-    UNSTATED_UNIT,
-    degree_cell_m,
-    unit_m,
-)
+from snakewalk.controller.mapping.length_units import UNSTATED_UNIT, degree_cell_m, height_fact
 
 _LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
 _LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
@@ -26,16 +24,15 @@ _FAR_EXTENTS: Final = 20.0
 
 
 def points_in_metres(
-    file: Path, points: Floats, names: Sequence[str], units: ElevationChoice, notes: list[str]
-) -> Floats:
-    """Return points (n, 3) in metres; degrees become metres east and north.
+    file: Path, points: Floats, names: Sequence[str], units: ElevationChoice
+) -> tuple[Floats, Facts]:
+    """Return points (n, 3) in metres, and their units; degrees become metres east and north.
 
     Args:
         file: for errors.
         points: as in the file.
         names: of its columns, or none.
         units: stated by the user.
-        notes: lines about what was concluded are appended.
 
     Raises:
         InputError: the points may be degrees (the question), or a point has too few numbers.
@@ -45,23 +42,26 @@ def points_in_metres(
         raise InputError(f"{file}: holds {points.shape[1]} numbers a point; x, y and z are needed")
     if units.no_data is not None:
         points = np.where(points == units.no_data, np.nan, points)
-    unit = units.unit
+    fact = by_user("--unit", units.unit)
     columns = _columns(names)
     if columns is not None:
         points = points[:, columns]
-        if unit is None:
-            unit = DEGREE
-            notes.append(f"columns {', '.join(names)}: degrees, as their names state")
-    if unit is None:
-        _ask(file, points)
-        unit = "m"
-        notes.append(UNSTATED_UNIT)
-    rise_m = unit_m(units.height_unit or ("m" if unit == DEGREE else unit))
+        if fact is None:
+            fact = Fact(DEGREE, "file", f"the names of its columns, {', '.join(names)}")
+    if fact is None and ending(file) == ".glb":
+        fact = Fact("m", "file", "its format")
+    if fact is None:
+        fact = _unstated(file, points)
+    unit = fact.value
+    by_format = "m" if fact.source == "file" and unit != DEGREE else None
+    height = height_fact(file, fact, units.height_unit, by_format)
+    facts = {"unit": fact, "height_unit": height}
+    rise_m = unit_m(height.value)
     if unit != DEGREE:
-        return points * [unit_m(unit), unit_m(unit), rise_m]
+        return points * [unit_m(unit), unit_m(unit), rise_m], facts
     if not _is_on_earth(points):
         raise InputError(f"{file}: --unit deg: expected longitude, latitude and height in columns")
-    return points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m]
+    return points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m], facts
 
 
 def _columns(names: Sequence[str]) -> list[int] | None:
@@ -82,17 +82,19 @@ def _is_on_earth(points: Floats) -> bool:
     return bool(size[0] <= 360.0 and size[1] <= 90.0)
 
 
-def _ask(file: Path, points: Floats) -> None:
-    """Ask for the unit of points that may be degrees: small, and far from the origin."""
+def _unstated(file: Path, points: Floats) -> Fact:
+    """Metres; or the question, if the points may be degrees: small, and far from the origin."""
+    metres = Fact("m", "inferred", UNSTATED_UNIT)
     finite = points[np.isfinite(points).all(axis=1)]
     if len(finite) < 2 or not _is_on_earth(finite):
-        return
+        return metres
     extent = np.ptp(finite[:, :2], axis=0)
     distance = np.abs(finite[:, :2].mean(axis=0)).max()
     if extent.max() > _MOST_DEGREES or distance < _FAR_EXTENTS * extent.max():
-        return
+        return metres
     east_m, north_m = degree_cell_m(float(extent[0]), float(extent[1]), _latitude(finite))
-    raise InputError(
-        f"{file}: states no unit of x and y: degrees (--unit deg) make a ground of {east_m:.4g} m "
-        f"by {north_m:.4g} m, metres (--unit m) one of {extent[0]:.4g} m by {extent[1]:.4g} m"
-    )
+    readings = {
+        DEGREE: f"degrees, a ground of {east_m:.4g} m by {north_m:.4g} m",
+        "m": f"metres, one of {extent[0]:.4g} m by {extent[1]:.4g} m",
+    }
+    return decided(file, "states no unit of x and y", "--unit", readings, None)

@@ -14,8 +14,9 @@ from snakewalk.config.archive import check_expansion, ending, read_arrays, read_
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
+from snakewalk.config.file_units import DEGREE, unit_m
+from snakewalk.config.reading import Fact, Facts
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
-from snakewalk.controller.mapping.length_units import DEGREE, unit_m
 from snakewalk.controller.mapping.number_table import read_numbers
 
 GEO_RASTERS = (".tif", ".tiff", ".asc")
@@ -36,6 +37,8 @@ class Raster:
     """Distance between columns."""
     dy_m: float
     """Distance between rows."""
+    facts: Facts
+    """Units of the file."""
     notes: tuple[str, ...] = ()
     """Statements of the file that were used or left out, for the result."""
     per_value_m: float = 1.0
@@ -69,9 +72,15 @@ def read_plain_raster(file: Path, units: ElevationChoice, crop: Crop | None) -> 
         raise InputError(
             f"{file}: states no latitude, so degrees cannot be converted to lengths; add --unit m"
         )
-    cell_m = units.cell * unit_m(units.unit or "m")
+    unit = units.unit or "m"
+    height_unit = units.height_unit or unit
+    facts = {
+        "unit": Fact(unit, "user", "--cell, --unit"),
+        "height_unit": Fact(height_unit, "user", "--height-step, --height-unit"),
+    }
+    cell_m = units.cell * unit_m(unit)
     rows, columns = raster_window(file, values.shape, cell_m, cell_m, crop)
-    per_value_m = (units.height_step or 1.0) * unit_m(units.height_unit or units.unit or "m")
+    per_value_m = (units.height_step or 1.0) * unit_m(height_unit)
     z = np.array(values[rows, columns], dtype=float)
     if units.no_data is not None:
         z[z == units.no_data] = np.nan
@@ -80,7 +89,7 @@ def read_plain_raster(file: Path, units: ElevationChoice, crop: Crop | None) -> 
     if absent:
         notes.append(f"{absent} cells hold no height")
     upright = np.ascontiguousarray(z[::-1] * per_value_m)
-    return Raster(upright, cell_m, cell_m, tuple(notes), per_value_m)
+    return Raster(upright, cell_m, cell_m, facts, tuple(notes), per_value_m)
 
 
 def raster_window(

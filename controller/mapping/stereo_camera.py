@@ -13,12 +13,13 @@ from typing import Any
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, read_arrays, read_bytes
+from snakewalk.config.archive import MOST_STORAGE_BYTES, read_arrays, read_bytes
 from snakewalk.config.arrays import Bools, Floats, Image
-from snakewalk.config.calibration_lists import read_json_lists
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import Fact, Facts
-from snakewalk.controller.mapping.length_units import unit_m
+from snakewalk.config.file_units import LENGTHS_M, unit_m
+from snakewalk.config.reading import Fact, Facts, answered, by_user, decided, stated
+from snakewalk.controller.images.calibration_storage import read_storage
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 
 _NAMES = {
     "k_left": ("K1", "M1", "cameraMatrix1", "camera_matrix_left", "K_left"),
@@ -31,8 +32,8 @@ _NAMES = {
 """Names that people use for the results of ``stereoCalibrate``."""
 _OPTIONAL = ("distortion_left", "distortion_right")
 _MOST_BYTES = 1_000_000
-_MOST_BASELINE_M = 5.0
-"""Distance of the cameras above which the unit of a calibration is wrong (ours)."""
+_BASELINES_M = (0.005, 5.0)
+"""Distances of two cameras that are possible (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +52,8 @@ class StereoCalibration:
     """(3,) of the right camera; its x is below 0."""
     facts: Facts
     """Quantity, unit and order of the values."""
+    notes: tuple[str, ...] = ()
+    """Stored answers that were used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +85,8 @@ class RectifiedPair:
         return np.stack([x, y, self.focal_px * per_px], axis=-1) @ self.turned
 
 
-def read_calibration(file: Path, unit: str = "m") -> StereoCalibration:
-    """Read a calibration by its ending; ``unit`` is that of the translation.
+def read_calibration(file: Path, choice: CalibrationChoice | None = None) -> StereoCalibration:
+    """Read a calibration by its ending, with the stored answers about it.
 
     Accepts files of OpenCV (.yml, .yaml, .xml, .json), .json with plain lists and .npz with the
     same names, and calib.txt of the Middlebury pairs, whose baseline is in millimetres.
@@ -93,13 +96,18 @@ def read_calibration(file: Path, unit: str = "m") -> StereoCalibration:
         OSError: it cannot be opened.
 
     """
+    return answered(file, choice or CalibrationChoice(), lambda choice: _read(file, choice))
+
+
+def _read(file: Path, choice: CalibrationChoice) -> StereoCalibration:
     if file.stat().st_size > _MOST_BYTES:
         raise InputError(f"{file}: is too large for a calibration")
     ending = file.suffix.lower()
     if ending == ".txt":
-        return _checked_calibration(file, _middlebury(file), Fact("m", "file", "calib.txt"))
+        unit = stated(file, "--unit", "mm", choice.unit)
+        return _checked_calibration(file, _middlebury(file), unit)
     if ending in (".yml", ".yaml", ".xml", ".json"):
-        storage = _storage(file)
+        storage = read_storage(file)
     elif ending == ".npz":
         try:
             storage, _ = read_arrays(file)
@@ -116,29 +124,7 @@ def read_calibration(file: Path, unit: str = "m") -> StereoCalibration:
             )
             raise InputError(f"{file}: holds no {' or '.join(names)}; it has {there or 'none'}")
         matrices[key] = np.zeros(5) if name is None else storage[name]
-    is_default = unit == "m"
-    fact = (
-        Fact(unit, "inferred", "default of --unit") if is_default else Fact(unit, "user", "--unit")
-    )
-    return _checked_calibration(file, matrices, fact)
-
-
-def _storage(file: Path) -> dict[str, Any]:
-    check_matrices(file)
-    lists = read_json_lists(file)
-    if lists is not None:
-        return lists
-    try:
-        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
-        nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict
-        nodes_by_name = {name: node.mat() for name, node in nodes.items() if node.isMap()}
-        store.release()
-    except (cv2.error, SystemError) as error:
-        raise InputError(
-            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
-            "file"
-        ) from None
-    return nodes_by_name
+    return _checked_calibration(file, matrices, by_user("--unit", choice.unit))
 
 
 def _middlebury(file: Path) -> dict[str, Any]:
@@ -150,7 +136,7 @@ def _middlebury(file: Path) -> dict[str, Any]:
             np.array([float(n) for n in re.split(r"[\s;,]+", lines[key].strip(" []\r"))])
             for key in ("cam0", "cam1")
         )
-        baseline_m = 0.001 * float(lines["baseline"])
+        baseline_mm = float(lines["baseline"])
         k_left, k_right = k_left.reshape(3, 3), k_right.reshape(3, 3)
     except (KeyError, ValueError) as error:
         raise InputError(
@@ -162,19 +148,18 @@ def _middlebury(file: Path) -> dict[str, Any]:
         "distortion_left": np.zeros(5),
         "distortion_right": np.zeros(5),
         "rotation": np.eye(3),
-        "translation": np.array([-baseline_m, 0.0, 0.0]),
+        "translation": np.array([-baseline_mm, 0.0, 0.0]),
     }
 
 
-def _numbers(file: Path, matrices: Mapping[str, Any], unit_m: float) -> dict[str, Floats]:
-    """Return the values as arrays of the right size, in metres."""
+def _numbers(file: Path, matrices: Mapping[str, Any]) -> dict[str, Floats]:
+    """Return the values as arrays of the right size."""
     values: dict[str, Floats] = {}
     for key, value in matrices.items():
         try:
             values[key] = np.array(value, dtype=float)
         except (TypeError, ValueError):
             raise InputError(f"{file}: {_NAMES[key][0]} holds no numbers") from None
-    values["translation"] *= unit_m
     for key, size in (("k_left", 9), ("k_right", 9), ("rotation", 9), ("translation", 3)):
         if values[key].size != size:
             raise InputError(f"{file}: {_NAMES[key][0]} has {values[key].size} numbers, not {size}")
@@ -193,8 +178,10 @@ def _numbers(file: Path, matrices: Mapping[str, Any], unit_m: float) -> dict[str
     return values
 
 
-def _checked_calibration(file: Path, matrices: Mapping[str, Any], unit: Fact) -> StereoCalibration:
-    values = _numbers(file, matrices, unit_m(unit.value))
+def _checked_calibration(
+    file: Path, matrices: Mapping[str, Any], unit: Fact | None
+) -> StereoCalibration:
+    values = _numbers(file, matrices)
     rotation = values["rotation"]
     translation = values["translation"]
     for key in ("k_left", "k_right"):
@@ -208,12 +195,7 @@ def _checked_calibration(file: Path, matrices: Mapping[str, Any], unit: Fact) ->
             f"{file}: T is ({shown}): the second camera must stand to the right of the first "
             "(x below 0, in OpenCV's order); if it stands to the left, exchange the cameras"
         )
-    baseline_m = float(np.linalg.norm(translation))
-    if baseline_m > _MOST_BASELINE_M:
-        raise InputError(
-            f"{file}: states no unit of T, and in {unit.value} its cameras stand {baseline_m:.4g} "
-            "m apart; give --unit mm (or cm)"
-        )
+    unit = _unit(file, float(np.linalg.norm(translation)), unit)
     facts: Facts = {
         "quantity": Fact("calibration of two cameras", "file", "its names of matrices"),
         "unit": unit,
@@ -225,9 +207,34 @@ def _checked_calibration(file: Path, matrices: Mapping[str, Any], unit: Fact) ->
         values["k_right"],
         values["distortion_right"],
         rotation,
-        translation,
+        unit_m(unit.value) * translation,
         facts,
     )
+
+
+def _unit(file: Path, baseline: float, unit: Fact | None) -> Fact:
+    """Unit of a baseline: stated, or the only one in which it is that of a pair of cameras.
+
+    Raises:
+        InputError: several are possible, or the stated one is not.
+
+    """
+    apart_m = {name: baseline * LENGTHS_M[name] for name in ("m", "cm", "mm")}
+    low_m, high_m = _BASELINES_M
+    possible = {
+        name: f"cameras {apart:.4g} m apart"
+        for name, apart in apart_m.items()
+        if low_m <= apart <= high_m
+    }
+    if not possible or (unit and unit.value in apart_m.keys() - possible):
+        raise InputError(
+            f"{file}: the length of T is {baseline:.4g}; possible units: "
+            f"{', '.join(possible) or 'none; calibrate again with the size of a square'}"
+        )
+    if unit is None and list(possible) == ["m"]:
+        unit = Fact("m", "inferred", "no other unit is possible; --unit states another")
+    question = f"states no unit of T, whose length is {baseline:.4g}"
+    return decided(file, question, "--unit", possible, unit)
 
 
 def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:

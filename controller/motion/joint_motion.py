@@ -13,19 +13,18 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import ANGLES_RAD, DEGREE, TIMES_S
 from snakewalk.config.playback import JointRequest
-from snakewalk.config.reading import Fact, Facts
+from snakewalk.config.reading import Fact, Facts, decided
 from snakewalk.config.robot import RobotConfig
 
-UNITS = {"rad": 1.0, "deg": np.pi / 180.0}
-"""Units of angles and their size in radians."""
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-"""Units of times and their size in seconds."""
 MOST_CELLS = 20_000_000
 """Angles of a motion (ours): an hour of 50 joints at 100 Hz."""
 REST = "rest"
 """Name that keeps a joint of the robot at 0."""
 _STILL_JOINT_RAD = 1e-6
+_MOST_RAD = 2.0 * np.pi
+"""Largest angle of a joint that may be in radians (ours)."""
 _NUMBERED_NAME = re.compile(r"^(.*?)(\d+)(?:[_.]?(?:pos|position|joint))?$", re.IGNORECASE)
 """Name of a joint with a number near its end."""
 _STEPS_S = (0.0005, 0.5)
@@ -69,43 +68,40 @@ def radians(where: str, angles: Floats, unit: Fact | None, hint: str) -> tuple[F
     """Return angles in radians, and the fact of their unit in the file.
 
     Raises:
-        InputError: neither the file nor the user states their unit; proposes the likely one.
+        InputError: neither the file nor the user states their unit.
 
     """
-    if unit is not None:
-        return angles * UNITS[unit.value], unit
     largest = float(np.nanmax(np.abs(angles), initial=0.0))
-    likely = "deg" if largest > 2.0 * np.pi else "rad"
-    raise InputError(
-        f"{where} states no unit of angles, which go to {largest:.3g}; "
-        f"give --unit {likely} ({hint})"
-    )
+    readings = {} if largest > _MOST_RAD else {"rad": f"up to {np.degrees(largest):.3g}°"}
+    readings[DEGREE] = f"up to {largest:.3g}°"
+    question = f"states no unit of angles, which go to {largest:.3g}; {hint}"
+    unit = decided(where, question, "--unit", readings, unit)
+    return angles * ANGLES_RAD[unit.value], unit
 
 
 def time_unit(path: Path, time: Floats, column: str, unit: Fact | None) -> Fact:
-    """Return the unit of times (T,), one of ``TIME_UNITS``, which may not be stated.
+    """Return the unit of times (T,), one of ``TIMES_S``, which may not be stated.
 
     Seconds are assumed if no other unit gives steps that a recording of motion has.
 
     Raises:
-        InputError: another unit is possible; proposes those that are.
+        InputError: another unit is possible.
 
     """
-    if unit is not None:
-        return unit
     steps = np.diff(time[np.isfinite(time)])
     step = float(np.median(steps)) if len(steps) else 0.01
     least_s, most_s = _STEPS_S
-    possible = [unit for unit, size in TIME_UNITS.items() if least_s <= step * size <= most_s]
-    if possible in ([], ["s"]):
+    possible = [unit for unit, size in TIMES_S.items() if least_s <= step * size <= most_s]
+    if unit is None and possible in ([], ["s"]):
         return Fact("s", "inferred", "no other unit is possible")
     length = float(np.nanmax(time) - np.nanmin(time))
-    readings = " or ".join(
-        f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz (--time-unit {unit})"
-        for unit, size in TIME_UNITS.items()
+    readings = {
+        unit: f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz"
+        for unit, size in TIMES_S.items()
         if unit in {"s", *possible}
-    )
-    raise InputError(f"{path}: column {column} states no unit of time: {readings}")
+    }
+    question = f"column {column} states no unit of time"
+    return decided(path, question, "--time-unit", readings, unit)
 
 
 def joint_motion(

@@ -51,7 +51,7 @@ def test_answers_about_a_track_are_used_by_later_commands(tmp_path: Path) -> Non
 
 def test_answers_about_joint_angles_elevations_and_robots_are_used(tmp_path: Path) -> None:
     angles = joint_csv(tmp_path / "j.csv", unit="")
-    with pytest.raises(InputError, match="give --unit"):
+    with pytest.raises(InputError, match="--unit deg"):
         prepare_playback(str(angles))
     (tmp_path / "j.csv.reading.toml").write_text('unit = "deg"\n')
     prepared = prepare_playback(str(angles))

@@ -11,6 +11,7 @@ import numpy as np
 from snakewalk.config.reading import Facts
 from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 from snakewalk.controller.exchange.robot_import.robot_import import import_robot
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.stereo_camera import read_calibration
 from tests.controller.exchange.robot_import.test_sdf import sdf
 from tests.foreign.case import Case, Values
@@ -231,7 +232,7 @@ def calibrations() -> Iterator[Case]:
     """Yield the calibrations."""
 
     def read_one(file: Path, options: dict[str, Any]) -> tuple[Values, Facts]:
-        found = read_calibration(file, **options)
+        found = read_calibration(file, CalibrationChoice(**options))
         baseline_m = float(np.linalg.norm(found.translation_m))
         return {"baseline_m": baseline_m, "focal_px": found.k_left[0, 0]}, found.facts
 
@@ -244,8 +245,16 @@ def calibrations() -> Iterator[Case]:
             yield case(f"{words}, T in m", calibration(ending, names, 1.0))
         for unit, factor in (("mm", 1e3), ("cm", 100.0)):
             write = calibration(ending, NAMES[0], factor)
-            yield case(f"{ending}, T in {unit}", write, "states no unit of T.*--unit mm")
+            yield case(f"{ending}, T in {unit}", write, f"states no unit of T.*--unit {unit}")
             yield case(f"{ending}, --unit {unit}", write, unit=unit)
+        write = calibration(ending, NAMES[0], 1.0)
+        yield case(f"{ending}, --unit m", write, unit="m")
+        yield case(
+            f"{ending}, --unit mm of T in m",
+            write,
+            "length of T is 0.1.*possible units: m$",
+            unit="mm",
+        )
     yield case("cameras exchanged", calibration("yml", NAMES[0], 1.0, -1.0), "exchange the cameras")
     yield case(
         "Middlebury, baseline in mm", middlebury, {"baseline_m": 0.193001, "focal_px": 400.0}

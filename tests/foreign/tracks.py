@@ -178,7 +178,7 @@ def c3d(unit: str, rate_hz: float, up: str = "z", screen: str = "") -> Write:
         if screen:
             file.add_parameter("POINT", "Y_SCREEN", [screen])
         data = np.ones((4, len(NODES), FRAMES))
-        data[:3] = spaced(up, "", UNITS[unit]).transpose(2, 1, 0)
+        data[:3] = spaced(up, "", UNITS.get(unit, 1.0)).transpose(2, 1, 0)
         file["data"]["points"] = data
         file.write(str(folder / "m.c3d"))
         return folder / "m.c3d"
@@ -229,7 +229,12 @@ def tables() -> Iterator[Case]:
     yield case("two animals, --individual", two, right(), individual="eel")
     same = midlines(change=lambda text: text + "\n".join(text.splitlines()[1:]) + "\n")
     yield case("each row twice", same, "a point twice in a frame")
-    yield case("feet", midlines(("x_ft", "y_ft"), 1 / 304.8), "expected the columns")
+    yield case("feet", midlines(("x_ft", "y_ft"), 1 / 304.8), right())
+    for unit, size in (("cm", 0.1), ("um", 1e3), ("in", 1 / 25.4)):
+        write = midlines((f"x_{unit}", f"y_{unit}"), size)
+        yield case(f"columns x_{unit}", write, right())
+    unknown = midlines(("x_cubits", "y_cubits"), 1 / 457.2)
+    yield case("columns x_cubits", unknown, "expected the columns")
 
     for statement, write, length_m in (
         ("t in ms", worms({"t": "ms"}, (1e3, 1, 1)), LENGTH_M),
@@ -359,13 +364,20 @@ def marker_cases() -> Iterator[Case]:
             write = changed(markers("o.csv", motive, "y", size=size),
                             ("Millimeters", word), (r"1\.24", version))  # fmt: skip
             yield case("motive", f"{word}, version {version}", write, right())
-    for unit in ("ft", "in"):
+    for unit, metres in (("ft", 0.3048), ("in", 0.0254)):
+        size = 1e-3 / metres
+        write = changed(markers("v.csv", vicon, size=size), (r"\bmm\b", unit))
+        yield case("vicon", f"unit {unit}", write, right())
+        write = changed(markers("t.trc", trc, size=size), (r"\tmm\t", f"\t{unit}\t"))
+        yield case("trc", f"unit {unit}", write, right())
+    for unit in ("px", "units"):
         write = changed(markers("v.csv", vicon), (r"\bmm\b", unit))
-        yield case("vicon", f"unit {unit}", write, "expected one unit of")
+        yield case("vicon", f"unit {unit}", write, f"its unit is '{unit}'; expected one of m, cm")
         write = changed(markers("t.trc", trc), (r"\tmm\t", f"\t{unit}\t"))
-        yield case("trc", f"unit {unit}", write, "its unit is")
+        yield case("trc", f"unit {unit}", write, f"its unit is '{unit}'; expected one of m, cm")
+    yield case("c3d", "no unit", c3d("", RATE_HZ), right(NO_SCALE))
     write = changed(markers("v.csv", vicon), ("^,,mm,mm,mm", ",,mm,mm,m"))
-    yield case("vicon", "two units", write, "expected one unit of")
+    yield case("vicon", "two units", write, "expected one unit for all")
     more = changed(markers("t.trc", trc), ("\t60\t11", "\t80\t11"))
     yield case("trc", "fewer rows than stated", more, "states NumFrames 80")
     yield case("trc", "no rate", changed(markers("t.trc", trc), (r"^20\t20", "0\t20")),

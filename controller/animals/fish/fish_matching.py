@@ -6,10 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from snakewalk.config.loader import with_keys
 from snakewalk.controller.animals.fish.match_film import FilmMatch, match_film
 from snakewalk.controller.animals.fish.model import fish_model
 from snakewalk.controller.animals.fish.postures import Postures, postures_of_track
 from snakewalk.controller.animals.fish.silhouettes import open_film
+from snakewalk.controller.track.choice import ALL
 from snakewalk.controller.track.readers.load import load_track
 
 MIDLINES = (".csv", ".npz", ".npy", ".mat", ".wcon", ".h5", ".slp", ".json")
@@ -125,7 +127,7 @@ def read_midlines(file: Path, build: str, rate_hz: float | None) -> MatchedRecor
         InputError: no recording that can be read.
 
     """
-    track = load_track(str(file), rate_hz)
+    track = load_track(str(file), with_keys(ALL, {"rate": rate_hz}, str(file)))
     postures = postures_of_track(track, fish_model(build).joints_at)
     rest = track.angles_rad - postures.tangents_rad()[postures.found]
     facts = MatchFacts(

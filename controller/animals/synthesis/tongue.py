@@ -10,7 +10,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.text_table import read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 
 RATE_LIMITS = (0.4, 2.5)
 """Range of b_st, how fast the tongue plays."""
@@ -57,17 +57,13 @@ class TongueRecord:
             first, *cells = read_rows(file, "CSV table of the tongue") or [[]]
         except OSError as error:
             raise InputError(f"{file}: {error}; name a CSV table of the tongue") from None
-        rows = [dict(zip(first, row, strict=False)) for row in cells if row]
-        columns = set(first)
-        kind = next((name for name in ("height", "length_m") if name in columns), None)
-        if "time_s" not in columns or kind is None:
+        kind = next((name for name in ("height", "length_m") if name in first), None)
+        if "time_s" not in first or kind is None:
             raise InputError(f"{file}: the header must name time_s, and height or length_m")
-        try:
-            time_s, value = np.array([[float(row["time_s"]), float(row[kind])] for row in rows]).T
-        except (TypeError, ValueError):
-            raise InputError(f"{file}: a cell is not a number; fill it in") from None
+        rows = numbers_of(file, filter(any, cells), first, range(2, len(cells) + 2))
+        time_s, value = (rows[:, first.index(name)] for name in ("time_s", kind))
         steps = np.diff(time_s)
-        if len(rows) < 3 or steps.min() <= 0.0 or np.ptp(steps) > 0.05 * np.median(steps):
+        if len(rows) < 3 or not steps.min() > 0.0 or np.ptp(steps) > 0.05 * np.median(steps):
             raise InputError(f"{file}: time_s must rise evenly over three rows or more")
         most = float(value.max()) if kind == "length_m" else 1.0
         if not np.isfinite(value).all() or value.min() < 0.0 or value.max() > most or most <= 0.0:

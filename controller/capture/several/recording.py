@@ -14,12 +14,13 @@ from snakewalk.controller.capture.capturing import (
     marker_scale,
     part_folder,
 )
+from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.film.scale import scale_of_length
 from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
-from snakewalk.controller.capture.options import AUTO, CaptureOptions, check_options, track_files
+from snakewalk.controller.capture.options import AUTO, check_options, track_files
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
-from snakewalk.controller.capture.scale import scale_of_length
 from snakewalk.controller.capture.several.animal_films import (
     AnimalsFound,
     CapturedAnimal,
@@ -65,6 +66,8 @@ class AnimalsFacts:
     smaller_objects: int
     """Objects in most frames whose area is less than 0.3 of the usual one; they have no track."""
     background: str
+    notes: tuple[str, ...] = ()
+    """Stored answers that were used."""
 
 
 def capture_several(options: CaptureOptions) -> AnimalsFacts:

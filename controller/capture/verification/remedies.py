@@ -9,8 +9,8 @@ import numpy as np
 
 from snakewalk.config.arrays import DeepImage
 from snakewalk.config.errors import InputError
+from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.capture.opened_film import OpenedFilm
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.several.animal_films import share_of_several
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector, whole_share
 

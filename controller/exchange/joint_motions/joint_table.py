@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Final
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import ANGLES_RAD, TIMES_S
 from snakewalk.config.playback import JointRequest
 from snakewalk.config.reading import stated
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
-    TIME_UNITS,
-    UNITS,
     JointMotion,
     joint_motion,
     radians,
@@ -69,12 +68,12 @@ class JointTable:
             hint = "or end the names of columns in _rad or _deg"
             angles, unit = radians(f"{path}:", values[:, 1:], unit, hint)
         else:
-            angles = values[:, 1:] * [UNITS[kind] for kind in units]
+            angles = values[:, 1:] * [ANGLES_RAD[kind] for kind in units]
         match = _TIME.fullmatch(_plain_name(cells[0]))
         by_name = None if match is None else match[1] or match[2]
         time = stated(path, "--time-unit", by_name, request.time_unit)
         time = time_unit(path, values[:, 0], cells[0], time)
-        time_s = values[:, 0] * TIME_UNITS[time.value]
+        time_s = values[:, 0] * TIMES_S[time.value]
         return joint_motion(path, time_s, names, angles, unit=unit, time=time)
 
 

@@ -15,7 +15,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
 from snakewalk.config.playback import JointRequest
-from snakewalk.config.reading import Fact, stated
+from snakewalk.config.reading import Fact, by_user
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
     MOST_CELLS,
@@ -61,7 +61,7 @@ class LeRobotEpisode:
         angles, unit = radians(
             f"{path}: {feature}",
             values,
-            stated(path, "--unit", None, request.unit),
+            by_user("--unit", request.unit),
             "motors normalized to -100..100 are not angles",
         )
         if not np.isfinite(time_s).all():

@@ -1,6 +1,6 @@
 """Facts about a robot model that its file may not state."""
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field
 
@@ -23,3 +23,7 @@ class RobotChoice(Answers):
     assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
         {}, description="KEY=VALUE: a value that the model does not state; may be repeated"
     )
+
+
+NOTHING: Final = RobotChoice()
+"""Choice of nothing: the model states all."""

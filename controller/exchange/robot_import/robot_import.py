@@ -17,7 +17,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import Assumptions, ConfigError, InputError
 from snakewalk.config.loader import checked
-from snakewalk.config.reading import Fact, Facts, store, with_stored
+from snakewalk.config.reading import Fact, Facts, answered, by_user
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_catalogue import servo_model as known_model
 from snakewalk.controller.exchange.robot_import.body_tree import (
@@ -38,7 +38,7 @@ from snakewalk.controller.exchange.robot_import.link_figures import (
 )
 from snakewalk.controller.exchange.robot_import.model_compiler import load_model
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
-from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
+from snakewalk.controller.exchange.robot_import.robot_choice import NOTHING, RobotChoice
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
 
@@ -77,7 +77,7 @@ def import_robot(
     path: Path,
     name: str,
     servo_model: str,
-    choice: RobotChoice | None = None,
+    choice: RobotChoice = NOTHING,
 ) -> ImportedRobot:
     """Read a robot; its joints get the IDs 1, 2, 3 ... from the head.
 
@@ -92,7 +92,10 @@ def import_robot(
             robot's file cannot express.
 
     """
-    choice, lines = with_stored(path, RobotChoice() if choice is None else choice)
+    return answered(path, choice, lambda choice: _import(path, name, servo_model, choice))
+
+
+def _import(path: Path, name: str, servo_model: str, choice: RobotChoice) -> ImportedRobot:
     assumed = Assumptions(choice.assume)
     try:
         model, source = load_model(path, assumed)
@@ -105,9 +108,7 @@ def import_robot(
     except InputError as error:
         named = [f"{path}: {fault.removeprefix(f'{path}: ')}" for fault in error.faults]
         raise InputError(named) from None
-    if choice.remember:
-        store(path, choice)
-    return replace(imported, notes=(*lines, *imported.notes))
+    return imported
 
 
 def _read(
@@ -161,12 +162,10 @@ def _read(
     is_scaled = scale != 1.0 or choice.mass_scale is not None
     facts: Facts = {
         "quantity": Fact("robot model", "file", "its format"),
-        "unit": Fact(factors, "user", "--scale, --mass-scale")
-        if is_scaled
-        else Fact(factors, "file", "its format"),
-        "order": Fact("tail first", "user", "--reverse")
-        if reverse
-        else Fact("head first", "inferred", "its first body; --reverse states the other end"),
+        "unit": by_user("--scale, --mass-scale", factors if is_scaled else None)
+        or Fact(factors, "file", "its format"),
+        "order": by_user("--reverse", "tail first" if reverse else None)
+        or Fact("head first", "inferred", "its first body; --reverse states the other end"),
     }
     names = tuple(hinge.name for hinge in hinges)
     return ImportedRobot(robot, names, tuple(notes), facts, worst_m)

@@ -105,7 +105,7 @@ def _head(
         f"samples {spacing_m:g} m apart.",
         *([f"Part of the file, from its south-west corner: {crop} m."] if crop else []),
         *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
-        *(f"- {note}" for note in read.notes),
+        *(f"- {line}" for line in (*map(str, read.facts.values()), *read.notes)),
     ]
 
 

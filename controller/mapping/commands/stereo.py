@@ -9,7 +9,7 @@ import typer
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.config.key_types import DISPARITIES, METRE, Disparities, LengthUnit
+from snakewalk.config.key_types import DISPARITIES, Disparities
 from snakewalk.config.reading import texts
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json
@@ -23,6 +23,7 @@ from snakewalk.controller.mapping.commands.elevation import (
     finish,
     not_positive,
 )
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.world_file import MapWorld
 
 if TYPE_CHECKING:
@@ -76,7 +77,6 @@ def stereo(
     right: Right,
     calibration: Calibration,
     out: WorldOut,
-    unit: LengthUnit = METRE,
     height: Height = None,
     tilt: Tilt = None,
     roll: Roll = 0.0,
@@ -90,6 +90,8 @@ def stereo(
     picture: Picture = None,
     force: Force = False,
     as_json: Json = False,
+    *,
+    choice: CalibrationChoice,
 ) -> None:
     """Make a world of the ground in front of a stereo camera; unseen ground stays unknown.
 
@@ -112,7 +114,7 @@ def stereo(
     if faults:
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
-    calibrated = stereo_camera.read_calibration(calibration, unit)
+    calibrated = stereo_camera.read_calibration(calibration, choice)
     pictures = (colour_picture.read_colours(side) for side in (left, right))
     pair = stereo_camera.rectify(calibrated, *pictures)
     stand = None
@@ -144,7 +146,10 @@ def stereo(
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
     )
-    facts = _facts(terrain) | {"facts": texts(calibrated.facts)}
+    facts = _facts(terrain) | {
+        "facts": texts(calibrated.facts),
+        "notes": list(calibrated.notes),
+    }
     finish(world, facts, picture, as_json=as_json)
 
 

@@ -11,6 +11,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
 from snakewalk.controller.mapping.colour_picture import read_colours
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
 from snakewalk.controller.mapping.mosaic.mosaic import mosaic
@@ -64,7 +65,9 @@ def read_walk(
         InputError: a picture or the calibration is unusable, or two positions do not match.
 
     """
-    calibration = read_calibration(file.parent / config.calibration, config.unit)
+    calibration = read_calibration(
+        file.parent / config.calibration, CalibrationChoice(unit=config.unit)
+    )
     count = len(config.positions)
     total = 2 * count - 1
     models = []

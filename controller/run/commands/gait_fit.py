@@ -1,6 +1,5 @@
 """``snakewalk gait fit``: joint angles that lay the robot on a curve in space."""
 
-import math
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import typer
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
-from snakewalk.config.text_table import read_rows
+from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import (
@@ -95,21 +94,10 @@ def _read(path: Path) -> list[list[float]]:
             f"{path}: no column {', '.join(missing)}; the first line names the columns "
             f"{', '.join(COLUMNS)}, the points follow from the head backwards"
         )
-    return [
-        [
-            _number(path, line, name, dict(zip(names, row, strict=False)).get(name))
-            for name in COLUMNS
-        ]
-        for line, row in enumerate(rows, start=2)
-        if row
-    ]
-
-
-def _number(path: Path, line: int, name: str, text: str | None) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"{path}, line {line}: {name} is {text or 'empty'}; expected a number")
-    return value
+    lines = [line for line, row in enumerate(rows, start=2) if any(row)]
+    table = numbers_of(path, filter(any, rows), names, lines)
+    points = table[:, [names.index(name) for name in COLUMNS]]
+    for line in np.array(lines)[~np.isfinite(points).all(axis=1)]:
+        raise InputError(f"{path}: line {line} lacks one of {', '.join(COLUMNS)}; fill it in")
+    listed: list[list[float]] = points.tolist()
+    return listed

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from snakewalk.config.answers import Answers
 from snakewalk.config.playback import PlaybackConfig
-from snakewalk.config.reading import store, texts
+from snakewalk.config.reading import store, texts, with_stored
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.option import Flag
@@ -70,7 +70,7 @@ def play(
         **playback.model_dump(exclude={"remember"}),
     )
     if playback.remember:
-        store(Path(track), playback.request)
+        store(Path(track), with_stored(Path(track), playback.request)[0])
     name = f"play-{prepared.run.name}"
     result = run_for_user(
         prepared, name, options, bar=TimeBar(prepared.run.name, prepared.duration_s)

@@ -4,7 +4,7 @@ Pixel rows count downwards. Points with a low score are missing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import Fact
+from snakewalk.config.reading import Facts
 from snakewalk.controller.track.choice import FEWEST, Choice
 from snakewalk.controller.track.exchanged_ends import with_ends_in_place
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -46,8 +46,8 @@ class Keypoints:
     """(T,) frame numbers; None: 0, 1, 2..."""
     scale_m: float | None = None
     """Metres in a unit of the places; None: not known."""
-    plane: Fact | None = None
-    """Plane onto which markers in space were projected."""
+    facts: Facts = field(default_factory=dict)
+    """Facts about the file; of markers in space also the plane onto which they are projected."""
     notes: tuple[str, ...] = ()
     """Lines about parts that the reader left out or changed."""
 

@@ -5,18 +5,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from snakewalk.config.archive import read_head, read_text
+from snakewalk.config.archive import ending, read_head, read_text
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
-from snakewalk.config.loader import load, with_keys
-from snakewalk.config.reading import Fact, store, with_stored
+from snakewalk.config.loader import load
+from snakewalk.config.reading import Fact, Facts, answered
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.arrays import load_mat, load_npy, load_npz
 from snakewalk.controller.track.readers.bvh import load_bvh
 from snakewalk.controller.track.readers.formats import HEAD_BYTES, KNOWN, Format, format_of
 from snakewalk.controller.track.readers.generated import EMBEDDED, embedded, generate
-from snakewalk.controller.track.readers.keypoints import Keypoints
+from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
 from snakewalk.controller.track.readers.marker_tables import load_trc
 from snakewalk.controller.track.readers.markers import load_c3d, load_qtm
 from snakewalk.controller.track.readers.tables import load_csv
@@ -29,25 +29,19 @@ def choice_among(name: str, names: Sequence[str], choice: Choice) -> Choice:
     return ALL if name in EMBEDDED and not {*names} <= {*EMBEDDED} else choice
 
 
-def load_track(
-    name_or_path: str,
-    rate_hz: float | None = None,
-    choice: Choice = ALL,
-) -> Track:
+def load_track(name_or_path: str, choice: Choice = ALL) -> Track:
     """Load a shipped recording by name, or a file by path.
 
     Args:
         name_or_path: a name of ``EMBEDDED``, figures in a ``.toml`` (``RecordingConfig``), or a
             file in a format of ``formats.KNOWN``.
-        rate_hz: frames per second of a file; replaces its own or its format's rate.
-        choice: other facts, and parts of the file.
+        choice: facts that the file may not state, and parts of it.
 
     Raises:
         InputError: neither name nor file, an unknown format, or a fault inside it.
 
     """
     path = Path(name_or_path)
-    choice = _with(path, rate_hz, choice)
     if name_or_path in EMBEDDED or path.suffix == ".toml":
         choice.only(path, "a shipped recording")
         if choice.rate or choice.min_score:
@@ -64,65 +58,61 @@ def load_track(
         )
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))
-    return load_file(path, choice=choice)
+    return load_file(path, choice)
 
 
-def load_file(
-    path: str | Path,
-    rate_hz: float | None = None,
-    choice: Choice = ALL,
-) -> Track:
+def load_file(path: str | Path, choice: Choice = ALL) -> Track:
     """Load a recording from a file, whose content decides its format.
 
     Args:
         path: of the file.
-        rate_hz: frames per second; replaces the file's or its format's rate.
-        choice: other facts, and parts of the file.
+        choice: facts that the file may not state, and parts of it.
 
     Raises:
         InputError: no such file, an unknown format, or a fault inside it.
 
     """
     file = Path(path)
-    choice, lines = with_stored(file, _with(path, rate_hz, choice))
-    kind = _format(file)
-    loaded = _loaded_recording(file, kind, choice)
-    track = loaded.track(choice) if isinstance(loaded, Keypoints) else loaded
-    if choice.remember:
-        store(file, choice)
-    facts = _facts(track, choice, kind, has_names=isinstance(loaded, Keypoints))
-    if isinstance(loaded, Keypoints) and loaded.plane is not None:
-        facts["plane"] = loaded.plane
-    return replace(track, notes=(*lines, *track.notes), facts=facts)
+
+    def read(choice: Choice) -> Track:
+        loaded = _loaded_recording(file, choice)
+        if isinstance(loaded, Track):
+            return loaded
+        track = loaded.track(choice)
+        return replace(track, facts=loaded.facts)
+
+    return answered(file, choice, read)
 
 
-def _facts(track: Track, choice: Choice, kind: Format, *, has_names: bool) -> dict[str, Fact]:
+def _facts(file: Path, kind: Format, loaded: Track | Keypoints, choice: Choice) -> Facts:
     """Facts about a recording: by the user, by its format, or inferred."""
-    its_format = f"its format, {kind}"
-    unit = (
-        Fact("body lengths", "inferred", "the file states no length")
-        if track.length_m is None
-        else Fact("m", "file", its_format)
-    )
-    order = (
-        Fact("head first", "user", "--keypoints")
-        if choice.keypoints
-        else Fact("head first", "inferred", "the order of its names, which lie along a body")
-        if has_names
-        else Fact("head first", "file", its_format)
-    )
-    rate = f"{track.rate_hz:g} Hz"
-    time = (
-        Fact(rate, "user", "--rate" if choice.rate else "--time-unit")
-        if choice.rate or choice.time_unit
-        else Fact(rate, "inferred", "the default of its format; --rate states another")
-        if track.rate_assumed
-        else Fact(rate, "inferred", "only seconds are possible; --time-unit states another unit")
-        if kind == "csv" and not has_names
-        else Fact(rate, "file", its_format)
-    )
-    quantity = Fact("bodies of an animal", "file", its_format)
-    return {"quantity": quantity, "unit": unit, "order": order, "time": time}
+    its_format = f"its format, {ending(file)[1:] or kind}"
+    if isinstance(loaded, Keypoints):
+        length, rate_hz = loaded.scale_m, loaded.rate_hz
+        order = Fact("head first", "inferred", "the order of its names, which lie along a body")
+    else:
+        length, rate_hz = loaded.length_m, None if loaded.rate_assumed else loaded.rate_hz
+        order = Fact("head first", "file", its_format)
+    if choice.keypoints:
+        order = Fact("head first", "user", "--keypoints")
+    unit = Fact("m", "file", its_format)
+    if length is None:
+        unit = Fact("body lengths", "inferred", "the file states no length")
+    rate = f"{rate_hz or KEYPOINT_RATE_HZ:g} Hz"
+    time = Fact(rate, "file", its_format)
+    if choice.rate or choice.time_unit:
+        time = Fact(rate, "user", "--rate" if choice.rate else "--time-unit")
+    elif rate_hz is None:
+        time = Fact(rate, "inferred", "the default of its format; --rate states another")
+    elif kind == "csv" and isinstance(loaded, Track):
+        time = Fact(rate, "inferred", "no other unit is possible; --time-unit states another")
+    return {
+        "quantity": Fact("bodies of an animal", "file", its_format),
+        "unit": unit,
+        "order": order,
+        "time": time,
+        **loaded.facts,
+    }
 
 
 def load_keypoints(path: str | Path, choice: Choice = ALL) -> Keypoints:
@@ -133,24 +123,26 @@ def load_keypoints(path: str | Path, choice: Choice = ALL) -> Keypoints:
 
     """
     file = Path(path)
-    choice, lines = with_stored(file, choice)
-    loaded = _loaded_recording(file, _format(file), choice)
-    if not isinstance(loaded, Keypoints):
+
+    def read(choice: Choice) -> Keypoints:
+        loaded = _loaded_recording(file, choice)
+        if isinstance(loaded, Keypoints):
+            return loaded
         raise InputError(
             f"{path}: holds midlines; expected named keypoints: SLEAP, DeepLabCut, QTM, Vicon, TRC "
             "or C3D"
         )
-    if choice.remember:
-        store(file, choice)
-    return replace(loaded, notes=(*lines, *loaded.notes))
+
+    return answered(file, choice, read)
 
 
-def _loaded_recording(file: Path, kind: Format, choice: Choice) -> Track | Keypoints:
+def _loaded_recording(file: Path, choice: Choice) -> Track | Keypoints:
+    kind = _format(file)
     loaded = _read(file, kind, choice)
-    if isinstance(loaded, Track):
-        return loaded
-    least_score = loaded.least_score if choice.min_score is None else choice.min_score
-    return replace(loaded, rate_hz=choice.rate or loaded.rate_hz, least_score=least_score)
+    if isinstance(loaded, Keypoints):
+        least_score = loaded.least_score if choice.min_score is None else choice.min_score
+        loaded = replace(loaded, rate_hz=choice.rate or loaded.rate_hz, least_score=least_score)
+    return replace(loaded, facts=_facts(file, kind, loaded, choice))
 
 
 def _read(file: Path, kind: Format, choice: Choice) -> Track | Keypoints:
@@ -189,10 +181,6 @@ _MARKERS: Final[dict[str, Callable[[Path, Choice], Track | Keypoints]]] = {
     "c3d": load_c3d,
 }
 """Readers of motion capture."""
-
-
-def _with(path: str | Path, rate_hz: float | None, choice: Choice) -> Choice:
-    return choice if rate_hz is None else with_keys(choice, {"rate": rate_hz}, str(path))
 
 
 def _format(file: Path) -> Format:

@@ -19,7 +19,6 @@ from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.markers import (
-    UNITS,
     marker_places,
     number_or_none,
     projected,
@@ -55,11 +54,10 @@ def load_vicon(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
     units = {cell.strip().lower() for cell in block[3][1][2:] if cell.strip()}
     if not names:
         raise InputError(f"{file}: line {block[1][0]}: expected the names of markers")
-    if len(units) != 1 or not units <= UNITS.keys():
+    if len(units) != 1:
         units_text = ", ".join(sorted(units)) or "none"
         raise InputError(
-            f"{file}: line {block[3][0]}: expected one unit of {', '.join(UNITS)} for all markers, "
-            f"found {units_text}"
+            f"{file}: line {block[3][0]}: expected one unit for all markers, found {units_text}"
         )
     data = []
     for line, row in block[4:]:

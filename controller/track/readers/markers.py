@@ -15,16 +15,12 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.config.extras import require_extra
+from snakewalk.config.file_units import LENGTHS_M, named_unit, unit_m
 from snakewalk.config.reading import Fact
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.track.choice import FEWEST, PLANES, Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 
-UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0} | {
-    "millimeters": 1e-3,
-    "centimeters": 1e-2,
-    "meters": 1.0,
-}
 _ACROSS = {"x": "yz", "y": "xz", "z": "xy"}
 """Plane across each axis."""
 _FLAT_SHARE = 0.5
@@ -81,7 +77,7 @@ def load_c3d(file: Path, choice: Choice) -> Keypoints:
         c3d = ezc3d.c3d(str(file))
         about = c3d["parameters"]["POINT"]
         names = [str(name) for name in about["LABELS"]["value"]]
-        unit = str((about["UNITS"]["value"] or ["mm"])[0]).strip()
+        unit = str((about.get("UNITS", {}).get("value") or [""])[0])
         stated = float(about["RATE"]["value"][0])
         screen = (about.get("Y_SCREEN", {}).get("value") or [""])[0]
         stated_up = str(screen).strip().lower()
@@ -123,9 +119,9 @@ def projected(
     ``ups`` is the axis that the file states to point up, ``+z``, or the usual ones of the format.
     Without chosen keypoints, unlabelled and static markers are left out, and named in the notes.
     """
-    unit = unit.lower()
-    if unit not in UNITS:
-        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(UNITS)}")
+    length = named_unit(unit)
+    if length is None and unit.strip():
+        raise InputError(f"{file}: its unit is {unit!r}; expected one of {', '.join(LENGTHS_M)}")
     places = np.where((places == 0.0).all(axis=2)[..., None], np.nan, places)
     notes: list[str] = []
     if choice.keypoints is None:
@@ -145,8 +141,8 @@ def projected(
         None,
         rate_hz=rate_hz,
         frame=frame,
-        scale_m=UNITS[unit],
-        plane=plane,
+        scale_m=None if length is None else unit_m(length),
+        facts={"plane": plane},
         notes=tuple(notes),
     )
 

@@ -1,15 +1,18 @@
 """Recordings as tables: midlines point by point, keypoints frame by frame."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import stated
+from snakewalk.config.file_units import TIMES_S, named_unit, unit_m
+from snakewalk.config.reading import by_user
 from snakewalk.config.text_table import numbers_of, read_rows
-from snakewalk.controller.motion.joint_motion import TIME_UNITS, time_unit
+from snakewalk.controller.motion.joint_motion import time_unit
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus, statuses_named
 from snakewalk.controller.track.readers.deeplabcut import is_deeplabcut, load_rows
@@ -24,14 +27,10 @@ from snakewalk.controller.track.readers.marker_tables import (
 from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_MIDLINE: dict[tuple[str, str], float | None] = {
-    **{("mxmm", "mymm"): 1e-3, ("x_mm", "y_mm"): 1e-3, ("x_m", "y_m"): 1.0},
-    **{("x_lengths", "y_lengths"): None, ("x_px", "y_px"): None},
-}
-"""Columns of places, and metres in their unit; None: body lengths or pixels, without a scale."""
-_WIDE_COLUMNS = {"x_m": 1.0, "x_px": None, "x_lengths": None}
-"""Columns of places in wide rows, which end in the number of the point, and metres in their
-unit."""
+_PLACE: Final = re.compile(r"(m?)x_?(m|[a-z]{2,})(_1)?")
+"""Column of places: x, their unit, and in wide rows the number of the first point."""
+_NO_LENGTHS: Final = ("lengths", "px")
+"""Body lengths and pixels, which have no scale."""
 
 
 def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
@@ -47,19 +46,23 @@ def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
     if is_deeplabcut(rows):
         return load_rows(file, rows, choice)
     column = {name.strip(): index for index, name in enumerate(rows[0])}
-    for pair, scale_m in _MIDLINE.items():
-        if {"t", "frame", "point", *pair} <= column.keys():
-            rows = _of_animal(file, rows, column, choice)
-            columns = [column[name] for name in ("t", "frame", "point", *pair)]
-            table = _numbers(file, rows, columns)
-            track = _midline(file, table, scale_m, choice, _status_of(rows, column))
-            return _named_track(file, track, rows, column)
-    for name, scale_m in _WIDE_COLUMNS.items():
-        if {"t", "frame", f"{name}_1", f"{name}_4"} <= column.keys():
-            rows = _of_animal(file, rows, column, choice)
-            table = _long_table(file, rows, column, name.removeprefix("x_"))
-            track = _midline(file, table, scale_m, choice, _status_of(rows, column))
-            return _named_track(file, track, rows, column)
+    for name in column:
+        place = _PLACE.fullmatch(name)
+        unit = named_unit(place[2]) if place else None
+        if place is None or (unit is None and place[2] not in _NO_LENGTHS):
+            continue
+        pair = name.replace("x", "y", 1)
+        other = f"{name[:-1]}4" if place[3] else "point"
+        if not {"t", "frame", other, pair} <= column.keys():
+            continue
+        rows = _of_animal(file, rows, column, choice)
+        columns = [column[n] for n in ("t", "frame", other, name, pair)]
+        table = (
+            _long_table(file, rows, column, place[2]) if place[3] else _numbers(file, rows, columns)
+        )
+        scale_m = None if unit is None else unit_m(unit)
+        track = _midline(file, table, scale_m, choice, _status_of(rows, column))
+        return _named_track(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, choice)
@@ -162,8 +165,8 @@ def _midline(
                 f"{file}: t must increase from frame to frame, in seconds; it does not in "
                 f"{len(back)} of {len(step)} steps, first after frame {frames[back[0]]:g}"
             )
-        given = stated(file, "--time-unit", None, choice.time_unit)
-        unit_s = TIME_UNITS[time_unit(file, np.cumsum(step), "t", given).value]
+        given = by_user("--time-unit", choice.time_unit)
+        unit_s = TIMES_S[time_unit(file, np.cumsum(step), "t", given).value]
         rate_hz = float(1.0 / np.median(unit_s * step))
         time_s = unit_s * table[first, 0]
     return track_from_points(

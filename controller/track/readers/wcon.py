@@ -6,7 +6,6 @@ last. ``ox, oy`` (else ``cx, cy``) are added to the points; null is missing.
 """
 
 import math
-import re
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 from snakewalk.config.archive import DAMAGE, check_members, parse_json
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import si_value
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import statuses_named
 from snakewalk.controller.track.resample import equal_arc_length
@@ -197,61 +197,3 @@ def _unit(file: Path, units: dict[str, Any], name: str, dimension: str) -> float
     if not isinstance(units.get(name), str):
         raise InputError(f"{file}: units: {name} must be given, such as {dimension!r}")
     return si_value(units[name], dimension)
-
-
-_PREFIX = {
-    **{"": 1.0, "c": 1e-2, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "n": 1e-9},
-    **{"k": 1e3, "K": 1e3, "M": 1e6, "G": 1e9},
-}
-_PREFIX_WORDS = {
-    **{"centi": 1e-2, "milli": 1e-3, "micro": 1e-6, "nano": 1e-9, "": 1.0},
-    **{"kilo": 1e3, "mega": 1e6, "giga": 1e9},
-}
-_SHORT_UNITS = {"m": ("m", 1.0), "in": ("m", 0.0254), "s": ("s", 1.0), "sec": ("s", 1.0)} | {
-    "min": ("s", 60.0),
-    "h": ("s", 3600.0),
-    "d": ("s", 86400.0),
-}
-_LONG_UNITS = {"metre": ("m", 1.0), "meter": ("m", 1.0), "inch": ("m", 0.0254)} | {
-    "micron": ("m", 1e-6),
-    "second": ("s", 1.0),
-    "minute": ("s", 60.0),
-    "hour": ("s", 3600.0),
-    "day": ("s", 86400.0),
-}
-
-
-def si_value(unit: str, dimension: str) -> float | None:
-    """Factor from a unit to metres ("m") or seconds ("s"); None for another dimension.
-
-    Accepts the WCON prefixes and names, short (``um``) or in full (``micrometres``), and numbers as
-    factors. Case matters.
-    """
-    value = 1.0
-    kinds: list[str] = []
-    parts = re.split(r"([*/])", unit.replace(" ", ""))
-    for sign, word in zip(["*", *parts[1::2]], parts[::2], strict=True):
-        kind, factor = _unit_factor(word)
-        if factor == 0.0:
-            return None
-        value = value * factor if sign == "*" else value / factor
-        kinds += [] if kind == "1" else [kind if sign == "*" else f"1/{kind}"]
-    return value if kinds == [dimension] else None
-
-
-def _unit_factor(word: str) -> tuple[str, float]:
-    """Kind ("m", "s", "1" for a number, "?") and SI value of a factor of a unit."""
-    try:
-        return "1", float(word)
-    except ValueError:
-        singular = word.removesuffix("s")
-    if word in _SHORT_UNITS:
-        return _SHORT_UNITS[word]  # "min" is a minute, not a milli-inch
-    for base, (kind, factor) in _LONG_UNITS.items():
-        for name in (word, singular, "inch" if word == "inches" else word):
-            if name.endswith(base) and name.removesuffix(base) in _PREFIX_WORDS:
-                return kind, factor * _PREFIX_WORDS[name.removesuffix(base)]
-    for base, (kind, factor) in _SHORT_UNITS.items():
-        if word.endswith(base) and word.removesuffix(base) in _PREFIX:
-            return kind, factor * _PREFIX[word.removesuffix(base)]
-    return "?", 1.0

@@ -13,16 +13,16 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capturing import capture_recording
-from snakewalk.controller.capture.options import CaptureOptions
+from snakewalk.controller.capture.film.scale import scale_of_marker
 from snakewalk.controller.capture.plots.capture import trail_picture
 from snakewalk.controller.capture.recording import examine
-from snakewalk.controller.capture.scale import scale_of_marker
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.video import open_footage
 from snakewalk.controller.track.analysis import analyse
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_track
 from tests.helpers.command import snakewalk
+from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
 SCENE = SnakeScene(rows=160, columns=200, length_px=70.0, frames=12, wave_hz=1.0, rate_hz=15.0)
@@ -127,9 +127,9 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
     track = tmp_path / "t.npz"
     track.write_bytes(b"mine")
     with pytest.raises(InputError, match=r"t\.npz: exists; --force overwrites it"):
-        capture_recording(CaptureOptions(swim, track))
+        capture_recording(film_options(swim, track))
     assert track.read_bytes() == b"mine"
-    capture_recording(CaptureOptions(swim, track, force=True))
+    capture_recording(film_options(swim, track, force=True))
     assert load_track(str(track)).frames == 6
 
 
@@ -140,7 +140,7 @@ def test_a_fault_leaves_nothing_behind(swim: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.avi"
     cut.write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"ends after \d+ of 12 frames"):
-        capture_recording(CaptureOptions(cut, folder / "t.npz"))
+        capture_recording(film_options(cut, folder / "t.npz"))
     assert list(folder.iterdir()) == []
 
 
@@ -197,7 +197,7 @@ def test_a_folder_of_images_is_taken_in_the_order_of_its_numbers(tmp_path: Path)
 def test_a_given_background_is_used(swim: Path, tmp_path: Path) -> None:
     ground = tmp_path / "ground.png"
     cv2.imwrite(str(ground), empty(SCENE))
-    facts = capture_recording(CaptureOptions(swim, tmp_path / "t.npz", background=ground))
+    facts = capture_recording(film_options(swim, tmp_path / "t.npz", background=ground))
     assert facts.background == "given"
     assert facts.frames_used == 12
 
@@ -223,7 +223,7 @@ def test_the_steps_show_the_animal_as_large_as_the_panel(tmp_path: Path) -> None
     for number, frame in enumerate(film(replace(SCENE, rows=240, columns=480, frames=4))):
         cv2.imwrite(str(arena / f"{number}.png"), frame)
     steps = tmp_path / "steps.png"
-    capture_recording(CaptureOptions(arena, tmp_path / "t.npz", rate_hz=30.0, steps=steps))
+    capture_recording(film_options(arena, tmp_path / "t.npz", rate_hz=30.0, steps=steps))
     sheet = cv2.imread(str(steps), cv2.IMREAD_GRAYSCALE)
     assert sheet is not None
     high, wide = sheet.shape
@@ -276,7 +276,7 @@ def test_bad_options_are_told_before_any_work(
     (tmp_path / "bare").mkdir()
     paths = {"recording", "output", "overlay", "sheet", "background"}
     given = {k: tmp_path / str(v) if k in paths else v for k, v in change.items()}
-    options = replace(CaptureOptions(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
+    options = changed(film_options(swim, tmp_path / "t.npz"), **given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=said):
         capture_recording(options)
     assert not (tmp_path / "t.npz").exists()
@@ -292,7 +292,7 @@ def test_grey_frames_of_a_colour_film_are_as_large_as_the_others(tmp_path: Path)
         if number % 2:
             coloured[0, 0] = (0, 10, 20)
         cv2.imwrite(str(folder / f"{number}.png"), coloured)
-    options = CaptureOptions(folder, tmp_path / "t.npz", rate_hz=15.0, roi="2,2,190,150")
+    options = film_options(folder, tmp_path / "t.npz", rate_hz=15.0, roi="2,2,190,150")
     facts = capture_recording(options)
     assert facts.frames_used == SCENE.frames
     assert facts.head_by == "travel"
@@ -303,8 +303,8 @@ def test_a_track_of_cropped_images_says_that_it_contains_no_travel(
     swim: Path, tmp_path: Path
 ) -> None:
     fixed, cropped = (tmp_path / name for name in ("fixed.npz", "cropped.npz"))
-    assert capture_recording(CaptureOptions(swim, fixed)).places_recorded
-    assert not capture_recording(CaptureOptions(swim, cropped, cropped=True)).places_recorded
+    assert capture_recording(film_options(swim, fixed)).places_recorded
+    assert not capture_recording(film_options(swim, cropped, cropped=True)).places_recorded
     found = analyse(load_track(str(cropped)))
     assert found.travel is None
     assert found.sliding is None
@@ -324,7 +324,7 @@ def test_a_head_that_is_not_sure_is_a_warning(
         "snakewalk.controller.capture.capture.head_end", lambda *_, **__: (0.19, "taper")
     )
     track = tmp_path / "t.npz"
-    facts = capture_recording(CaptureOptions(swim, track))
+    facts = capture_recording(film_options(swim, track))
     assert facts.head_sure == 0.19
     assert facts.warning is not None
     assert facts.warning in caplog.text

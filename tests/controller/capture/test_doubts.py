@@ -20,13 +20,13 @@ from snakewalk.controller.capture.capturing import (
 from snakewalk.controller.capture.coil_film import CoilFilm
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import align_ends, head_end
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.verification.film_check import has_faint_continuation
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.film_options import film_options
 from tests.oracles.rendered_snake import (
     SnakeScene,
     coverage,
@@ -38,7 +38,7 @@ from tests.oracles.rendered_snake import (
 from tests.oracles.skeleton_accuracy import point_error
 
 SCENE = SnakeScene(rows=240, columns=320, frames=10, rate_hz=3.75, wave_hz=0.6, length_px=100.0)
-OPTIONS = CaptureOptions(Path("film.avi"), Path("track.npz"))
+OPTIONS = film_options(Path("film.avi"), Path("track.npz"))
 
 
 def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
@@ -195,7 +195,7 @@ def test_an_animal_as_bright_as_its_ground_is_rejected_with_that_reason(tmp_path
         frame = scene.ground + body * pattern + rng.normal(0.0, 3.0, body.shape)
         cv2.imwrite(str(folder / f"{k:02d}.png"), np.clip(frame, 0.0, 255.0).astype(np.uint8))
     with pytest.raises(InputError, match="the animal is about as bright as its ground"):
-        capture_recording(CaptureOptions(folder, tmp_path / "track.npz", rate_hz=4.0))
+        capture_recording(film_options(folder, tmp_path / "track.npz", rate_hz=4.0))
     assert not (tmp_path / "track.npz").exists()
 
 
@@ -216,7 +216,7 @@ def test_a_few_rough_frames_of_an_unclear_outline_are_no_result(kind: str, tmp_p
     seen = capture(film(scene), BodyDetector(empty(scene), Polarity.DARK, "given"), 3.0)
     length = np.where([one.has_points for one in status], 100.0, np.nan)
     altered = replace(seen, status=status, length_px=length)
-    options = CaptureOptions(tmp_path / "film.avi", tmp_path / "track.npz")
+    options = film_options(tmp_path / "film.avi", tmp_path / "track.npz")
     if not rejected:
         check_chance_finds(options, altered)
         return

@@ -15,13 +15,14 @@ from snakewalk.controller.capture import capturing, film_parts, image_file
 from snakewalk.controller.capture.capture import Capture, CaptureFile, load_capture, save_capture
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.detections import Detections
+from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.image_file import ImageFile, large_array, scaled
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.images.body_detector import Detection, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -41,7 +42,7 @@ def frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def options_of(frames: Path, folder: Path) -> CaptureOptions:
     """Options with a known background, which need no time to learn it."""
     ground = frames.with_name("ground.png")
-    return CaptureOptions(frames, folder / "t.npz", rate_hz=30.0, background=ground)
+    return film_options(frames, folder / "t.npz", rate_hz=30.0, background=ground)
 
 
 @pytest.fixture
@@ -80,17 +81,17 @@ def test_an_interrupted_capture_is_continued(
     with pytest.raises(InputError, match="holds an interrupted capture; continue it with --resume"):
         capture_recording(options)
     with pytest.raises(InputError, match="its capture has other values of threshold"):
-        capture_recording(replace(options, resume=True, threshold=20.0))
+        capture_recording(changed(options, resume=True, threshold=20.0))
 
     seen.clear()
     most[0] = 10**6
-    capture_recording(replace(options, resume=True))
+    capture_recording(changed(options, resume=True))
     assert len(seen) == 16, "two parts of 10 frames were finished"
     assert load_capture(options.output).fingerprint == plain.fingerprint
     assert not (tmp_path / "t.npz.part").exists()
     options.output.unlink()
     with pytest.raises(InputError, match="there is nothing to continue; leave --resume out"):
-        capture_recording(replace(options, resume=True))
+        capture_recording(changed(options, resume=True))
 
 
 @pytest.mark.nightly("a further film: 3 s of CPU")

@@ -18,12 +18,12 @@ from snakewalk.controller.capture.corrections import (
     apply_corrections,
     read_corrections,
 )
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.review import picture_scale, review_page
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
 from tests.helpers.browser import IN_A_BROWSER, chromium, new_tab
 from tests.helpers.command import snakewalk
+from tests.helpers.film_options import film_options
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 
 SCENE = SnakeScene(rows=210, columns=240, length_px=125.0, frames=16, wave_hz=1.0)
@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cv2.imwrite(str(made / "frames" / f"{number}.png"), shown)
     cv2.imwrite(str(made / "ground.png"), empty(SCENE))
     capture_recording(
-        CaptureOptions(
+        film_options(
             made / "frames", made / "track.npz", rate_hz=30.0, review=made / "review.html",
             background=made / "ground.png",
             length_m=0.35,
@@ -145,7 +145,7 @@ def test_wrong_corrections_are_refused(
 ) -> None:
     file = tmp_path / "c.json"
     file.write_text(json.dumps({"track": held.fingerprint, "frames": 16} | change))
-    options = CaptureOptions(folder / "track.npz", tmp_path / "new.npz", corrections=file)
+    options = film_options(folder / "track.npz", tmp_path / "new.npz", corrections=file)
     with pytest.raises(InputError, match=said):
         correct_recording(options)
     assert not (tmp_path / "new.npz").exists()
@@ -157,19 +157,19 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
     track = folder / "track.npz"
     new = tmp_path / "new.npz"
     for options, said in (
-        (CaptureOptions(track, new, corrections=junk), "is not JSON"),
-        (CaptureOptions(track, new, corrections=tmp_path / "no.json"), "No such file"),
+        (film_options(track, new, corrections=junk), "is not JSON"),
+        (film_options(track, new, corrections=tmp_path / "no.json"), "No such file"),
         (
-            CaptureOptions(track, new, corrections=junk, roi="1,2,3,4"),
+            film_options(track, new, corrections=junk, roi="1,2,3,4"),
             "leave the other options out",
         ),
-        (CaptureOptions(track, track, corrections=junk), "exists; --force"),
-        (CaptureOptions(track, tmp_path / "a.csv", corrections=junk), "a track is an .npz"),
+        (film_options(track, track, corrections=junk), "exists; --force"),
+        (film_options(track, tmp_path / "a.csv", corrections=junk), "a track is an .npz"),
     ):
         with pytest.raises(InputError, match=said):
             correct_recording(options)
     with pytest.raises(InputError, match=r"a review page is an \.html"):
-        capture_recording(CaptureOptions(folder / "frames", new, review=tmp_path / "a.doc"))
+        capture_recording(film_options(folder / "frames", new, review=tmp_path / "a.doc"))
     np.savez(tmp_path / "other.npz", points=np.zeros((3, 5, 2)))
     for file in (tmp_path / "other.npz", junk):
         with pytest.raises(InputError, match=r"`animal capture` wrote"):

@@ -17,7 +17,6 @@ from snakewalk.controller.capture.capture import capture, load_capture, save_cap
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.commands.capture import show_several
 from snakewalk.controller.capture.film_parts import FilmParts
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.several.animal_films import find_animals
 from snakewalk.controller.capture.several.blobs import blobs_of, detector_of_several
@@ -29,6 +28,7 @@ from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_file
+from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_crossings import CrossingScene, crossing_film, crossing_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -118,7 +118,7 @@ def dish(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, AnimalsFacts]:
     for frame in crossing_film(PAIR, crossing_midlines(PAIR)):
         writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
     writer.release()
-    options = CaptureOptions(
+    options = film_options(
         film, folder / "track.npz", animals="auto", review=folder / "page.html",
         overlay=folder / "film.avi", sheet=folder / "sheet.png",
     )  # fmt: skip
@@ -213,7 +213,7 @@ def test_a_film_that_is_mostly_lost_names_the_option_that_captures_it(
 ) -> None:
     """The fixture shows that the option gives a track of each animal."""
     folder, _ = dish
-    options = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz")
+    options = film_options(folder / "dish.avi", tmp_path / "t.npz")
     capture_recording(options)
     assert "with --animals auto; try: snakewalk animal capture" in caplog.text
 
@@ -223,17 +223,17 @@ def test_what_does_not_fit_several_animals_is_rejected(
     dish: tuple[Path, AnimalsFacts], tmp_path: Path
 ) -> None:
     folder, _ = dish
-    plain = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz", animals="2")
+    plain = film_options(folder / "dish.avi", tmp_path / "t.npz", animals="2")
     with pytest.raises(InputError, match=r"--animals 5: \d animals can be followed"):
-        capture_several(replace(plain, animals="5"))
+        capture_several(changed(plain, animals="5"))
     with pytest.raises(InputError, match="--animals many: expected a number"):
-        capture_several(replace(plain, animals="many"))
+        capture_several(changed(plain, animals="many"))
     with pytest.raises(InputError, match="--animals and --head"):
-        capture_several(replace(plain, head="3,4"))
+        capture_several(changed(plain, head="3,4"))
     with pytest.raises(InputError, match="--wide"):
-        capture_several(replace(plain, wide=True))
+        capture_several(changed(plain, wide=True))
     with pytest.raises(InputError, match="--review"):
-        capture_several(replace(plain, output=tmp_path / "t.csv", review=tmp_path / "r.html"))
+        capture_several(changed(plain, output=tmp_path / "t.csv", review=tmp_path / "r.html"))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -259,7 +259,7 @@ def test_an_interrupted_capture_of_several_animals_is_continued(
 ) -> None:
     monkeypatch.setattr(film_parts, "PART_FRAMES", 6)
     folder, facts = dish
-    plain = CaptureOptions(folder / "dish.avi", tmp_path / "t.npz", animals="2")
+    plain = film_options(folder / "dish.avi", tmp_path / "t.npz", animals="2")
     seen: list[int] = []
     add, most = FilmParts.add, [18]
 
@@ -274,10 +274,10 @@ def test_an_interrupted_capture_of_several_animals_is_continued(
         capture_several(plain)
     assert "continue by --resume" in stop.value.__notes__[0]
     with pytest.raises(InputError, match="its capture has other values of animals"):
-        capture_several(replace(plain, resume=True, animals="auto"))
+        capture_several(changed(plain, resume=True, animals="auto"))
     seen.clear()
     most[0] = 10**6
-    again = capture_several(replace(plain, resume=True))
+    again = capture_several(changed(plain, resume=True))
     used = [one.capture.frames_used for one in again.animals if one.capture is not None]
     assert len(used) == 2
     assert len(seen) < sum(used), "finished parts are not captured again"

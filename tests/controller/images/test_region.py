@@ -9,11 +9,11 @@ import pytest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capturing import capture_recording
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.region import WHOLE, region_of
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -49,13 +49,13 @@ def off_px(track: Path) -> float:
 
 @pytest.mark.nightly("two further films: 4 s of CPU")
 def test_the_region_or_the_mask_leaves_the_clutter_out(cluttered: Path, tmp_path: Path) -> None:
-    plain = replace(CaptureOptions(cluttered, tmp_path / "t.npz"), force=True)
+    plain = changed(film_options(cluttered, tmp_path / "t.npz"), force=True)
     with pytest.raises(InputError, match="give --background"):
         capture_recording(plain)
-    roi = capture_recording(replace(plain, roi=f"{PAD[1]},{PAD[0]},{SCENE.columns},{SCENE.rows}"))
+    roi = capture_recording(changed(plain, roi=f"{PAD[1]},{PAD[0]},{SCENE.columns},{SCENE.rows}"))
     assert roi.frames_used == SCENE.frames
     assert off_px(plain.output) < 1.5
-    masked = capture_recording(replace(plain, mask=cluttered.parent / "mask.png"))
+    masked = capture_recording(changed(plain, mask=cluttered.parent / "mask.png"))
     assert masked.frames_used == SCENE.frames
     assert off_px(plain.output) < 1.5
 
@@ -104,4 +104,4 @@ def test_without_either_the_whole_picture_is_taken_and_nonsense_is_told(tmp_path
         with pytest.raises(InputError, match=told):
             region_of(None, mask, shape)
     with pytest.raises(InputError, match="--threshold -3: expected the grey levels"):
-        capture_recording(CaptureOptions(tmp_path, tmp_path / "t.npz", threshold=-3.0))
+        capture_recording(film_options(tmp_path, tmp_path / "t.npz", threshold=-3.0))

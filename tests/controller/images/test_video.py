@@ -9,11 +9,12 @@ import pytest
 
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.capturing import capture_recording
-from snakewalk.controller.capture.options import CaptureOptions
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.video import frame_numbers_of, frame_times, in_8_bits, open_footage
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_track
+from tests.helpers.film_options import film_options
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -63,7 +64,7 @@ def test_a_deep_film_is_captured_and_a_threshold_is_in_its_own_counts(
     deep: Path, tmp_path: Path
 ) -> None:
     facts = capture_recording(
-        CaptureOptions(
+        film_options(
             deep, tmp_path / "t.npz", rate_hz=30.0, background=deep.parent / "ground16.png",
             threshold=150.0, sheet=tmp_path / "s.png", steps=tmp_path / "steps.png",
             overlay=tmp_path / "o.avi", review=tmp_path / "r.html",
@@ -111,7 +112,7 @@ def test_a_film_of_variable_rate_becomes_a_track_with_its_times(tmp_path: Path) 
             made.mux(stream.encode(shot))
         made.mux(stream.encode())
     cv2.imwrite(str(tmp_path / "ground.png"), empty(SCENE))
-    options = CaptureOptions(path, tmp_path / "t.npz", background=tmp_path / "ground.png")
+    options = film_options(path, tmp_path / "t.npz", background=tmp_path / "ground.png")
     facts = capture_recording(options)
     assert not facts.rate_assumed
     held = load_capture(tmp_path / "t.npz").captured
@@ -119,7 +120,7 @@ def test_a_film_of_variable_rate_becomes_a_track_with_its_times(tmp_path: Path) 
     track = load_track(str(tmp_path / "t.npz"))
     assert track.uneven
     assert track.time_s[-1] == pytest.approx(0.245, abs=0.5 / track.rate_hz)
-    assert not load_track(str(tmp_path / "t.npz"), 30.0).uneven
+    assert not load_track(str(tmp_path / "t.npz"), Choice(rate=30.0)).uneven
 
 
 def test_all_pages_of_a_stack_are_frames(tmp_path: Path) -> None:

@@ -125,7 +125,7 @@ def test_units_of_rasters(tmp_path: Path) -> None:
     assert wide == pytest.approx(40 * 78.847, rel=1e-4)
     assert deep == pytest.approx(29 * 111.13, rel=1e-4)
     geotiff(file, HILL[::-1].astype("float32"), crs="EPSG:2263")  # US survey feet
-    with pytest.raises(InputError, match=r"cells are in us-ft, .* add --height-unit us-ft"):
+    with pytest.raises(InputError, match=r"in us-ft, .*\(--height-unit us-ft\)"):
         read_elevation(file, MapOptions(scale=10.0))
     read = read_elevation(file, MapOptions(ElevationChoice(height_unit="us-ft"), scale=10.0))
     assert read.size_m[0] == pytest.approx(4.0 * 1200 / 3937)
@@ -281,7 +281,7 @@ def test_points_that_may_be_degrees_are_asked_about_with_both_readings(
 ) -> None:
     file = tmp_path / f"a.{ending}"
     np.savetxt(file, DEGREES, fmt="%.9f", delimiter="," if ending == "csv" else " ")
-    with pytest.raises(InputError, match=r"--unit deg.*3\.0\d* m by 3\.2\d* m.*--unit m"):
+    with pytest.raises(InputError, match=r"3\.0\d* m by 3\.2\d* m \(--unit deg\).*--unit m"):
         read_elevation(file, MapOptions())
     found = read_elevation(file, MapOptions(ElevationChoice(unit="deg")))
     np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
@@ -302,7 +302,8 @@ def test_columns_named_as_degrees_are_degrees_in_any_order(tmp_path: Path, names
     for name in ("a.csv", "b.csv"):
         found = read_elevation(tmp_path / name, MapOptions())
         np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
-        assert any("degrees, as their names state" in note for note in found.notes)
+        assert found.facts["unit"].value == "deg"
+        assert found.facts["unit"].basis.startswith("the names of its columns, ")
 
 
 def test_small_scans_near_their_origin_are_metres(tmp_path: Path) -> None:

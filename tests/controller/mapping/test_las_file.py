@@ -69,7 +69,7 @@ def read(file: Path, spacing_m: float = 1.0, **units: Any) -> FileMap:
 
 
 def noted(found: FileMap, words: str) -> bool:
-    return any(words in note for note in found.notes)
+    return any(words in line for line in (*found.notes, *map(str, found.facts.values())))
 
 
 UTM = CRS.from_epsg(32632).to_wkt()
@@ -123,7 +123,9 @@ def test_units_are_those_that_the_file_states(tmp_path: Path) -> None:
     ground = points * [1, 1, 0] + [0, 0, 1] * (0.2 * points[:, :1])
     feet = CRS.from_epsg(2263).to_wkt()
     there = np.add(ground, [1e6, 2e5, 0.0])
-    with pytest.raises(InputError, match=r"in us-ft, and it states no unit of heights: add --heig"):
+    with pytest.raises(
+        InputError, match=r"in us-ft, and it states no unit of heights; .*-unit us-ft"
+    ):
         read(write(tmp_path / "a.las", there, kinds, wkt=feet))
     both = CRS.from_user_input("EPSG:2263+6360").to_wkt()
     found = read(write(tmp_path / "a.las", there, kinds, wkt=both))
@@ -137,7 +139,7 @@ def test_units_are_those_that_the_file_states(tmp_path: Path) -> None:
     found = read(keyed)
     assert found.size_m == pytest.approx((40, 30), rel=1e-2)
     assert found.relief_m == pytest.approx(8 * 0.3048, rel=0.05)
-    assert noted(found, "heights are in ft, as the file states")
+    assert noted(found, "ft (stated by its coordinate system)")
     known = write(
         tmp_path / "c.las",
         np.add(ground, [1e6, 2e5, 0]),
@@ -157,7 +159,7 @@ def test_units_are_those_that_the_file_states(tmp_path: Path) -> None:
 def test_a_file_without_a_system_is_asked_about(tmp_path: Path) -> None:
     points, kinds = cloud()
     file = write(tmp_path / "a.las", points, kinds)
-    with pytest.raises(InputError, match=r"states no coordinate system, .* add --unit m \(or ft"):
+    with pytest.raises(InputError, match=r"states no coordinate system, .*--unit m\) or feet "):
         read(file)
     assert read(file, unit="m").size_m == pytest.approx((40, 30), rel=1e-2)
     assert read(file, unit="ft").size_m == pytest.approx((40 * 0.3048, 30 * 0.3048), rel=1e-2)

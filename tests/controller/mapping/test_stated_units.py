@@ -14,12 +14,13 @@ from rasterio.transform import from_origin
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import LENGTHS_M, named_unit
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.elevation_file import FileMap, MapOptions, read_elevation
-from snakewalk.controller.mapping.length_units import UNITS_M, named_unit, vertical_unit
+from snakewalk.controller.mapping.length_units import vertical_unit
 from snakewalk.controller.mapping.number_table import read_numbers
 from snakewalk.controller.terrain.relief import Relief, elevation_variance_m2
 
@@ -62,7 +63,7 @@ def read(file: Path, **units: Any) -> FileMap:
 
 
 def noted(found: FileMap, words: str) -> bool:
-    return any(words in note for note in found.notes)
+    return any(words in line for line in (*found.notes, *map(str, found.facts.values())))
 
 
 @pytest.mark.parametrize(
@@ -72,13 +73,13 @@ def test_heights_have_the_unit_of_the_band(tmp_path: Path, unit: str) -> None:
     found = read(geotiff(tmp_path / "a.tif", unit=unit))
     assert found.relief_m == pytest.approx(FEET, rel=1e-5)
     assert found.size_m == (COLUMNS - 1, ROWS - 1)
-    assert noted(found, "heights are in ")
+    assert noted(found, "ft (stated by its band)")
 
 
 def test_heights_have_the_unit_of_the_vertical_system(tmp_path: Path) -> None:
     found = read(geotiff(tmp_path / "a.tif", crs=COMPOUND, GEOTIFF_VERSION="1.1"))
     assert found.relief_m == pytest.approx(FEET, rel=1e-6)
-    assert noted(found, "heights are in us-ft, as it states")
+    assert noted(found, "us-ft (stated by its band)")
 
 
 def test_units_are_known_by_their_spellings() -> None:
@@ -89,7 +90,7 @@ def test_units_are_known_by_their_spellings() -> None:
     wkt2 = 'VERTCRS["h",VDATUM["d"],CS[vertical,1],AXIS["up",up,LENGTHUNIT["foot",0.3048]]]'
     assert vertical_unit(f'COMPOUNDCRS["c",PROJCRS["p",UNIT["metre",1]],{wkt2}]') == "ft"
     assert vertical_unit('PROJCRS["p",LENGTHUNIT["metre",1]]') is None
-    assert UNITS_M["us-ft"] == 1200 / 3937
+    assert LENGTHS_M["us-ft"] == 1200 / 3937
 
 
 def test_an_unknown_unit_of_heights_is_rejected(tmp_path: Path) -> None:
@@ -107,7 +108,7 @@ def test_two_statements_that_differ_are_asked_about(tmp_path: Path) -> None:
 def test_feet_across_say_nothing_of_heights(tmp_path: Path) -> None:
     where = from_origin(1e6, 2e5, 1.0, 1.0)
     file = geotiff(tmp_path / "a.tif", crs="EPSG:2263", transform=where)
-    with pytest.raises(InputError, match=r"cells are in us-ft, .* --height-unit us-ft \(or --h"):
+    with pytest.raises(InputError, match=r"x and y are in us-ft, .*unit us-ft\) or .*unit m\)"):
         read(file)
     found = read(file, height_unit="m")
     assert found.relief_m == pytest.approx(np.ptp(HILL))
@@ -123,7 +124,7 @@ def test_metres_across_and_no_unit_of_heights_are_metres_and_noted(tmp_path: Pat
 def test_an_option_overrides_what_a_file_states_and_is_noted(tmp_path: Path) -> None:
     found = read(geotiff(tmp_path / "a.tif", unit="ft"), unit="m")
     assert found.relief_m == pytest.approx(np.ptp(HILL))
-    assert noted(found, "heights are in m by --unit; the file states ft")
+    assert noted(found, "m (stated by you: --unit; the file states ft)")
 
 
 def test_scale_and_offset_of_the_band(tmp_path: Path) -> None:
@@ -187,13 +188,13 @@ def asc(file: Path, values: Any = HILL, cell: float = 1 / 1200, x: float = 8.0, 
 
 def test_degrees_without_a_system_are_asked_about(tmp_path: Path) -> None:
     file = asc(tmp_path / "a.asc")
-    with pytest.raises(InputError, match=r"states no system; .* --unit deg \(or --unit m\)"):
+    with pytest.raises(InputError, match=r"states no system; .*\(--unit deg\) or .*\(--unit m\)"):
         read(file)
     found = read(file, unit="deg")
     assert found.size_m == pytest.approx((65.7 * (COLUMNS - 1), 92.6 * (ROWS - 1)), rel=2e-3)
     assert read(file, unit="m").size_m[0] == pytest.approx((COLUMNS - 1) / 1200)
     bare = geotiff(tmp_path / "b.tif", crs=None, transform=from_origin(8.0, 45.0, 1e-4, 1e-4))
-    with pytest.raises(InputError, match="may be degrees"):
+    with pytest.raises(InputError, match="--unit deg"):
         read(bare)
     projected = asc(tmp_path / "c.asc", cell=1.0, x=500000.0, y=4e6)
     assert read(projected).size_m == (COLUMNS - 1, ROWS - 1)
@@ -394,8 +395,8 @@ def test_the_result_and_the_worlds_file_hold_the_notes(tmp_path: Path) -> None:
     words = ["world", "from", str(file), "-o", str(out), "--json", "--scale", "0.1"]
     ran = CliRunner().invoke(app, words)
     assert ran.exit_code == 0, ran.output
-    assert json.loads(ran.stdout)["notes"] == ["heights are in ft, as it states"]
-    assert "# - heights are in ft, as it states" in out.read_text()
+    assert json.loads(ran.stdout)["facts"]["height_unit"] == "ft (stated by its band)"
+    assert "# - ft (stated by its band)" in out.read_text()
     values = HILL.copy()
     values[0, 0] = -9999
     geotiff(file, values, unit="m")

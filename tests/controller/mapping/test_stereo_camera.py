@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.stereo_camera import (
     StereoCalibration,
     read_calibration,
@@ -42,7 +43,7 @@ def test_calibrations_are_read_by_the_names_people_use(ending: str, tmp_path: Pa
         file.write_text(json.dumps(lists | {"camera": "bench", "rms": 0.4}))
     else:
         opencv_file(file, names, 1000 * T_M)
-    found = read_calibration(file, "mm")
+    found = read_calibration(file, CalibrationChoice(unit="mm"))
     np.testing.assert_allclose(found.k_left, K)
     np.testing.assert_allclose(found.distortion_left, D)
     np.testing.assert_allclose(found.rotation, TURN)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_runs import common_step, consecutive, is_mostly_every_nth
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_file
@@ -87,7 +88,7 @@ def test_a_table_of_every_nth_frame_is_a_recording_at_that_rate(tmp_path: Path, 
                  for n, (x, y) in enumerate(body)]  # fmt: skip
     (tmp_path / "nth.csv").write_text("\n".join(rows))
     for rate_hz in (None, 30.0):
-        track = load_file(tmp_path / "nth.csv", rate_hz)
+        track = load_file(tmp_path / "nth.csv", Choice(rate=rate_hz))
         assert (track.every, track.absent, track.dropped) == (every, 0, 0)
         assert track.rate_hz == pytest.approx(30.0 / every, rel=1e-4)
         assert analyse(track).facts()["frequency_hz"] == pytest.approx(1.0, abs=0.02)

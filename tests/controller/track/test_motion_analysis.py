@@ -10,6 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.synthesis.synthesis import Behaviour, Sampling, Start, synthesise
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.pulse_speed import measure_pulse_speed
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_track
@@ -262,7 +263,9 @@ def test_a_real_lamprey(shared_data: Path) -> None:
 def test_a_real_worm_that_backs_up(shared_data: Path) -> None:
     """Forward, back from second 6.5 to 10.5, an omega turn, forward again."""
     found = analyse(
-        load_track(str(shared_data / "worm-joint-angles" / "kymogram_omega-turn.npy"), 32.0)
+        load_track(
+            str(shared_data / "worm-joint-angles" / "kymogram_omega-turn.npy"), Choice(rate=32.0)
+        )
     )
     u = found.pulse.points_per_frame
     when = found.track.time_s[found.pulse.frame]

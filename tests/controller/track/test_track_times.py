@@ -86,7 +86,7 @@ def test_files_with_times_are_read_by_them(tmp_path: Path) -> None:
         track = load_track(str(tmp_path / name))
         assert track.uneven, name
         assert track.time_s[-1] == pytest.approx(time_s[-1] - time_s[0], abs=0.05)
-        assert not load_track(str(tmp_path / name), 25.0).uneven
+        assert not load_track(str(tmp_path / name), Choice(rate=25.0)).uneven
 
 
 def test_an_assumed_rate_stays_assumed_in_the_file_that_is_written(tmp_path: Path) -> None:
@@ -97,7 +97,7 @@ def test_an_assumed_rate_stays_assumed_in_the_file_that_is_written(tmp_path: Pat
     save_track(tmp_path / "again.npz", first)
     assert first.rate_assumed
     assert load_track(str(tmp_path / "again.npz")).rate_assumed
-    assert not load_track(str(tmp_path / "again.npz"), 30.0).rate_assumed
+    assert not load_track(str(tmp_path / "again.npz"), Choice(rate=30.0)).rate_assumed
 
 
 def test_milliseconds_in_a_table_are_asked_about(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_milliseconds_in_a_table_are_asked_about(tmp_path: Path) -> None:
         InputError, match=r"0\.05 Hz \(--time-unit s\) or .* 50 Hz \(--time-unit ms\)"
     ):
         load_track(str(path))
-    assert load_track(str(path), 50.0).time_s[-1] == pytest.approx(1.18)
+    assert load_track(str(path), Choice(rate=50.0)).time_s[-1] == pytest.approx(1.18)
     assert load_track(str(path), choice=Choice(time_unit="ms")).time_s[-1] == pytest.approx(1.18)
     with pytest.raises(InputError, match="--time-unit s"):
         _ = prepare_playback(str(path)).joint_track

@@ -111,7 +111,7 @@ def test_a_pair_that_was_never_seen_has_no_estimate() -> None:
     ("text", "fault"),
     [
         ("time_s,x\n0,1", "the header must name time_s"),
-        ("time_s,height\n0,0\n1,a\n2,0", "a cell is not a number"),
+        ("time_s,height\n0,0\n1,a\n2,0", "line 3: height: expected a number"),
         ("time_s,height\n0,0\n1,1\n5,0", "must rise evenly"),
         ("time_s,height\n0,0\n1,2\n2,0", "a height at most 1"),
     ],

@@ -129,8 +129,8 @@ def test_the_animal_is_chosen_and_who_is_in_the_file_is_told(tmp_path: Path) -> 
         with pytest.raises(InputError, match=r"no such animal; in it are eel, other"):
             load_file(tmp_path / name, choice=Choice(individual="trout"))
         scale = 0.08 if name == "two.wcon" else None
-        same(load_file(tmp_path / name, RATE_HZ, choice=EEL), length_m=scale)
-        backwards = load_file(tmp_path / name, RATE_HZ, choice=OTHER)
+        same(load_file(tmp_path / name, EEL.model_copy(update={"rate": RATE_HZ})), length_m=scale)
+        backwards = load_file(tmp_path / name, OTHER.model_copy(update={"rate": RATE_HZ}))
         assert backwards.frames == FRAMES
     assert not load_file(tmp_path / "two.slp", choice=EEL).rate_assumed, "the project states it"
 
@@ -190,7 +190,7 @@ def test_a_rate_that_was_taken_stays_marked_in_the_file(tmp_path: Path) -> None:
     assert first.rate_assumed
     save_track(tmp_path / "t.npz", first)
     assert load_file(tmp_path / "t.npz").rate_assumed
-    assert not load_file(tmp_path / "t.npz", 25.0).rate_assumed
+    assert not load_file(tmp_path / "t.npz", Choice(rate=25.0)).rate_assumed
 
 
 def test_markers_in_space_are_projected(tmp_path: Path) -> None:

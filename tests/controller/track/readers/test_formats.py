@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_track
 from snakewalk.controller.track.resample import body_points, equal_arc_length, tangent_angles
@@ -78,7 +79,7 @@ def test_every_format_gives_back_the_same_angles(
     assert track.rate_assumed is assumed
     assert track.rate_hz == pytest.approx(track.rate_hz if assumed else RATE_HZ)
     assert track.length_m == (None if length_m is None else pytest.approx(length_m, rel=1e-3))
-    again = load_track(str(save(tmp_path, angles)), rate_hz=12.5)
+    again = load_track(str(save(tmp_path, angles)), Choice(rate=12.5))
     assert (again.rate_hz, again.rate_assumed) == (12.5, False)
     assert again.time_s[-1] == pytest.approx((FRAMES - 1) / 12.5)
 

@@ -149,14 +149,14 @@ def test_frame_numbers_of_vicon_and_trc_count_missing_frames(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("name", "change", "said"),
     [
-        ("v.csv", lambda text: text.replace("mm", "ft"), "one unit of mm, cm, m"),
+        ("v.csv", lambda text: text.replace("mm", "px"), "its unit is 'px'"),
         ("v.csv", lambda text: text[: text.index("Frame,")], "ends before its rows"),
         ("v.csv", lambda text: text.replace("\n5,0,", "\nx,0,"), "expected a frame number"),
-        ("t.trc", lambda text: text.replace("\tmm\t", "\tfeet\t"), "its unit is 'feet'"),
+        ("t.trc", lambda text: text.replace("\tmm\t", "\tcubits\t"), "its unit is 'cubits'"),
         ("t.trc", lambda text: text.replace("\n20\t20", "\n0\t20"), "states no DataRate"),
         ("t.trc", lambda text: text[: len(text) // 2], "states NumFrames 60"),
         ("t.trc", lambda text: "\n".join(text.splitlines()[:5]), "five head lines"),
-        ("o.csv", lambda text: text.replace("Millimeters", "Inches"), "its unit is 'inches'"),
+        ("o.csv", lambda text: text.replace("Millimeters", "Cubits"), "its unit is 'Cubits'"),
         ("o.csv", lambda text: text.replace("Global", "Local"), "export it in Global"),
         ("o.csv", lambda text: text.replace("Position", "Velocity"), "has no positions of markers"),
         (

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.config.errors import InputError
+from snakewalk.config.errors import ConfigError, InputError
+from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.readers.load import load_track, track_beside
 from tests.helpers.travelling import RATE_HZ, ends, wave_angles
 
@@ -84,8 +85,9 @@ def test_what_does_not_exist_is_told_names_and_formats(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_frame_rate_is_above_zero(rate: float, tmp_path: Path) -> None:
     np.savez(tmp_path / "good.npz", points=POINTS, rate_hz=RATE_HZ)
-    with pytest.raises(InputError, match="rate: must be "):
-        load_track(str(tmp_path / "good.npz"), rate)
+    (tmp_path / "good.npz.reading.toml").write_text(f"rate = {rate}\n")
+    with pytest.raises(ConfigError, match="rate: must be "):
+        load_track(str(tmp_path / "good.npz"))
 
 
 def test_figures_of_your_own_are_checked_like_every_configuration(tmp_path: Path) -> None:
@@ -93,7 +95,7 @@ def test_figures_of_your_own_are_checked_like_every_configuration(tmp_path: Path
     with pytest.raises(InputError, match=r"mine\.toml:2: waves"):
         load_track(str(tmp_path / "mine.toml"))
     with pytest.raises(InputError, match="hold the frame rate"):
-        load_track("worm-like", 60.0)
+        load_track("worm-like", Choice(rate=60.0))
 
 
 def test_a_run_names_its_recording_relative_to_itself(tmp_path: Path) -> None:

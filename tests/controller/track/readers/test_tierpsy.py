@@ -76,5 +76,5 @@ def test_frames_and_pixels_of_tierpsy_are_no_seconds_and_metres(
     write(path, is_features=is_features, states=states | {"xy_units": "pixels"})
     with pytest.raises(InputError, match="states no frame rate; give --rate"):
         load_file(path, choice=Choice(individual="2"))
-    track = load_file(path, 30.0, Choice(individual="2"))
+    track = load_file(path, Choice(rate=30.0, individual="2"))
     assert (track.rate_hz, track.length_m) == (30.0, None)

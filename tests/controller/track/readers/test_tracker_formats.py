@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from scipy.io import savemat
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.file_units import si_value
 from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.load import load_file
-from snakewalk.controller.track.readers.wcon import si_value
 from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
 
 BODY = ends(wave_angles(), 80.0)[:, ::10] + 200.0  # (60, 11, 2), y upwards
@@ -96,7 +96,7 @@ def test_deeplabcut_as_csv_and_hdf5_with_three_and_four_header_rows(tmp_path: Pa
         dlc_h5(tmp_path / "eelDLC.h5", individuals=individuals)
         dlc_h5(tmp_path / "newDLC.h5", individuals=individuals, protocol=4)
         for name in ("eelDLC.csv", "eelDLC.h5", "newDLC.h5"):
-            track = same(load_file(tmp_path / name, RATE_HZ))
+            track = same(load_file(tmp_path / name, Choice(rate=RATE_HZ)))
             assert not track.rate_assumed
     assert load_file(tmp_path / "eelDLC.csv").rate_assumed
 
@@ -109,10 +109,10 @@ def test_what_a_tracker_was_not_sure_of_is_missing(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "s.h5", scores=sure)
     for name, usual in (("a.csv", 1), ("a.h5", 1), ("s.h5", 0)):
         for least, bridged in ((None, usual), (0.0, 0), (0.8, 3)):
-            track = load_file(tmp_path / name, RATE_HZ, Choice(min_score=least))
+            track = load_file(tmp_path / name, Choice(rate=RATE_HZ, min_score=least))
             assert (track.dropped, track.bridged) == (0, bridged)
         with pytest.raises(InputError, match=r"scores less than 0.95.*lower the least score"):
-            load_file(tmp_path / name, RATE_HZ, Choice(min_score=0.95))
+            load_file(tmp_path / name, Choice(rate=RATE_HZ, min_score=0.95))
 
 
 def test_one_frame_is_told_as_such_and_not_as_a_low_score(tmp_path: Path) -> None:
@@ -120,12 +120,12 @@ def test_one_frame_is_told_as_such_and_not_as_a_low_score(tmp_path: Path) -> Non
     rows = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "one.csv").write_text("\n".join(rows[:4]) + "\n")
     with pytest.raises(InputError, match="holds 1 frame; two or more are needed"):
-        load_file(tmp_path / "one.csv", RATE_HZ)
+        load_file(tmp_path / "one.csv", Choice(rate=RATE_HZ))
 
 
 def test_sleap_analysis(tmp_path: Path) -> None:
     sleap_h5(tmp_path / "one.h5")
-    assert same(load_file(tmp_path / "one.h5", 20.0)).dropped == 0
+    assert same(load_file(tmp_path / "one.h5", Choice(rate=20.0))).dropped == 0
     sleap_h5(tmp_path / "two.h5", animals=2)
     with pytest.raises(InputError, match=r"2 animals in it \(eel, other\): give --individual"):
         load_file(tmp_path / "two.h5")
@@ -165,10 +165,10 @@ def test_images_of_hand_labels_say_which_frames_they_are(tmp_path: Path) -> None
         (tmp_path / "b.csv").write_text("\n".join([*head, *labels]) + "\n")
         return tmp_path / "b.csv"
 
-    track = load_file(write(range(5, 5 + 2 * FRAMES, 2)), RATE_HZ)
+    track = load_file(write(range(5, 5 + 2 * FRAMES, 2)), Choice(rate=RATE_HZ))
     np.testing.assert_allclose(np.diff(track.time_s), 2.0 / RATE_HZ)
     with pytest.raises(InputError, match="do not rise; expected the labels of one film"):
-        load_file(write([*range(30), *range(30)]), RATE_HZ)
+        load_file(write([*range(30), *range(30)]), Choice(rate=RATE_HZ))
 
 
 def test_keypoints_in_another_order_than_along_the_body_are_told() -> None:
@@ -203,7 +203,7 @@ def test_matlab_before_and_since_version_7_3(old: bool, tmp_path: Path) -> None:
     time = np.arange(FRAMES) / RATE_HZ
     write(tmp_path / "b.mat", {"x": BODY[..., 0], "y": BODY[..., 1], "t": time[:, None]})
     same(load_file(tmp_path / "b.mat"))
-    same(load_file(tmp_path / "b.mat", 5.0), rate_hz=5.0)
+    same(load_file(tmp_path / "b.mat", Choice(rate=5.0)), rate_hz=5.0)
     write(tmp_path / "c.mat", {"other": BODY})
     with pytest.raises(InputError, match="found other"):
         load_file(tmp_path / "c.mat")

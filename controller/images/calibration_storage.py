@@ -1,15 +1,48 @@
-"""Camera calibrations as plain lists in JSON."""
+"""Camera calibrations: files of OpenCV's FileStorage, or plain lists in JSON."""
 
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
-from snakewalk.config.archive import MOST_STORAGE_BYTES, parse_json, read_text
+from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, parse_json, read_text
 from snakewalk.config.errors import InputError
 
 
-def read_json_lists(file: Path) -> dict[str, Any] | None:
+def read_storage(file: Path) -> dict[str, Any]:
+    """Matrices and numbers by name of a file of OpenCV's FileStorage, or of JSON lists.
+
+    Raises:
+        InputError: it cannot be read, or is too large.
+        OSError: it cannot be opened.
+
+    """
+    check_matrices(file)
+    lists = _json_lists(file)
+    if lists is not None:
+        return lists
+    try:
+        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
+        nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict
+        values = {
+            name: node.mat()
+            if node.isMap()
+            else node.real()
+            if node.isReal() or node.isInt()
+            else None
+            for name, node in nodes.items()
+        }
+        store.release()
+    except (cv2.error, SystemError) as error:
+        raise InputError(
+            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
+            "file"
+        ) from None
+    return values
+
+
+def _json_lists(file: Path) -> dict[str, Any] | None:
     """Values of a JSON file of plain lists and numbers, as from ``json.dump``.
 
     An object with ``data`` is a matrix of OpenCV, also next to plain lists.

@@ -1,0 +1,1 @@
+"""Film of a capture: its options, its facts and its scale."""
