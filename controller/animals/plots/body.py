@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.colours import AMBER, BLUE, INK, RED
@@ -21,7 +20,10 @@ from snakewalk.controller.images.mesh import Mesh
 from snakewalk.controller.images.mesh_files import SKIN_RGB
 from snakewalk.controller.track.bone_motion import BoneMotion
 
-_SUN = np.array([0.3, 0.5, 0.81])
+_SUN = np.array([0.3, 0.5, 0.812])
+"""Direction of the light, of length 1 (ours)."""
+_SOLID_PX = 1300
+"""Longer side of a drawn body, in half pixels (ours)."""
 
 
 def draw_body(
@@ -110,26 +112,43 @@ def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image 
 
 
 def _solid(figure: Figure, mesh: Mesh, texture: Image | None) -> None:
-    """Draw the mesh in the light of one sun, each face in the colour at its middle."""
-    axes = figure.add_subplot(projection="3d")
-    triangles = mesh.vertices[mesh.faces]
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    shade = 0.45 + 0.55 * np.clip(normal @ (_SUN / np.linalg.norm(_SUN)), 0.0, 1.0)
-    if texture is None:
-        colour = np.broadcast_to(SKIN_RGB, (len(normal), 3))
-    else:
-        u, v = mesh.uv[mesh.faces].mean(axis=1).T
-        rows = np.rint((1.0 - v) * (texture.shape[0] - 1)).astype(int)
-        columns = np.rint(u * (texture.shape[1] - 1)).astype(int)
-        colour = texture[rows, columns] / 255.0
-    axes.add_collection3d(
-        Poly3DCollection(triangles, facecolors=np.clip(colour * shade[:, None], 0, 1), linewidths=0)
-    )
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_zlim(low[2], high[2])
-    axes.set_box_aspect(np.maximum(high - low, 1e-9), zoom=1.05)
-    axes.view_init(elev=38.0, azim=-62.0)
+    axes = figure.add_subplot()
+    axes.imshow(_solid_picture(mesh, texture))
     axes.set_axis_off()
+
+
+def _solid_picture(mesh: Mesh, texture: Image | None) -> Floats:
+    """(H, W, 3) parallel view of a mesh in the light of a sun and of the eye, as large as the body.
+
+    Each triangle is sampled more densely than the pixels; the sample nearest to the eye counts.
+    """
+    azimuth, elevation = np.radians(-62.0), np.radians(38.0)
+    c, s, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
+    view = np.array([[-s, c, 0.0], [c * se, s * se, -ce], [c * ce, s * ce, se]])
+    seen = mesh.vertices @ view.T  # right, down, towards the eye
+    low = seen[:, :2].min(axis=0)
+    scale = _SOLID_PX / float(np.ptp(seen[:, :2], axis=0).max())
+    corners = np.column_stack([(seen[:, :2] - low) * scale, seen[:, 2]])[mesh.faces]
+    edges = np.linalg.norm(corners[..., :2] - np.roll(corners[..., :2], 1, axis=1), axis=-1)
+    level = np.ceil(np.log2(np.maximum(1.2 * edges.max(axis=1), 1.0))).astype(int)
+    light = 0.4 + 0.35 * np.clip(mesh.normals @ _SUN, 0.0, 1.0)
+    light += 0.25 * np.abs(mesh.normals @ view[2])
+    facts = np.column_stack([light, mesh.uv])[mesh.faces]
+    groups = []
+    for k in np.unique(level):
+        i, j = (n.ravel() for n in np.indices((2**k + 1, 2**k + 1)))
+        inside = i + j <= 2**k
+        parts = np.column_stack([i, j, 2**k - i - j])[inside] / 2**k
+        both = np.concatenate([corners[level == k], facts[level == k]], axis=2)
+        groups.append(np.einsum("pk,tkv->tpv", parts, both).reshape(-1, 6))
+    samples = np.concatenate(groups)
+    x, y, _, light, u, v = samples[np.argsort(samples[:, 2])].T
+    colour: Floats = np.broadcast_to(SKIN_RGB, (len(x), 3))
+    if texture is not None:
+        rows = np.rint((1.0 - v) * (texture.shape[0] - 1)).astype(int)
+        colour = texture[rows, np.rint(u * (texture.shape[1] - 1)).astype(int)] / 255.0
+    column, row = np.rint(x).astype(int), np.rint(y).astype(int)
+    picture = np.ones((row.max() // 2 * 2 + 2, column.max() // 2 * 2 + 2, 3))
+    picture[row, column] = colour * light[:, None]
+    high, wide = (n // 2 for n in picture.shape[:2])
+    return np.asarray(picture.reshape(high, 2, wide, 2, 3).mean(axis=(1, 3)))
