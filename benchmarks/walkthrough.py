@@ -69,7 +69,7 @@ def matches_table(walk: StereoWalk, known: list[Truth]) -> None:
     for k, (flow, scale, _) in enumerate(known):
         for scales in (SCALES, (1.0,)):
             first, second = walk.models[k], walk.models[k + 1]
-            found = match_over_scale(first, second, scales, distance_m=0.7)
+            found = match_over_scale(first, second, scales)
             column, row = found.first_px.astype(int).T
             off = np.linalg.norm(found.second_px - found.first_px - flow[row, column], axis=1)
             off = np.nan_to_num(off, nan=np.inf)
@@ -122,14 +122,15 @@ def flow_table(walk: StereoWalk, known: list[Truth], off_m: float) -> None:
 
 def pose_table(walk: StereoWalk) -> None:
     """Poses between positions against the truth."""
-    print("| positions | matches | inliers | place off | axes off | common |")
-    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    print("| positions | matches | inliers | place off | its sd | axes off | common |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: |")
     for k, step in enumerate(walk.steps):
         assert step.place_error_m is not None
         assert step.angle_error_rad is not None
         print(
             f"| {k + 1} to {k + 2} | {step.matches} | {step.inliers} | "
-            f"{1000 * step.place_error_m:.1f} mm | {1000 * step.angle_error_rad:.1f} mrad | "
+            f"{1000 * step.place_error_m:.1f} mm | {1000 * step.place_sd_m:.1f} mm | "
+            f"{1000 * step.angle_error_rad:.1f} mrad | "
             f"{100 * step.common_share:.0f} % |"
         )
 

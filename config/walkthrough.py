@@ -33,7 +33,10 @@ class PositionConfig(Strict):
         "rotation; the first one looks along the route",
     )
     distance_m: float | None = Field(
-        None, gt=0.0, le=1000.0, description="guess of the distance to the next position"
+        None,
+        gt=0.0,
+        le=1000.0,
+        description="distance to the next position, if the pictures agree on several motions",
     )
     pose: Pose | None = Field(
         None,

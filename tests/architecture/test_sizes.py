@@ -29,8 +29,6 @@ KERNELS: Final[dict[str, str]] = {
     "controller/gaits/cpg/trajectory.py:peak_share": "a numba signature knows no records",
     "controller/gaits/cpg/trajectory.py:trajectory": "a numba signature knows no records",
     "controller/images/thin_body_fit.py:draw_spots": "numbers of a spot and derivatives",
-    "controller/mapping/mosaic/rasteriser.py:_draw": "buffers of a picture, made once",
-    "controller/mapping/mosaic/rasteriser.py:_shade": "runs for each pixel",
     "controller/mapping/mosaic/scale_flow.py:_data_terms": "runs in each step of a fit",
     "controller/mechanics/force_balance.py:_forces": "runs in each step of a solver",
     "controller/mechanics/force_balance.py:_least_missing": "work arrays of a solver are made once",

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import cv2
 import numba
@@ -184,6 +184,20 @@ def station(x_m: float, turn_rad: float = 0.0, tilt_rad: float = 0.22) -> Statio
     return Station(np.array([x_m, y_m, 0.5]), axes)
 
 
+class Lens(Protocol):
+    """Both cameras of a pair, without distortion."""
+
+    @property
+    def matrix(self) -> Array:
+        """(3, 3) camera matrix, pixels."""
+        ...
+
+    @property
+    def baseline_m(self) -> float:
+        """Distance of the cameras."""
+        ...
+
+
 @dataclass(frozen=True)
 class Camera:
     """Both cameras of a pair."""
@@ -229,25 +243,30 @@ def write_route(
     folder: Path, places_m: Sequence[float], camera: Camera = Camera(), fine: int = 2
 ) -> Path:
     """Write pictures, calibration and positions of a walk; return the positions' file."""
-    k = " ".join(f"{value:g}" for value in camera.matrix.ravel())
-    rows = k.split()
+    stations = [station(x_m) for x_m in places_m]
+    pairs = [camera.pair(at, number, fine=fine) for number, at in enumerate(stations)]
+    return write_positions(folder, camera, stations, pairs)
+
+
+def write_positions(
+    folder: Path,
+    camera: Lens,
+    stations: Sequence[Station],
+    pairs: Sequence[tuple[NDArray[np.uint8], ...]],
+) -> Path:
+    """Write pictures, calibration and true poses; return the positions' file."""
+    rows = [f"{value:g}" for value in camera.matrix.ravel()]
     matrix = "[" + "; ".join(" ".join(rows[i : i + 3]) for i in (0, 3, 6)) + "]"
     (folder / "calib.txt").write_text(
         f"cam0={matrix}\ncam1={matrix}\nbaseline={1000 * camera.baseline_m:g}\n"
     )
-    lines = ['calibration = "calib.txt"', "disparities = 96"]
-    for number, x_m in enumerate(places_m):
-        at = station(x_m)
+    lines = ['calibration = "calib.txt"', "disparities = 128"]
+    for number, (at, pair) in enumerate(zip(stations, pairs, strict=True)):
         lines += ["", "[[positions]]"]
-        for side, picture in zip(
-            ("left", "right"), camera.pair(at, number, fine=fine), strict=True
-        ):
+        for side, picture in zip(("left", "right"), pair, strict=True):
             name = f"{number}-{side}.png"
             cv2.imwrite(str(folder / name), picture[..., ::-1])
             lines.append(f'{side} = "{name}"')
-        if number + 1 < len(places_m):
-            step_m = np.linalg.norm(station(places_m[number + 1]).at_m - at.at_m)
-            lines.append(f"distance_m = {step_m:.2g}")
         lines.append(f"pose = {np.round(at.pose, 6).tolist()}")
     file = folder / "positions.toml"
     file.write_text("\n".join(lines) + "\n")

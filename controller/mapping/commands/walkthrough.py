@@ -39,6 +39,9 @@ World = Annotated[
     Path | None,
     typer.Option(help="write the ground of the route, with colours and holes, as a world (.toml)"),
 ]
+MeshFile = Annotated[
+    Path | None, typer.Option("--mesh", help="write the place as a textured mesh (.glb)")
+]
 Alone = Annotated[
     bool,
     typer.Option(
@@ -62,6 +65,7 @@ def walkthrough(
     size: Size = "640x480",
     alone: Alone = False,
     world: World = None,
+    mesh: MeshFile = None,
     spacing: SampleSpacing = 0.03,
     error: Error = 0.03,
     fill: Fill = 0.0,
@@ -70,27 +74,37 @@ def walkthrough(
     as_json: Json = False,
 ) -> None:
     """Film a walk along several stereo positions: each local model morphs into the next one."""
-    require_extra("walk-throughs need", "cv2", "PIL", "av")
+    require_extra("walk-throughs need", "cv2", "PIL", "av", "trimesh")
     faults = not_positive({"--spacing": spacing, "--error": error})
     check_fill(fill, faults)
     if out.suffix != ".mp4":
         faults.append(f"{out}: a film ends in .mp4; choose another name")
+    if mesh is not None and mesh.suffix.lower() != ".glb":
+        faults.append(f"{mesh}: a mesh ends in .glb; choose another name")
     if picture is not None and world is None:
         faults.append("--picture: draws the world; add --world")
     size_px = _size(size, faults)
     if faults:
         raise InputError(faults)
-    refuse_to_overwrite([out], force)
+    refuse_to_overwrite([out, *([mesh] if mesh is not None else [])], force)
     if world is not None:
         check_world_files(world, picture, [positions, out], force)
     config = load(positions, WalkthroughConfig)
-    from snakewalk.controller.mapping.mosaic import route, walk, walk_ground  # noqa: PLC0415  an extra
+    from snakewalk.controller.mapping.mosaic import (  # noqa: PLC0415  an extra
+        place_mesh,
+        route,
+        walk,
+        walk_ground,
+    )
 
     with ProgressBar("models", transient=True) as bar:
         walk_steps = walk.read_walk(positions, config, bar.update)
     ground = None
     if world is not None:
         ground = walk_ground.walk_ground(walk_steps, spacing, error, fill)
+    if mesh is not None:
+        with atomic_write(mesh) as part:
+            place_mesh.write_place(part, walk_steps, error)
     per_step = max(1, round(seconds * fps))
     with ProgressBar("frames", transient=True) as bar, atomic_write(out) as part:
         facts = route.film(
@@ -98,6 +112,7 @@ def walkthrough(
         )
     shown = {
         "film": str(out),
+        **({"mesh": str(mesh)} if mesh is not None else {}),
         "frames": facts.frames,
         "frame_ms": round(1000.0 * facts.frame_s, 1),
         "hole_share": round(facts.hole_share, 4),
@@ -138,8 +153,9 @@ def _step_facts(steps: "Sequence[Step]") -> dict[str, object]:
         "inliers": [step.inliers for step in steps],
         "reprojection_px": [round(step.error_px, 2) for step in steps],
         "distance_m": [round(step.distance_m, 4) for step in steps],
+        "place_sd_mm": [round(1000.0 * step.place_sd_m, 2) for step in steps],
+        "angle_sd_mrad": [round(1000.0 * step.angle_sd_rad, 2) for step in steps],
         "common_share": [round(step.common_share, 3) for step in steps],
-        "step_s": [round(step.seconds, 1) for step in steps],
     }
     places, angles = (
         [None if error_m is None else 1000.0 * error_m for error_m in errors]

@@ -73,6 +73,11 @@ class LocalModel:
         per_m = DISPARITY_ERROR_PX / (self.camera[0, 0] * self.baseline_m)
         return np.asarray(distance * self.points_m[..., 2] * per_m)
 
+    def near(self, error_m: float) -> Bools:
+        """(H, W) points with an expected error of at most ``error_m``."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.error_m <= error_m)
+
 
 def _has_no_texture(image: Image) -> Bools:
     """(H, W) pixels of a region without texture, such as the sky.

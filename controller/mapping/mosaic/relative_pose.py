@@ -8,11 +8,25 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.mosaic.adjustment import Sightings, adjusted
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
-from snakewalk.controller.mapping.mosaic.scale_matches import ScaleMatches
+from snakewalk.controller.mapping.mosaic.scale_matches import (
+    ScaleMatches,
+    match_around,
+    match_over_scale,
+    similar_points,
+)
 
 LEAST_INLIERS = 12
 """Number of inliers below which a pose is an accident (ours)."""
+_MOST_STARTS = 5
+_RIVAL = 0.65
+"""Share of the most matches from which a start may be the right one too (ours)."""
+_SAME_WAY = 0.1
+"""Relative difference of the distances of two starts that are the same motion (ours)."""
+_WIDE_RADIUS_PX = 16
+_RADII_PX = (8, 4)
+"""Search radii around a first and a settled motion (ours)."""
 _TOLERANCE_PX = 3.0
 """Reprojection error of an inlier, per unit of its match's scale (ours)."""
 
@@ -80,6 +94,105 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
         kept = off_px <= _TOLERANCE_PX * np.sqrt(matches.scale)
     error_px = float(np.sqrt((off_px[kept] ** 2).mean())) if kept.any() else float("nan")
     return RelativePose(np.asarray(rotation, float), translation_m, kept, error_px)
+
+
+def estimated_motion(
+    first: LocalModel, second: LocalModel, distance_m: float | None = None
+) -> tuple[Floats, ScaleMatches]:
+    """Match, estimate the motion, and match again around the estimate until it is settled.
+
+    ``distance_m`` is a guess of the way forward.
+
+    Returns:
+        Motion (3, 4) from the first position's axes to the second's, and the last matches.
+
+    Raises:
+        InputError: too few matches agree.
+
+    """
+    best = best_start(first, second, similar_points(first, second), distance_m)
+    if best is None:
+        best = best_start(first, second, match_over_scale(first, second), distance_m)
+    if best is None:
+        raise InputError(
+            f"fewer than {LEAST_INLIERS} matches agree on a relative pose; record the pictures "
+            "closer together, or set `distance_m`"
+        )
+    motion, matches = best
+    for radius_px in _RADII_PX:
+        sightings = Sightings.of_matches((0, 1), (first, second), matches)
+        motion = adjusted([sightings], motion[None]).motions[0]
+        matches = matches_around(first, second, motion, radius_px)
+        if len(matches.scale) < LEAST_INLIERS:
+            raise InputError(
+                f"{len(matches.scale)} matches agree on a relative pose, fewer than "
+                f"{LEAST_INLIERS}; record the pictures closer together"
+            )
+    return motion, matches
+
+
+def matches_around(
+    first: LocalModel, second: LocalModel, motion: Floats, radius_px: int
+) -> ScaleMatches:
+    """Match around the places that a motion (3, 4) from the first to the second predicts."""
+    moved_m = first.points_m @ motion[:, :3].T + motion[:, 3]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(moved_m[..., 2] > 0.0, first.points_m[..., 2] / moved_m[..., 2], np.nan)
+        scale *= second.camera[0, 0] / first.camera[0, 0]
+    return match_around(first, second, project(second.camera, moved_m), scale, radius_px)
+
+
+def _starts(first: LocalModel, second: LocalModel, matches: ScaleMatches) -> list[Floats]:
+    """Motions that many matches support: of repeated patterns more than one."""
+    starts = []
+    for _ in range(_MOST_STARTS):
+        try:
+            pose = relative_pose(first, second, matches)
+        except InputError:
+            break
+        starts.append(np.column_stack([pose.rotation, pose.translation_m]))
+        rest = ~pose.inliers
+        matches = ScaleMatches(
+            matches.first_px[rest],
+            matches.second_px[rest],
+            matches.scale[rest],
+            matches.correlation[rest],
+        )
+    return starts
+
+
+def best_start(
+    first: LocalModel,
+    second: LocalModel,
+    matches: ScaleMatches,
+    distance_m: float | None = None,
+) -> tuple[Floats, ScaleMatches] | None:
+    """Choose the motion (3, 4) around which most points match; return it and these matches.
+
+    Of repeated patterns several motions are supported by matches. The one near a stated distance is
+    chosen. None: fewer than twelve points match.
+
+    Raises:
+        InputError: two different motions explain the pictures, and no distance tells them apart.
+
+    """
+    starts = _starts(first, second, matches)
+    if distance_m is not None:
+        starts.append(np.column_stack([np.eye(3), [0.0, 0.0, -distance_m]]))
+    tried = [(start, matches_around(first, second, start, _WIDE_RADIUS_PX)) for start in starts]
+    most = max((len(around.scale) for _, around in tried), default=0)
+    if most < LEAST_INLIERS:
+        return None
+    rivals = [pair for pair in tried if len(pair[1].scale) >= _RIVAL * most]
+    ways_m = [float(np.linalg.norm(start[:, 3])) for start, _ in rivals]
+    if distance_m is not None:
+        return rivals[int(np.argmin(np.abs(np.array(ways_m) - distance_m)))]
+    if max(ways_m) - min(ways_m) > _SAME_WAY * max(ways_m):
+        raise InputError(
+            "the pictures repeat themselves: they agree on distances of "
+            f"{' m and '.join(f'{way_m:.2f}' for way_m in sorted(ways_m))} m; set `distance_m`"
+        )
+    return max(rivals, key=lambda pair: len(pair[1].scale))
 
 
 def pose_error(pose: RelativePose, first_pose: Floats, second_pose: Floats) -> tuple[float, float]:

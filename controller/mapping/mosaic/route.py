@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, SecondTexture, cells, draw
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
 from snakewalk.sim.rendering.movie_file import MovieFile
 
@@ -38,7 +38,7 @@ class FilmFacts:
 
     frames: int
     frame_s: float
-    """Median time to draw a frame."""
+    """Median processor time to draw a frame."""
     hole_share: float
     """Mean share of the pixels that no model covers."""
 
@@ -95,18 +95,14 @@ def render(
             camera,
             shown,
             morph.first.image,
-            morph.second.image,
-            morph.counterpart_px,
-            view.share,
+            SecondTexture(morph.second.image, morph.counterpart_px, view.share),
         )
     else:
         _draw_model(canvas, walk, 0, view, camera)
     if not alone:
         for number in (view.step + 1, view.step - 1, view.step + 2):
             if 0 <= number < len(walk.models):
-                behind = Canvas.blank(*size_px)
-                _draw_model(behind, walk, number, view, camera)
-                canvas.fill(behind)
+                _draw_model(canvas, walk, number, view, camera)
     return canvas
 
 
@@ -114,11 +110,12 @@ def _draw_model(
     canvas: Canvas, walk: StereoWalk, number: int, view: RouteView, camera: Floats
 ) -> None:
     model = walk.models[number]
-    pose = walk.poses[number]
-    base = walk.poses[view.step]
-    points = (model.points_m @ pose[:, :3].T + pose[:, 3] - base[:, 3]) @ base[:, :3]
-    points = (points - view.place_m) @ view.rotation.T
-    draw(canvas, points, camera, cells(model.points_m), model.image)
+    pose, base = walk.poses[number], walk.poses[view.step]
+    turn = view.rotation @ base[:, :3].T
+    place_m = turn @ (pose[:, 3] - base[:, 3]) - view.rotation @ view.place_m
+    points_m = model.points_m @ (turn @ pose[:, :3]).T + place_m
+    canvas.blocked = canvas.drawn
+    draw(canvas, points_m, camera, cells(model.points_m), model.image)
 
 
 def film(
@@ -142,11 +139,11 @@ def film(
     holes = []
     with MovieFile(file, fps, size_px) as movie:
         for k, view in enumerate(views):
-            begin = perf_counter()
+            begin = process_time()
             canvas = render(walk, view, camera, size_px, alone=alone)
-            render_times_s.append(perf_counter() - begin)
+            render_times_s.append(process_time() - begin)
             holes.append(1.0 - float(canvas.drawn.mean()))
-            movie.add(canvas.under_sky())
+            movie.add(canvas.with_unseen())
             on_frame(k + 1, len(views))
     return FilmFacts(len(views), float(np.median(render_times_s)), float(np.mean(holes)))
 

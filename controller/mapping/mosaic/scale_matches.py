@@ -4,14 +4,16 @@ A forward motion enlarges the picture, so a patch of the first picture is compar
 one at several reduced sizes.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
+from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 
 SCALES = tuple(10.0 / k for k in range(10, 0, -1))
 """Scales of the set S of the paper: 1, 1 / 0.9, ..., 1 / 0.1."""
@@ -24,8 +26,11 @@ _UNIQUE = 0.03
 (ours)."""
 _WIDE_SEARCH = 0.35
 """Half the width of the search region, in widths of the picture, without a guess (ours)."""
-_NARROW_SEARCH = 0.12
-"""Search radius around the place that a guess of the distance predicts (ours)."""
+_RATIO = 0.85
+"""Largest ratio of the distances of the two most similar descriptors (ours)."""
+_KEYPOINTS = 3000
+_LEAST_SEEN = 0.8
+"""Share of a search region that the second picture shows (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +70,6 @@ def match_over_scale(
     first: LocalModel,
     second: LocalModel,
     scales: tuple[float, ...] = SCALES,
-    distance_m: float | None = None,
     wide: float = _WIDE_SEARCH,
 ) -> ScaleMatches:
     """Match interest points of the first picture: ``argmax corr`` over places and scales.
@@ -74,36 +78,133 @@ def match_over_scale(
         first: model; points are chosen in its valid region.
         second: model at the next position.
         scales: the set S, from 1.
-        distance_m: approximate way forward; it narrows the search regions.
-        wide: half the width of a search region without it, in picture widths.
+        wide: half the width of a search region, in picture widths.
 
     """
     grey_first = grey(first.image)
     two = grey(second.image)
     pyramid = [(scale, reduced(two, scale)) for scale in scales]
-    inside = np.zeros(grey_first.shape, np.uint8)
-    edge = _RADIUS_PX + 1
-    inside[edge:-edge, edge:-edge] = first.valid[edge:-edge, edge:-edge]
-    corners = cv2.goodFeaturesToTrack(grey_first, _MOST_POINTS, 0.002, 8, mask=inside)
-    places = np.zeros((0, 2)) if corners is None else np.asarray(corners, float).reshape(-1, 2)
-    columns, rows = np.rint(places).astype(int).T if len(places) else np.zeros((2, 0), int)
-    centres = places
-    half = wide
-    if distance_m is not None:
-        ahead = first.points_m[rows, columns] - [0.0, 0.0, distance_m]
-        centres = project(second.camera, ahead)
-        half = _NARROW_SEARCH
     kept = []
-    for k, (column, row) in enumerate(zip(columns, rows, strict=True)):
-        if not np.isfinite(centres[k]).all():
-            continue
-        patch = grey_first[row - _RADIUS_PX : row + _RADIUS_PX + 1, column - _RADIUS_PX :][
-            :, : 2 * _RADIUS_PX + 1
-        ]
-        best = _best_match(patch, pyramid, centres[k], half * grey_first.shape[1])
+    for column, row in _corners(grey_first, first.valid, _RADIUS_PX):
+        patch = _patch(grey_first, column, row, _RADIUS_PX)
+        best = _best_match(patch, pyramid, np.array([column, row]), wide * grey_first.shape[1])
         if best is not None:
             kept.append((column, row, *best))
-    table = np.array(kept, dtype=float).reshape(-1, 6)
+    return _as_matches(kept)
+
+
+def similar_points(first: LocalModel, second: LocalModel) -> ScaleMatches:
+    """Match keypoints by their descriptors (SIFT), which scale and rotation do not change (ours).
+
+    The first keypoint of a pair is in the valid region of its model.
+    """
+    sift = cv2.SIFT_create(_KEYPOINTS, contrastThreshold=0.01)  # type: ignore[attr-defined]
+    sides = [
+        sift.detectAndCompute(grey(model.image).astype(np.uint8), mask)
+        for model, mask in ((first, first.valid.astype(np.uint8)), (second, None))
+    ]
+    if any(len(keypoints) < 2 for keypoints, _ in sides):
+        return _as_matches([])
+    roots: list[Any] = [
+        np.sqrt(d / np.maximum(d.sum(axis=1, keepdims=True), 1e-9)) for _, d in sides
+    ]
+    kept = []
+    for best, rival in cv2.BFMatcher().knnMatch(roots[0], roots[1], k=2):
+        if best.distance < _RATIO * rival.distance:
+            one, two = sides[0][0][best.queryIdx], sides[1][0][best.trainIdx]
+            kept.append((*one.pt, *two.pt, two.size / one.size, 1.0 - 0.5 * best.distance**2))
+    return _as_matches(kept)
+
+
+def match_around(
+    first: LocalModel, second: LocalModel, predicted_px: Floats, scale: Floats, radius_px: int
+) -> ScaleMatches:
+    """Match interest points around the places that geometry and a pose predict.
+
+    The second picture is drawn in the pixels of the first one, so that the turn, the scale and the
+    slope of each patch agree, before patches are compared.
+
+    Args:
+        first: model; points are chosen in its valid region.
+        second: model at another position.
+        predicted_px: (H, W, 2) places of the first model's points in the second picture, or NaN.
+        scale: (H, W) size in the second picture over size in the first, or NaN.
+        radius_px: half the width of the search region, in pixels of the first picture.
+
+    """
+    grey_first = grey(first.image)
+    seen = _redrawn(grey(second.image), predicted_px, scale)
+    wide = _RADIUS_PX + radius_px
+    kept = []
+    corners = _corners(grey_first, np.isfinite(seen), wide)
+    for column, row in corners:
+        region = _patch(seen, column, row, wide)
+        is_seen = np.isfinite(region)
+        if is_seen.mean() < _LEAST_SEEN:
+            continue
+        region = np.where(is_seen, region, region[is_seen].mean())
+        patch = _patch(grey_first, column, row, _RADIUS_PX)
+        likeness = np.asarray(cv2.matchTemplate(region, patch, cv2.TM_CCOEFF_NORMED), np.float32)
+        y, x = divmod(int(likeness.argmax()), likeness.shape[1])
+        value = float(likeness[y, x])
+        if value < _LEAST_CORRELATION or not (0 < y < 2 * radius_px and 0 < x < 2 * radius_px):
+            continue
+        place = np.array(
+            [
+                column + x - radius_px + _vertex(likeness[y], x),
+                row + y - radius_px + _vertex(likeness[:, x], y),
+            ]
+        )
+        counterpart = _bilinear(predicted_px, place)
+        if np.isfinite(counterpart).all():
+            kept.append((column, row, *counterpart, scale[row, column], value))
+    return _as_matches(kept)
+
+
+def _redrawn(picture: NDArray[np.float32], places_px: Floats, scale: Floats) -> NDArray[np.float32]:
+    """(H, W) samples of a picture at places, each from the reduction with the nearest scale."""
+    nearest = np.full(scale.shape, -1)
+    known = np.isfinite(places_px).all(axis=-1) & np.isfinite(scale)
+    nearest[known] = np.abs(np.log(scale[known, None] / np.array(SCALES))).argmin(axis=1)
+    out = np.full(scale.shape, np.nan)
+    for k in np.unique(nearest[known]):
+        chosen = nearest == k
+        map_px = (np.where(chosen[..., None], places_px, -1e4) / SCALES[k]).astype(np.float32)
+        drawn = cv2.remap(
+            reduced(picture, SCALES[k]),
+            map_px[..., 0],
+            map_px[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(np.nan,) * 4,
+        )
+        out[chosen] = drawn[chosen]
+    return out.astype(np.float32)
+
+
+def _bilinear(values: Floats, place_px: Floats) -> Floats:
+    """(k,) sample of values (H, W, k) at a column and row inside."""
+    (u, v), (a, b) = np.floor(place_px).astype(int), place_px % 1.0
+    square = values[v : v + 2, u : u + 2]
+    return np.asarray(np.einsum("i,j,ijk->k", [1 - b, b], [1 - a, a], square))
+
+
+def _corners(picture: NDArray[np.float32], usable: Bools, margin_px: int) -> NDArray[np.int64]:
+    """(n, 2) columns and rows of the interest points in the usable part, inside a margin."""
+    inside = np.zeros(picture.shape, np.uint8)
+    edge = margin_px + 1
+    inside[edge:-edge, edge:-edge] = usable[edge:-edge, edge:-edge]
+    corners: Any = cv2.goodFeaturesToTrack(picture, _MOST_POINTS, 0.002, 8, mask=inside)
+    places = np.zeros((0, 2)) if corners is None else np.asarray(corners, float).reshape(-1, 2)
+    return np.asarray(np.rint(places), np.int64)
+
+
+def _patch(picture: NDArray[np.float32], column: int, row: int, radius: int) -> NDArray[np.float32]:
+    return picture[row - radius : row + radius + 1, column - radius : column + radius + 1]
+
+
+def _as_matches(rows: Sequence[Sequence[float]]) -> ScaleMatches:
+    table = np.array(rows, dtype=float).reshape(-1, 6)
     return ScaleMatches(table[:, :2], table[:, 2:4], table[:, 4], table[:, 5])
 
 

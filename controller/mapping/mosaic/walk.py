@@ -1,7 +1,6 @@
 """Local models of all positions, joined along the route ([KP] 3.1)."""
 
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,18 +11,32 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
 from snakewalk.controller.mapping.colour_picture import read_colours
 from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
+from snakewalk.controller.mapping.mosaic.adjustment import (
+    Adjusted,
+    Sightings,
+    adjusted,
+    composed,
+)
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
 from snakewalk.controller.mapping.mosaic.mosaic import mosaic
-from snakewalk.controller.mapping.mosaic.relative_pose import pose_error, relative_pose
+from snakewalk.controller.mapping.mosaic.relative_pose import (
+    LEAST_INLIERS,
+    RelativePose,
+    estimated_motion,
+    matches_around,
+    pose_error,
+)
 from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
-from snakewalk.controller.mapping.mosaic.scale_matches import match_over_scale
 from snakewalk.controller.mapping.stereo_camera import (
     RectifiedPair,
     StereoCalibration,
     read_calibration,
     rectify,
 )
+
+_SKIP_RADIUS_PX = 6
+"""Search radius between a position and the next but one (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +47,11 @@ class Step:
     inliers: int
     error_px: float
     distance_m: float
+    place_sd_m: float
+    """Standard deviations of the next position's place and axes."""
+    angle_sd_rad: float
     common_share: float
     """Share of the valid region that has a counterpart."""
-    seconds: float
     place_error_m: float | None = None
     """Errors of the pose; None where the positions' poses are not known."""
     angle_error_rad: float | None = None
@@ -69,26 +84,52 @@ def read_walk(
         file.parent / config.calibration, CalibrationChoice(unit=config.unit)
     )
     count = len(config.positions)
-    total = 2 * count - 1
+    total = 3 * count - 2
     models = []
     for k, position in enumerate(config.positions):
         with _FaultPlace(f"{file}: position {k + 1}"):
             models.append(_model(file.parent, position, calibration, config.disparities))
         on_step(k + 1, total)
+    if count == 1:
+        return StereoWalk(tuple(models), (), np.eye(3, 4)[None], ())
+    motions = []
+    groups = []
+    for k in range(count - 1):
+        with _FaultPlace(f"{file}: positions {k + 1} and {k + 2}"):
+            motion, matches = estimated_motion(
+                models[k], models[k + 1], config.positions[k].distance_m
+            )
+        motions.append(motion)
+        groups.append(Sightings.of_matches((k, k + 1), (models[k], models[k + 1]), matches))
+        on_step(count + k + 1, total)
     morphs = []
     steps = []
     poses = [np.eye(3, 4)]
+    joint = _jointly(models, groups, motions)
     for k in range(count - 1):
-        with _FaultPlace(f"{file}: positions {k + 1} and {k + 2}"):
-            morph, step = _step(models[k], models[k + 1], config.positions[k : k + 2])
+        morph, step = _step(joint, k, groups[k], models[k : k + 2], config.positions[k : k + 2])
         morphs.append(morph)
         steps.append(step)
         turn = morph.pose.rotation.T
         shift = morph.pose.back(np.zeros(3))
         last = poses[-1]
         poses.append(np.column_stack([last[:, :3] @ turn, last[:, :3] @ shift + last[:, 3]]))
-        on_step(count + k + 1, total)
+        on_step(2 * count + k, total)
     return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps))
+
+
+def _jointly(
+    models: Sequence[LocalModel], steps: Sequence[Sightings], motions: Sequence[Floats]
+) -> Adjusted:
+    """Adjust all motions together, with matches between each position and the next but one."""
+    groups = list(steps)
+    for k in range(len(motions) - 1):
+        pair = (models[k], models[k + 2])
+        motion = composed(np.array(motions), k, k + 2)
+        matches = matches_around(*pair, motion, _SKIP_RADIUS_PX)
+        if len(matches.scale) >= LEAST_INLIERS:
+            groups.append(Sightings.of_matches((k, k + 2), pair, matches))
+    return adjusted(groups, np.array(motions))
 
 
 class _FaultPlace:
@@ -123,22 +164,31 @@ def _model(
 
 
 def _step(
-    first: LocalModel, second: LocalModel, positions: tuple[PositionConfig, ...]
+    joint: Adjusted,
+    number: int,
+    sightings: Sightings,
+    models: Sequence[LocalModel],
+    positions: tuple[PositionConfig, ...],
 ) -> tuple[MorphableModel, Step]:
-    begin = time.perf_counter()
-    matches = match_over_scale(first, second, distance_m=positions[0].distance_m)
-    pose = relative_pose(first, second, matches)
+    motion = joint.motions[number]
+    agrees = joint.agrees[number]
+    moved_m = sightings.points_m[agrees] @ motion[:, :3].T + motion[:, 3]
+    off_px = (sightings.predicted_px(moved_m) - sightings.seen_px[agrees])[:, :2]
+    error_px = float(np.sqrt((off_px**2).sum(axis=1).mean()))
+    pose = RelativePose(motion[:, :3], motion[:, 3], agrees, error_px)
+    first, second = models
     morph = morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
     errors: tuple[float | None, float | None] = (None, None)
     if positions[0].pose is not None and positions[1].pose is not None:
         errors = pose_error(pose, *(np.array(position.pose) for position in positions))
     step = Step(
-        len(matches.scale),
-        int(pose.inliers.sum()),
-        pose.error_px,
-        float(np.linalg.norm(pose.translation_m)),
+        len(agrees),
+        int(agrees.sum()),
+        error_px,
+        float(np.linalg.norm(motion[:, 3])),
+        float(joint.place_sd_m[number]),
+        float(joint.angle_sd_rad[number]),
         float(morph.common.sum() / max(morph.first.valid.sum(), 1)),
-        time.perf_counter() - begin,
         *errors,
     )
     return morph, step

@@ -8,7 +8,7 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
-from snakewalk.controller.mapping.stereo_ground import fit_ground
+from snakewalk.controller.mapping.stereo_ground import CameraStand, fit_ground
 from snakewalk.controller.terrain.elevation_map import ElevationMap
 
 _LEAST_POINTS = 2
@@ -39,26 +39,34 @@ def walk_ground(
     """
     points = []
     colours = []
-    errors = []
     for model, pose in zip(walk.models, walk.poses, strict=True):
-        expected = model.error_m
-        with np.errstate(invalid="ignore"):
-            good = expected <= error_m
+        good = model.near(error_m)
         points.append(model.points_m[good] @ pose[:, :3].T + pose[:, 3])
         colours.append(model.image[good])
-        errors.append(expected[good])
-    if len(points[0]) < 100:
-        raise InputError(
-            f"the first position shows {len(points[0])} points with an error of at most "
-            f"{error_m:g} m; raise --error, or record the pictures from nearer"
-        )
-    stand = fit_ground(points[0], errors[0])
+    stand = level_stand(walk, error_m)
     world = np.concatenate(points) @ stand.world_from_camera().T
     world[:, 2] += stand.height_m
     elevation_map = ElevationMap.of_points(world, spacing_m, "median", _LEAST_POINTS)
     field = elevation_map.height_field(fill_m)
     colour = _colours(elevation_map, world, np.concatenate(colours))
     return replace(field, colour=colour)
+
+
+def level_stand(walk: StereoWalk, error_m: float) -> CameraStand:
+    """Fit the stand of the first left camera to its points with an error of at most ``error_m``.
+
+    Raises:
+        InputError: no visible ground, or no point near enough for the error.
+
+    """
+    model = walk.models[0]
+    good = model.near(error_m)
+    if good.sum() < 100:
+        raise InputError(
+            f"the first position shows {good.sum()} points with an error of at most "
+            f"{error_m:g} m; raise --error, or record the pictures from nearer"
+        )
+    return fit_ground(model.points_m[good], model.error_m[good])
 
 
 def _colours(elevation_map: ElevationMap, points_m: Floats, colours: Floats | Image) -> Image:

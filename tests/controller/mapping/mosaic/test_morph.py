@@ -114,16 +114,24 @@ def test_a_slanted_plane_is_drawn_in_perspective_and_the_nearer_surface_wins() -
     assert (canvas.colour[rows[kept & (depth < 2.9)], 120, 0] > 77).all()
 
 
-def test_the_sky_is_light_and_holes_below_a_surface_stay_black() -> None:
+def test_what_no_camera_saw_is_grey() -> None:
     canvas = Canvas.blank(3, 6)
     canvas.colour[2:] = 90
     canvas.depth_m[2:] = 1.0
     canvas.depth_m[4, 1] = np.inf
-    canvas.colour[4, 1] = 0
-    canvas.depth_m[:, 2], canvas.colour[:, 2] = np.inf, 0  # a column that shows nothing
-    seen = canvas.under_sky()
-    assert seen[:2].min() > 140
-    assert (np.diff(seen[:2, 2].astype(int), axis=0) > 0).all()
-    np.testing.assert_array_equal(seen[2:, :2], canvas.colour[2:, :2])
-    assert seen[2:, 2].max() == 0  # no sky below the skyline of the others
-    assert Canvas.blank(3, 6).under_sky().min() > 140
+    seen = canvas.with_unseen()
+    assert (seen[:2] == 150).all()
+    assert (seen[4, 1] == 150).all()
+    assert (seen[2:4] == 90).all()
+
+
+def test_blocked_pixels_do_not_change() -> None:
+    model = wall()
+    canvas = Canvas.blank(240, 180)
+    canvas.colour[:, :100] = 7
+    canvas.depth_m[:, :100] = 5.0  # farther than the wall
+    canvas.blocked = canvas.drawn
+    draw(canvas, model.points_m, K, cells(model.points_m), model.image)
+    assert (canvas.colour[:, :100] == 7).all()
+    off = canvas.colour[5:-5, 105:-5].astype(int) - model.image[5:-5, 105:-5]
+    assert np.abs(off).max() <= 1

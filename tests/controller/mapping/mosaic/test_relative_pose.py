@@ -10,6 +10,9 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 from snakewalk.controller.mapping.mosaic.relative_pose import (
     RelativePose,
+    best_start,
+    estimated_motion,
+    matches_around,
     pose_error,
     relative_pose,
 )
@@ -103,3 +106,35 @@ def test_the_pose_survives_matches_that_are_wrong() -> None:
     few = ScaleMatches(places[:60].astype(float), wrong, ones[:60], ones[:60])
     with pytest.raises(InputError, match="matches agree on a relative pose"):
         relative_pose(model, model, few)
+
+
+@pytest.mark.costs("matches whole images")
+def test_matches_around_a_motion_are_exact_and_need_no_distance() -> None:
+    """The motion is 20 mm off; the patches of the second picture are 1.43 times as large."""
+    far = wall()
+    near = nearer(far, 0.6)
+    off = np.column_stack([Rotation.from_rotvec([0, 0.01, 0]).as_matrix(), [0.0, 0.0, -0.58]])
+    around = matches_around(far, near, off, 8)
+    truth = (around.first_px - K[:2, 2]) * (2.0 / 1.4) + K[:2, 2]
+    assert len(around.scale) > 60
+    assert np.median(np.linalg.norm(around.second_px - truth, axis=1)) < 0.2
+    motion, matches = estimated_motion(far, near)
+    assert len(matches.scale) > 60
+    assert motion[:, 3] == pytest.approx([0.0, 0.0, -0.6], abs=0.004)
+    assert motion[:, :3] == pytest.approx(np.eye(3), abs=0.004)
+
+
+@pytest.mark.costs("matches whole images")
+def test_a_picture_that_repeats_itself_is_rejected_without_a_distance() -> None:
+    """A period is 60 px, 0.6 m: half of the matches are right, half are one period off."""
+    model = wall()
+    image = np.ascontiguousarray(np.tile(model.image[:, :60], (1, 4, 1)))
+    repeated = LocalModel(model.points_m, image, K, 0.1)
+    places = np.random.default_rng(4).integers([70, 10], [170, 170], (80, 2)).astype(float)
+    seen = places + np.repeat([[0.0, 0.0], [60.0, 0.0]], 40, axis=0)
+    matches = ScaleMatches(places, seen, np.ones(80), np.ones(80))
+    with pytest.raises(InputError, match="they agree on distances of 0"):
+        best_start(repeated, repeated, matches)
+    found = best_start(repeated, repeated, matches, distance_m=0.5)
+    assert found is not None
+    assert found[0][:, 3] == pytest.approx([0.6, 0.0, 0.0], abs=0.01)
