@@ -4,7 +4,6 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
-import scipy  # scipy.spatial loads when it is first used
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
@@ -350,8 +349,10 @@ class PegsObstacle(_StandingObstacle):
 
     def gap_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Distance of places on the floor from the nearest peg; negative inside it."""
+        from scipy.spatial import KDTree  # noqa: PLC0415  slow, for lists and help
+
         places_m = np.stack(np.broadcast_arrays(x_m, y_m), axis=-1)
-        return np.asarray(scipy.spatial.KDTree(self.places_m()).query(places_m)[0]) - self.radius_m
+        return np.asarray(KDTree(self.places_m()).query(places_m)[0]) - self.radius_m
 
 
 WALL_M = 0.04

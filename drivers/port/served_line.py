@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 from urllib.parse import urlsplit
 
+from snakewalk.config.archive import parse_json
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.line_port import LinePort
 
@@ -101,7 +102,7 @@ class ServedLine(LinePort):
                 self._awaited -= 1
                 if not reply:
                     raise ConnectionError("its server has ended")
-                now_s, result, fault, datagrams = json.loads(reply)
+                now_s, result, fault, datagrams = parse_json(reply)
                 self._now_s = now_s
                 self._datagrams += [(due_s, bytes.fromhex(data)) for due_s, data in datagrams]
         except (OSError, ValueError) as error:

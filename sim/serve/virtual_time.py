@@ -5,6 +5,7 @@ import select
 import socket
 from collections.abc import Callable, Sequence
 
+from snakewalk.config.archive import parse_json
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.port.served_line import SCHEME
 from snakewalk.sim.line.wire import Wire
@@ -83,7 +84,7 @@ class VirtualTimeServer:
             raise ConnectionError
         *requests, self._unread = (self._unread + received).split(b"\n")
         for request in requests:
-            client.sendall(json.dumps(self._reply(*json.loads(request))).encode() + b"\n")
+            client.sendall(json.dumps(self._reply(*parse_json(request))).encode() + b"\n")
 
     def _reply(self, name: str, *arguments: object) -> list[object]:
         line = self._line

@@ -104,6 +104,7 @@ OTHERS: Final = {
     ),
     "config/archive.py": "bounds each read",
     "controller/images/calibration_storage.py": "lists of a calibration in JSON, for its readers",
+    "controller/mapping/mosaic/place_mesh.py": "writes a mesh",
     "config/text_table.py": "cells of a table, for its readers",
     "controller/animals/fish/silhouettes.py": "silhouettes in px; the rate is an option",
     "controller/animals/plots/fish.py": "pictures to draw on",

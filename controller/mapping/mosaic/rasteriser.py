@@ -18,7 +18,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 NEAREST_M: Final = 0.01
 """Triangles with a nearer corner are not drawn (ours)."""
 _UNSEEN: Final = np.full(3, 150, np.uint8)
-"""Colour of what no position shows (ours)."""
+"""Colour of unseen pixels (ours)."""
 _MATRIX: Final = readonly_array("float64", 2, "C")
 _FLOATS: Final = readonly_array("float64", 3, "C")
 _BOOLS: Final = readonly_array("bool_", 2, "A")

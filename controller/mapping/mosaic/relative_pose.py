@@ -169,11 +169,11 @@ def best_start(
 ) -> tuple[Floats, ScaleMatches] | None:
     """Choose the motion (3, 4) around which most points match; return it and these matches.
 
-    Of repeated patterns several motions are supported by matches. The one near a stated distance is
-    chosen. None: fewer than twelve points match.
+    Repeated patterns support several motions. The one near a stated distance is chosen. None: fewer
+    than twelve points match.
 
     Raises:
-        InputError: two different motions explain the pictures, and no distance tells them apart.
+        InputError: two different motions explain the pictures, and no distance is stated.
 
     """
     starts = _starts(first, second, matches)

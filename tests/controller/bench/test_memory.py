@@ -80,7 +80,7 @@ def sniffer() -> Iterator[Callable[[], object]]:
 
 @pytest.mark.parametrize(
     ("command", "steps"),
-    [(served_robot, 15), (served_bus, 150), (run_on_servos, 150), (sniffer, 300)],
+    [(served_robot, 30), (served_bus, 150), (run_on_servos, 150), (sniffer, 300)],
 )
 def test_memory_stays_flat(
     command: Callable[[], AbstractContextManager[Callable[[], object]]], steps: int

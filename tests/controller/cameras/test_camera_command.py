@@ -36,7 +36,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_pictures_in_a_folder_give_the_lens(pictures: Path, tmp_path: Path) -> None:
     out = tmp_path / "lens.yml"
-    told = call("pose", "calibrate", str(pictures), "-o", str(out))
+    told = call("pose", "lens", str(pictures), "-o", str(out))
     assert told["used"] == told["pictures"] == 9
     assert float(str(told["residual_rms_px"])) < 0.4
     lens = Lens.read(out)
@@ -50,7 +50,7 @@ def test_a_film_does_as_well(pictures: Path, tmp_path: Path) -> None:
     for k in range(9):
         writer.write(cv2.imread(str(pictures / f"{k}.png")))
     writer.release()
-    told = call("pose", "calibrate", str(film), "-o", str(tmp_path / "lens.json"))
+    told = call("pose", "lens", str(film), "-o", str(tmp_path / "lens.json"))
     assert told["pictures"] == 9
     assert Lens.read(tmp_path / "lens.json").matrix[0, 0] == pytest.approx(300.0, rel=0.03)
 
@@ -100,8 +100,8 @@ def test_markers_are_printed_in_their_size_one_a_page(tmp_path: Path) -> None:
             ("board", "-o", "x.pdf", "--pattern", "dots"),
             "is unknown; use one of charuco, chessboard",
         ),
-        (("calibrate", "nowhere", "-o", "lens.yml"), "nowhere"),
-        (("calibrate", "nowhere", "-o", "lens.txt"), "lens.txt: the file of a lens ends in"),
+        (("lens", "nowhere", "-o", "lens.yml"), "nowhere"),
+        (("lens", "nowhere", "-o", "lens.txt"), "lens.txt: the file of a lens ends in"),
     ],
 )
 def test_what_cannot_be_done_is_refused(
@@ -118,6 +118,6 @@ def test_pictures_of_two_sizes_are_refused(pictures: Path, tmp_path: Path) -> No
         cv2.imwrite(str(tmp_path / f"{k}.png"), np.zeros((side, 160), np.uint8))
     with pytest.raises(InputError, match="160 x 100 and 160 x 120"):
         CliRunner().invoke(
-            app, ["pose", "calibrate", str(tmp_path), "-o", str(pictures / "l.yml")],
+            app, ["pose", "lens", str(tmp_path), "-o", str(pictures / "l.yml")],
             catch_exceptions=False,
         )  # fmt: skip

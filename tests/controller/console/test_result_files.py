@@ -65,6 +65,7 @@ WRITERS_OF_A_KIND = frozenset(
         "capture/capture.py",
         "images/mesh_files.py",
         "mapping/las_file.py",
+        "mapping/mosaic/place_mesh.py",
         "motion/policy.py",
         "runlog/writer.py",
         "terrain/growing_map.py",
