@@ -6,6 +6,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+import trimesh
 from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
@@ -40,13 +41,13 @@ def refused(*words: object) -> str:
 
 @pytest.mark.slow
 def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) -> None:
-    film, world = tmp_path / "film.mp4", tmp_path / "ravine.toml"
+    film, world, mesh = (tmp_path / name for name in ("film.mp4", "ravine.toml", "place.glb"))
     made = call(
         "world", "walkthrough", route, "-o", film, "--size", "240x180", "--fps", 4,
-        "--seconds", 1, "--world", world, "--spacing", 0.03,
+        "--seconds", 1, "--world", world, "--spacing", 0.03, "--mesh", mesh,
     )  # fmt: skip
     assert made["inliers"][0] > 40
-    assert made["place_error_mm"][0] < 10.0
+    assert made["place_error_mm"][0] < min(10.0, 4.0 * made["place_sd_mm"][0])
     assert made["angle_error_mrad"][0] < 5.0
     assert made["hole_share"] < 0.12
     frames = [f.to_ndarray(format="rgb24") for f in av.open(str(film)).decode(video=0)]
@@ -67,6 +68,15 @@ def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) ->
     assert 0.2 < ground.known.mean() < 0.95
     assert ground.colour is not None
     assert ground.colour[ground.known].std(axis=0).min() > 10.0
+    place = trimesh.load_scene(mesh)
+    right, up, back = np.concatenate([part.vertices for part in place.geometry.values()]).T
+    assert len(place.geometry) == 2
+    assert all(part.visual.material.baseColorTexture.size == (240, 180)
+               for part in place.geometry.values())  # fmt: skip
+    column = np.rint((-back - ground.x0_m) / ground.spacing_m).astype(int)
+    row = np.rint((-right - ground.y0_m) / ground.spacing_m).astype(int)
+    off = up - ground.z_m[row, column]  # the lowest sample of a map is 0
+    assert np.median(np.abs(off - np.median(off))) < 0.02
 
 
 def test_a_real_pair_is_a_single_position(tmp_path: Path) -> None:
