@@ -111,7 +111,7 @@ def serve(
         bool,
         typer.Option(
             "--virtual-time",
-            help="print a URL for --port of one snakewalk command; time passes only while that "
+            help="print a URL for --port of one other command; time passes only while that "
             "command waits",
         ),
     ] = False,

@@ -52,7 +52,7 @@ def calibrate_source(
     world: World = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="write the robot's file with its [pose] here (.toml)"),
+        typer.Option("--out", "-o", help="write the robot with its pose source here (.toml)"),
     ] = None,
     force: Force = False,
     as_json: Json = False,
