@@ -347,16 +347,19 @@ def main() -> None:
         *(provenance("python -m benchmarks.bus_faults"), ""),
         f"{len(results)} scenarios, {sum(each.silent for _, each in results)} silent.",
         "",
-        "| fault | first report | cycles | outcome | ended by | cycles | silent |",
-        "| --- | --- | ---: | --- | --- | ---: | --- |",
+        "| fault | first report | cycles | outcome | ended by | cycles |",
+        "| --- | --- | ---: | --- | --- | ---: |",
     ]
     for scenario, result in results:
         cycles = "" if result.cycles is None else str(result.cycles)
         ended = "" if result.ended_after is None else str(result.ended_after)
-        silent = "**yes**" if result.silent else "no"
+        ended_by = result.ended_by
+        if ended and (ended_by, ended) == (result.detected_by, cycles):
+            ended_by, ended = "=", ""
+        outcome = result.outcome + ", **silent**" * result.silent
         lines.append(
-            f"| {scenario.name} | {result.detected_by} | {cycles} | {result.outcome} "
-            f"| {result.ended_by} | {ended} | {silent} |"
+            f"| {scenario.name} | {result.detected_by} | {cycles} | {outcome} "
+            f"| {ended_by} | {ended} |"
         )
     write_tables(PAGE, "faults", "\n".join(lines))
     lines = ["| servos | baud | cycles until a second master is named |", "| ---: | ---: | ---: |"]
@@ -366,12 +369,12 @@ def main() -> None:
         f"{len(buses)} buses, {sum(each.cycles for each in buses):,} cycles, "
         f"{sum(len(each.alarms) for each in buses)} false alarms.",
         "",
-        "| servos | baud | rate, Hz | latency, ms | amplitude, rad | cycles | false alarms |",
-        "| ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| servos | baud | rate, Hz | latency, ms | amplitude, rad | false alarms |",
+        "| ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     lines += [
         f"| {each.joints} | {each.baud:,} | {1.0 / each.period_s:.0f} "
-        f"| {1e3 * each.usb_latency_s:.0f} | {each.amplitude_rad:.2f} | {each.cycles} "
+        f"| {1e3 * each.usb_latency_s:.0f} | {each.amplitude_rad:.2f} "
         f"| {len(each.alarms)} |"
         for each in buses
     ]

@@ -18,10 +18,9 @@ body, ground and motion, as far as the source states them. To add your robot, se
 """
 _TERMS = """
 - **Ratio**: simulated / measured.
-- **Range**: the ratios with which the command succeeds. It contains today's ratio; it is not a
-  tolerance.
-- **State**: `ok` if the ratio is within 0.8 to 1.25. `reported` if it is within its range only; the
-  file then states the most likely cause. `outside` if it left its range.
+- **State**: `ok` if the ratio is within 0.8 to 1.25. `reported` if it is within the `range` of its
+  file only; the file then states the most likely cause. `outside` if it left this range. The range
+  contains today's ratio; it is not a tolerance.
 
 | kind | evidence |
 | --- | --- |
@@ -54,7 +53,7 @@ def page_text(loaded: Sequence[tuple[str, PublishedResults]], rows: Sequence[Com
         parts.append(
             f"**The median ratio of the {count} measured rows is {ratio:.2f}.** They are rows of "
             f"bodies that travel, without fitted constants. {near} of them are within 0.8 to "
-            f"1.25. The page has {len(rows)} rows.\n"
+            f"1.25. All files have {len(rows)} rows.\n"
         )
     parts.append(_TERMS)
     for name, measurement in loaded:
@@ -63,20 +62,28 @@ def page_text(loaded: Sequence[tuple[str, PublishedResults]], rows: Sequence[Com
 
 
 def _section(name: str, measurement: PublishedResults, rows: Sequence[Compared]) -> str:
-    lines = [
-        f"\n## {measurement.title[0].upper()}{measurement.title[1:]}\n",
-        "| row | quantity | measured | simulated | ratio | range | kind | state |",
-        "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
-    ]
-    for row in rows:
-        quantity, unit, _ = SHOWN[row.quantity]
-        what = f"{quantity}, {unit}" if unit and row.over is None else quantity
+    lines = [f"\n## {measurement.title[0].upper()}{measurement.title[1:]}"]
+    near = [row for row in rows if row.kind == "data sheet" and row.state == "ok"]
+    if near:
+        ratios = sorted(map(ratio_text, near))
+        lines.append(
+            f"\n{len(near)} of {len(rows)} rows are values of data sheets with the state `ok` and "
+            f"ratios of {ratios[0]} to {ratios[-1]}.\n`snakewalk trials validate {name}` prints "
+            "each of them."
+        )
+    listed = [row for row in rows if row not in near]
+    if listed:
+        lines += [
+            "\n| row | quantity | measured | simulated | ratio | kind | state |",
+            "| --- | --- | ---: | ---: | ---: | --- | --- |",
+        ]
+    for row in listed:
+        what = quantity_text(row)
         if row.over is not None:
-            what = f"{quantity} over that of `{row.over}`"
-        simulated = "-" if row.simulated is None else value_text(row, row.simulated)
-        low, high = row.range
-        cells = (row.row, what, value_text(row, row.measured), simulated, ratio_text(row))
-        lines.append(f"| {' | '.join(cells)} | {low:g} to {high:g} | {row.kind} | {row.state} |")
+            what += f" over that of `{row.over}`"
+        values = [value_text(row, value) for value in (row.measured, row.simulated)]
+        cells = (row.row, what, *values, ratio_text(row))
+        lines.append(f"| {' | '.join(cells)} | {row.kind} | {row.state} |")
     lines.append(
         f"\n`config/measurements/{name}.toml`. Source: {measurement.source}. Licence: "
         f"{measurement.licence}.\n"
@@ -93,8 +100,16 @@ def _section(name: str, measurement: PublishedResults, rows: Sequence[Compared])
     return "\n".join(lines) + "\n"
 
 
-def value_text(row: Compared, value: float) -> str:
-    """Return a value in the unit of its quantity, with three digits."""
+def quantity_text(row: Compared) -> str:
+    """Return the name of a quantity with its unit; a quotient has no unit."""
+    quantity, unit, _ = SHOWN[row.quantity]
+    return f"{quantity}, {unit}" if unit and row.over is None else quantity
+
+
+def value_text(row: Compared, value: float | None) -> str:
+    """Return a value in the unit of its quantity, with three digits, or a dash."""
+    if value is None:
+        return "-"
     factor = 1.0 if row.over is not None else SHOWN[row.quantity][2]
     return f"{value * factor:.3g}"
 

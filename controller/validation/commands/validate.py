@@ -16,9 +16,14 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import check_picture, write_result
-from snakewalk.controller.validation.comparison import SHOWN, Compared, compare, median_ratio
+from snakewalk.controller.validation.comparison import Compared, compare, median_ratio
 from snakewalk.controller.validation.measurement import PublishedResults, load_measurement
-from snakewalk.controller.validation.page import page_text, ratio_text, value_text
+from snakewalk.controller.validation.page import (
+    page_text,
+    quantity_text,
+    ratio_text,
+    value_text,
+)
 
 
 @command(
@@ -100,12 +105,11 @@ def _print(loaded: Sequence[tuple[str, PublishedResults]], rows: Sequence[Compar
         )
         file_rows = [row for row in rows if row.file == name]
         for row in file_rows:
-            quantity, unit, _ = SHOWN[row.quantity]
             grid.add_row(
                 row.row,
-                f"{quantity}, {unit}" if unit and row.over is None else quantity,
+                quantity_text(row),
                 value_text(row, row.measured),
-                "-" if row.simulated is None else value_text(row, row.simulated),
+                value_text(row, row.simulated),
                 ratio_text(row),
                 row.kind,
                 row.state,

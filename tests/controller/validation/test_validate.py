@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -227,6 +228,18 @@ def test_the_page_has_the_files_and_bench_rows_of_today() -> None:
         written = page_text(loaded, compare(loaded))
         section = written[written.index("\n## ") : written.index("\n## Limits")]
         assert section in text
+
+
+def test_values_of_data_sheets_are_one_sentence_and_a_row_that_is_off_is_listed() -> None:
+    loaded = [load_measurement("dynamixel-voltages")]
+    first, *others = compare(loaded)
+    off = replace(first, measured=2.0 * first.measured)
+    text = page_text(loaded, [off, *others])
+    assert f"\n\n{len(others)} of {len(others) + 1} rows are values of data sheets" in text
+    assert "each of them.\n\n| row |" in text
+    listed = [line for line in text.splitlines() if line.endswith("| data sheet | outside |")]
+    assert [line.split(" | ")[0] for line in listed] == [f"| {off.row}"]
+    assert not any(row.row in text for row in others)
 
 
 @pytest.mark.slow

@@ -1,7 +1,7 @@
 """Behaviours of the live page in Chromium: widths, connections, tabs, reloads, colours, the end.
 
 One browser and one simulated run, which waits while a test looks. ``python -m
-pytest --collect-only`` of this file lists the behaviours; docs/view.md has the same table.
+pytest --collect-only`` of this file lists the behaviours.
 """
 
 import re
