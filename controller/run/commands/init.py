@@ -55,8 +55,9 @@ def init(
 ) -> None:
     """Write run, robot and world files to edit, with schemas for editors."""
     if from_ is None:
+        robot = robot or "printed12"
         names = {name: load_run(name).robot for name in (*_PREFERRED_RUNS, *shipped("runs"))}
-        fitting = (name for name, body in names.items() if body == (robot or "yaw16"))
+        fitting = (name for name, body in names.items() if body == robot)
         from_ = next(fitting, _PREFERRED_RUNS[0])
     run = load_run(from_)
     run_folder = Path(from_).parent if from_.endswith(".toml") else None

@@ -17,7 +17,7 @@ from snakewalk.controller.run.factory import prepare_walk
 @pytest.mark.parametrize(
     ("words", "run_like", "robot_like", "world_like"),
     [
-        ([], "flat-square", "yaw16", "flat"),
+        ([], "flat-square", "printed12", "flat"),
         (["--robot", "xl330-16"], "flat-slalom-xl330", "xl330-16", "flat"),
         (["--robot", "alternating12"], "flat-square", "alternating12", "flat"),
         (["--from", "ramp-10-up"], "ramp-10-up", "alternating16", "ramp-10"),
