@@ -1,7 +1,7 @@
 """Commands that care for servos, on a chain with DYNAMIXEL and Feetech servos on two ports."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_catalogue import servo_model
 from snakewalk.config.template import plain_toml
+from snakewalk.controller.bench.guided_setup import GuidedSetup
 from snakewalk.drivers.protocol.registers import baud_code
 from snakewalk.sim.feetech.servos import FeetechServos
 from snakewalk.sim.line.clock import SimClock
@@ -153,3 +154,34 @@ def test_such_a_robot_is_not_served_on_one_port(service: TwoMakes, tmp_path: Pat
     done = snakewalk("bus", "serve", "--robot", str(robot))
     assert done.returncode == 2
     assert "serve the servos of each port alone" in done.stderr
+
+
+@pytest.mark.slow
+def test_the_guided_setup_leads_two_makes_to_a_rehearsal(service: TwoMakes, tmp_path: Path) -> None:
+    """No register tells the 12 V servo from the one of 7.4 V: a person corrects the model."""
+    folder = tmp_path / "snake"
+    answers = ["yp", "", "", "s", "", "", "", "q"]
+    ended: list[Ended] = []
+
+    def answer(_: str) -> str:
+        found = folder / "found.toml"
+        if found.exists():
+            found.write_text(found.read_text().replace('"STS3215"', '"STS3215-C018"'))
+        return answers.pop(0)
+
+    def run(words: Sequence[str]) -> int:
+        ended.append(snakewalk(*words))
+        return ended[-1].returncode
+
+    with pytest.raises(SystemExit) as stop:
+        GuidedSetup(folder, service.port, answer, run).carry_on()
+    assert stop.value.code == 0, ended[-1]
+    assert answers == []
+    robot = load_robot(str(folder / "robot.toml"))
+    assert robot.joint_axes == "ypypyp"
+    assert [each.ids for each in robot.ports] == [(1, 2, 3), (4, 5, 6)]
+    assert {model[:3] for model in robot.servo_models[3:]} == {"STS"}
+    assert "STS3215" in ended[1].stdout  # the doctor examined both ports
+    assert (folder / "rehearsal" / "report.html").exists()
+    for line in (service.first, service.other):
+        assert line.bank["Torque Enable"].tolist() == [0] * 3
