@@ -1,7 +1,5 @@
 """Answers of the user about a file: options of the commands that read it."""
 
-from typing import Final
-
 from pydantic import BeforeValidator, Field
 
 from snakewalk.config.base import Strict
@@ -16,7 +14,7 @@ class Answers(Strict):
     )
 
 
-LISTED: Final = BeforeValidator(
+LISTED = BeforeValidator(
     lambda given: [part.strip() for part in given.split(",")] if isinstance(given, str) else given
 )
 """Rule that reads a list from words: A,B,C."""

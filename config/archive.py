@@ -17,40 +17,40 @@ import zipfile
 import zlib
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, Final
+from typing import IO, TYPE_CHECKING, Any
 
 from snakewalk.config.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-FREE_BYTES: Final = 16_000_000
+FREE_BYTES = 16_000_000
 """Size to which any file may expand (ours): a mask of zeros is packed a thousandfold."""
-MOST_RATIO: Final = 100
-MOST_BYTES: Final = 1_000_000_000
+MOST_RATIO = 100
+MOST_BYTES = 1_000_000_000
 """Largest ratio of unpacked to packed size, and largest unpacked size, above ``FREE_BYTES``
 (ours)."""
-MOST_TEXT_RATIO: Final = 20
-MOST_TEXT_BYTES: Final = 500_000_000
+MOST_TEXT_RATIO = 20
+MOST_TEXT_BYTES = 500_000_000
 """Largest size of a JSON text (ours): parsing needs several times its size in memory."""
-MOST_LOG_BYTES: Final = 16_000_000_000
+MOST_LOG_BYTES = 16_000_000_000
 """Largest size of a log, which is read row by row (ours): 30 hours of 16 servos at 50 Hz."""
-MOST_JSON_BYTES: Final = 64_000_000
+MOST_JSON_BYTES = 64_000_000
 """Largest size of a JSON file that is read at once (ours)."""
-MOST_STORAGE_BYTES: Final = 1_000_000
+MOST_STORAGE_BYTES = 1_000_000
 """Largest size of a calibration file (ours)."""
-_PIECE_BYTES: Final = 1_000_000
-_PACKED: Final[dict[bytes, Callable[..., Any]]] = {
+_PIECE_BYTES = 1_000_000
+_PACKED: dict[bytes, Callable[..., Any]] = {
     b"\x1f\x8b": gzip.open,
     b"BZh": bz2.open,
     b"\xfd7zXZ\x00": lzma.open,
 }
 """First bytes of compressed files, and what unpacks them."""
 _DEEPEST_NESTING, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
-_NESTING: Final = re.compile(r"[\[\]{}]|<\w|</|/>")
-_ENDS: Final = ("]", "}", "</", "/>")
-_SIDES: Final = re.compile(r"\b(?:rows|cols|sizes)\b[\"'>:\[\s]{1,20}([\d,\s]+)")
-DAMAGE: Final = (
+_NESTING = re.compile(r"[\[\]{}]|<\w|</|/>")
+_ENDS = ("]", "}", "</", "/>")
+_SIDES = re.compile(r"\b(?:rows|cols|sizes)\b[\"'>:\[\s]{1,20}([\d,\s]+)")
+DAMAGE = (
     ValueError,
     EOFError,
     KeyError,

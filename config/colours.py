@@ -4,18 +4,16 @@ The colour-blind safe palette of M. Okabe and K. Ito (Color Universal Design, 20
 two grey tones.
 """
 
-from typing import Final
-
-INK: Final = "#22303c"
-GREY: Final = "#8796a5"
-PALE: Final = "#d9e0e6"
-BLUE: Final = "#0072b2"
-SKY: Final = "#56b4e9"
-GREEN: Final = "#009e73"
-AMBER: Final = "#e69f00"
-RED: Final = "#d55e00"
-PURPLE: Final = "#a4508b"
-COLOURS: Final = {
+INK = "#22303c"
+GREY = "#8796a5"
+PALE = "#d9e0e6"
+BLUE = "#0072b2"
+SKY = "#56b4e9"
+GREEN = "#009e73"
+AMBER = "#e69f00"
+RED = "#d55e00"
+PURPLE = "#a4508b"
+COLOURS = {
     "ink": INK,
     "grey": GREY,
     "pale": PALE,
@@ -27,34 +25,34 @@ COLOURS: Final = {
     "purple": PURPLE,
 }
 """Colours by their names, as ``column.Curve`` uses them."""
-SERIES: Final = (BLUE, RED, GREEN, AMBER, PURPLE, SKY, INK, GREY)
+SERIES = (BLUE, RED, GREEN, AMBER, PURPLE, SKY, INK, GREY)
 """Colours of things of one kind, in this order: runs, robots, joints."""
-LOWLAND: Final = "#606e46"
-HIGHLAND: Final = "#d6c098"
+LOWLAND = "#606e46"
+HIGHLAND = "#d6c098"
 """Colours of the lowest and the highest ground; higher places are lighter."""
 
-MEASURED: Final = BLUE
+MEASURED = BLUE
 """Colour of measured or simulated values."""
-GOAL: Final = AMBER
+GOAL = AMBER
 """Colour of goals that are sent to servos, and of predictions."""
-ASKED: Final = GREY
+ASKED = GREY
 """Colour of values that the motion asks for, before the safety layer."""
-PATH: Final = INK
-TO_COME: Final = RED
+PATH = INK
+TO_COME = RED
 """Colour of waypoints that are not reached."""
-REACHED: Final = GREEN
-HIGHEST: Final = RED
+REACHED = GREEN
+HIGHEST = RED
 """Colour of the joint or servo with the highest value."""
-MEAN: Final = SKY
+MEAN = SKY
 """Colour of the mean of all joints, or all servos."""
-SUPPLY: Final = AMBER
-WARNING: Final = AMBER
-FAULT: Final = RED
+SUPPLY = AMBER
+WARNING = AMBER
+FAULT = RED
 
 
-CENTRE: Final = BLUE
+CENTRE = BLUE
 """Colour of the track of the body's centre."""
-HEAD: Final = SKY
+HEAD = SKY
 """Colour of the track of the head."""
 
 

@@ -5,7 +5,7 @@ It also makes the JSON Schema, with which editors complete and check files.
 
 from collections.abc import Mapping
 from types import UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -23,7 +23,7 @@ from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.world import WorldConfig
 
-SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
+SCHEMAS: Mapping[str, type[BaseModel]] = {
     "run": RunConfig,
     "robot": RobotConfig,
     "world": WorldConfig,
@@ -38,7 +38,7 @@ SCHEMAS: Final[Mapping[str, type[BaseModel]]] = {
 }
 """Schemas by the names of their files; a synthesis is also a table of a run."""
 
-WRITTEN_BY_PROGRAM: Final = ("described_models",)
+WRITTEN_BY_PROGRAM = ("described_models",)
 """Keys that the program fills when it loads a file; no page or template shows them."""
 _HEAD = """# Configuration
 
@@ -100,7 +100,7 @@ This page is written from the schema by `python -m snakewalk.config.document`; a
 """
 
 
-_FILES: Final = (
+_FILES = (
     ("Run", RunConfig),
     ("Robot", RobotConfig),
     ("World", WorldConfig),

@@ -1,11 +1,10 @@
 """Optional packages: the extra that installs each, checked before work."""
 
 from importlib.util import find_spec
-from typing import Final
 
 from snakewalk.config.errors import InputError
 
-EXTRAS: Final = {
+EXTRAS = {
     "mujoco": ("MuJoCo", "sim"),
     "matplotlib": ("matplotlib", "view"),
     "mpl_toolkits": ("matplotlib", "view"),
@@ -34,7 +33,7 @@ EXTRAS: Final = {
     "mujoco_warp": ("MuJoCo-Warp", "warp"),
 }
 """Module to (name of the package, extra of ``pyproject.toml`` that brings it)."""
-BASE: Final = frozenset(
+BASE = frozenset(
     {"numba", "scipy", "networkx", "typer", "rich", "mcap", "foxglove_schemas_protobuf"}
 )
 """Modules of the base that a light install of the test fixture does without (docs/start/ci.md)."""

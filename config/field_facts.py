@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator
 from types import UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-_SIGNS: Final = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
+_SIGNS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
 
 
 def description_of(field: FieldInfo) -> str:

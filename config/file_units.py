@@ -5,10 +5,9 @@ No other module has factors of such units, so that each of them means one thing 
 
 import math
 import re
-from typing import Final
 
-DEGREE: Final = "deg"
-LENGTHS_M: Final = {
+DEGREE = "deg"
+LENGTHS_M = {
     "m": 1.0,
     "cm": 0.01,
     "mm": 0.001,
@@ -17,9 +16,9 @@ LENGTHS_M: Final = {
     "us-ft": 1200.0 / 3937.0,
 }
 """Metres per unit of length, by the names that options accept."""
-ANGLES_RAD: Final = {"rad": 1.0, DEGREE: math.pi / 180.0}
-TIMES_S: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-_FEET: Final = {
+ANGLES_RAD = {"rad": 1.0, DEGREE: math.pi / 180.0}
+TIMES_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_FEET = {
     "ft": ("ft", "foot", "feet", "international foot", "international feet", "foot international"),
     "us-ft": (
         "us-ft",

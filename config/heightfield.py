@@ -7,7 +7,7 @@ columns, 3) for pictures.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +16,9 @@ from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats, Image, Ints
 from snakewalk.config.errors import InputError
 
-MOST_SAMPLES: Final = 4_000_000
+MOST_SAMPLES = 4_000_000
 """Limit of a map (ours): planner and simulator hold several arrays of its size."""
-_NUMBERS: Final = ("spacing_m", "x0_m", "y0_m")
+_NUMBERS = ("spacing_m", "x0_m", "y0_m")
 
 
 @dataclass(frozen=True, slots=True)

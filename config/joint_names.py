@@ -5,10 +5,9 @@ digits and underscores, a letter first.
 """
 
 from collections.abc import Sequence
-from typing import Final
 
-JOINT_NAME_PATTERN: Final = r"^[A-Za-z][A-Za-z0-9_]*$"
-_AXES: Final = {"y": "yaw", "p": "pitch", "r": "roll"}
+JOINT_NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_]*$"
+_AXES = {"y": "yaw", "p": "pitch", "r": "roll"}
 
 
 def default_joint_names(axes: str, sides: Sequence[str]) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel
 
@@ -34,7 +34,7 @@ Kind = Literal[
     "measurements",
 ]
 
-_ONE_OF: Final = {"policies": "policy"}
+_ONE_OF = {"policies": "policy"}
 """Singulars of the kinds of files that do not end in s."""
 
 

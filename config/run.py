@@ -1,6 +1,6 @@
 """Description of a run: robot, world, recording, waypoints, motion and safety."""
 
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,7 +17,7 @@ from snakewalk.config.schedule import RepertoireConfig
 from snakewalk.config.synthesis import SynthesisConfig
 from snakewalk.config.value_faults import STOP_OUTPUT_PATTERN
 
-MOTIONS: Final = (
+MOTIONS = (
     "walk",
     "walk-printed",
     "walk-blind",
@@ -29,7 +29,7 @@ MOTIONS: Final = (
     "source",
 )
 """Names of the motions that need no plug-in."""
-WALKS: Final = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
+WALKS = frozenset({"walk", "walk-printed", "walk-blind", "kp", "serpenoid"})
 """Names of the motions that follow waypoints."""
 MotionName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=100)]
 """A motion of ``MOTIONS``, or the name of a plug-in."""

@@ -5,15 +5,15 @@ from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.config.errors import ConfigError
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.strict_toml import checked, read_toml
 
-FOLDER: Final = Path(__file__).parent / "servos"
+FOLDER = Path(__file__).parent / "servos"
 """Folder with a file for each shipped servo model."""
-_MOST_FILES: Final = 5
+_MOST_FILES = 5
 """Longest chain of files that are each like the next (ours)."""
 
 

@@ -7,19 +7,19 @@ Each model has one file in `config/servos`; a robot may have its own
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from snakewalk.config.base import Strict
 from snakewalk.config.value_faults import MARK_PATTERN
 
-TABLE_BYTES: Final = 1024
+TABLE_BYTES = 1024
 """Number of addresses that a control table may use."""
-MODES: Final = (0, 1, 3, 4, 5, 16)
+MODES = (0, 1, 3, 4, 5, 16)
 """Operating Mode of Protocol 2.0: current, velocity, position, extended position, current-based
 position, PWM."""
-FEETECH_MODES: Final = (0, 1, 2, 3)
+FEETECH_MODES = (0, 1, 2, 3)
 """Operating Mode of Feetech servos: position, velocity, PWM or current, step or PWM."""
 ModelName = Annotated[
     str, StringConstraints(min_length=1, max_length=40, pattern=r"^[A-Z0-9][A-Z0-9.+()-]*$")
@@ -28,9 +28,9 @@ ModelName = Annotated[
 Alarm = Literal["overload", "overheating", "voltage", "encoder", "shock"]
 Block = tuple[int, int, int]
 
-_P_GAIN_DIVISOR: Final = 128.0
+_P_GAIN_DIVISOR = 128.0
 """Divisor of the register Position P Gain (e-manual, X series)."""
-_FOR_A_RUN: Final = (
+_FOR_A_RUN = (
     "Model Number",
     "Firmware Version",
     "ID",
@@ -64,7 +64,7 @@ _FOR_A_RUN: Final = (
     "Present Temperature",
 )
 """Registers that a run on a port reads or writes."""
-_FOR_THE_SIMULATOR: Final = (
+_FOR_THE_SIMULATOR = (
     "Moving Threshold",
     "Temperature Limit",
     "Max Voltage Limit",
@@ -81,7 +81,7 @@ _FOR_THE_SIMULATOR: Final = (
     "Position Trajectory",
 )
 """Registers that the simulated servo needs besides those of a run."""
-_OF_PROTOCOL_1: Final = (
+_OF_PROTOCOL_1 = (
     "Model Number",
     "Firmware Version",
     "ID",
@@ -113,7 +113,7 @@ _OF_PROTOCOL_1: Final = (
     "Lock",
 )
 """Registers that a simulated servo of Protocol 1.0 needs."""
-_OF_FEETECH: Final = (
+_OF_FEETECH = (
     "Firmware Version",
     "Model Number",
     "ID",

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import PydanticSerializationError, to_json
@@ -103,15 +103,15 @@ def _check_keys(text: str) -> None:
             raise ValueError(f"a key of over {_MOST_TABLES} tables in line {number}")
 
 
-_MOST_BYTES: Final = 4_000_000
-_MOST_FAULTS: Final = 100
+_MOST_BYTES = 4_000_000
+_MOST_FAULTS = 100
 """Faults that are listed (ours)."""
-_MOST_TABLES: Final = 100
+_MOST_TABLES = 100
 """Limit of tables in a TOML file, and in a dotted key (ours)."""
-_NO_KEY: Final = re.compile(r"[^\w.\s\"'-]+")
-_PLACE: Final = re.compile(r" ?\(at line (\d+), column \d+\)")
-_TABLE: Final = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
-_KEY: Final = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
+_NO_KEY = re.compile(r"[^\w.\s\"'-]+")
+_PLACE = re.compile(r" ?\(at line (\d+), column \d+\)")
+_TABLE = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]")
+_KEY = re.compile(r"""^\s*([\w."' -]+?)\s*=""")
 
 
 def line_number(text: str, loc: Sequence[str | int]) -> int | None:

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, Final, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -17,7 +17,7 @@ from snakewalk.config.document import (
 )
 from snakewalk.config.field_facts import description_of
 
-_COLUMN: Final = 42
+_COLUMN = 42
 """Column in which the description behind a key begins."""
 
 

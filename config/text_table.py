@@ -4,7 +4,6 @@ import csv
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -12,13 +11,13 @@ from snakewalk.config.archive import read_text
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 
-MISSING: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
+MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "-"})
 """Lower-case cells for a missing value."""
-DECIMAL_COMMA: Final = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
-_THOUSANDS: Final = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
-_MOST_BYTES: Final = 250_000_000
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?")
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(,\d{3})+")
+_MOST_BYTES = 250_000_000
 """Limit of a table (ours): its cells need several times its size in memory."""
-_SEPARATORS: Final = (",", ";", "\t")
+_SEPARATORS = (",", ";", "\t")
 
 
 def read_lines(file: Path, what: str) -> list[str]:

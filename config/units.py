@@ -1,8 +1,6 @@
 """Units by the end of a key, for tables, pages, curves and columns of a log."""
 
-from typing import Final
-
-UNITS: Final = {
+UNITS = {
     "_rad_cycle": "rad per cycle",
     "_body_lengths_cycle": "body lengths per cycle",
     "_rad_per_body_length": "rad per body length",

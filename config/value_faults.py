@@ -2,14 +2,14 @@
 
 import math
 import re
-from typing import Any, Final
+from typing import Any
 
-_NOT_IN_NAMES: Final = r"/\\\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+_NOT_IN_NAMES = r"/\\\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
 """Characters that no name contains: those of folders and of ``plain_text``."""
-NAME_PATTERN: Final = f"^[^.{_NOT_IN_NAMES}][^{_NOT_IN_NAMES}]*$"
-STOP_OUTPUT_PATTERN: Final = r"^(-?(rts|dtr):.+|command:/.+)$"
-MARK_PATTERN: Final = "^(set|fixed|usual|kept|ignored: .+)$"
-PATTERNS_IN_WORDS: Final = {
+NAME_PATTERN = f"^[^.{_NOT_IN_NAMES}][^{_NOT_IN_NAMES}]*$"
+STOP_OUTPUT_PATTERN = r"^(-?(rts|dtr):.+|command:/.+)$"
+MARK_PATTERN = "^(set|fixed|usual|kept|ignored: .+)$"
+PATTERNS_IN_WORDS = {
     MARK_PATTERN: "must be set, fixed, usual, kept, or ignored: REASON",
     NAME_PATTERN: "holds '/', a control character or a leading dot",
     STOP_OUTPUT_PATTERN: "must be rts:PORT, -rts:PORT, dtr:PORT, -dtr:PORT or "

@@ -5,7 +5,7 @@ it: `robot.link_length_m` raises. `link_values` and `joint_values` give the valu
 joint.
 """
 
-from typing import Any, Final, NoReturn
+from typing import Any, NoReturn
 
 from pydantic import Field
 
@@ -108,7 +108,7 @@ class RobotKeys(Strict):
     )
 
 
-READ_INSTEAD: Final = {
+READ_INSTEAD = {
     "link_length_m": "link_lengths_m",
     "link_mass_kg": "link_masses_kg",
     "yaw_limit_rad": "limit_rad",

@@ -1,6 +1,6 @@
 """Adapters of a chain with segments on several ports."""
 
-from typing import Annotated, Final
+from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
@@ -8,7 +8,7 @@ from snakewalk.config.base import Strict
 
 SIMULATED = "sim"
 """Name of the port of servos that are simulated while the others of the chain are real."""
-URL_SCHEMES: Final = ("socket", "rfc2217", "loop", "snakewalk")
+URL_SCHEMES = ("socket", "rfc2217", "loop", "snakewalk")
 """Schemes of URLs that may be a port; others of pyserial, such as ``spy``, write to files."""
 
 

@@ -1,12 +1,11 @@
 """Bounds of a robot's keys: the registers of its servos hold no other values."""
 
 import math
-from typing import Final
 
 from snakewalk.config.robot.joint_values import JointValues
 from snakewalk.config.servo_model import RegisterRow, ServoModel
 
-_GAINS: Final = {
+_GAINS = {
     "position_p_gain": ("Position P Gain", "position_p_gains"),
     "position_i_gain": ("Position I Gain", "position_i_gains"),
     "position_d_gain": ("Position D Gain", "position_d_gains"),

@@ -6,7 +6,7 @@ Three conditions need another comparison, and are recognised in the frame itself
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import Self
 
 import cv2
 import numpy as np
@@ -26,17 +26,17 @@ from snakewalk.controller.cameras.pose_tracking import (
 from snakewalk.controller.images.compression import Compression, compression_of, without_blocks
 from snakewalk.drivers.attitude import about_up
 
-_CALM_PX: Final = 200  # fewest pixels away from the body for the noise
+_CALM_PX = 200  # fewest pixels away from the body for the noise
 _CLEAR = 0.2
 _CLEAR_IN_BLOCKS = 0.4
 """Shares of the body's contrast: halos of compression have less, without and with blocks (ours)."""
-_DISAGREES: Final = 0.7
+_DISAGREES = 0.7
 """Variance of a pose over the square of its distance from that of the frame with blocks (ours)."""
-DEEP_SHADE: Final = 0.9
+DEEP_SHADE = 0.9
 """Share of the light that a hard shadow may remove (ours)."""
-_COLOURLESS: Final = 0.08  # largest spread of a shadow's light over the channels (ours)
-_BRIGHT: Final = 40.0  # grey levels of a floor that shows a shadow (ours)
-_BODY: Final = 1.25  # radii to each side of the axis that may belong to the body (ours)
+_COLOURLESS = 0.08  # largest spread of a shadow's light over the channels (ours)
+_BRIGHT = 40.0  # grey levels of a floor that shows a shadow (ours)
+_BODY = 1.25  # radii to each side of the axis that may belong to the body (ours)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,11 +11,11 @@ import numpy as np
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
 
-DICTIONARY: Final = "DICT_5X5_250"
+DICTIONARY = "DICT_5X5_250"
 """Dictionary of the markers on a ChArUco board; those on the floor are of another."""
-_MARKER: Final = 0.75  # of a square's side
-_MOST_SQUARES: Final = 20
-_INCH_M: Final = 0.0254
+_MARKER = 0.75  # of a square's side
+_MOST_SQUARES = 20
+_INCH_M = 0.0254
 
 
 class BoardPattern(StrEnum):

@@ -3,7 +3,6 @@
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -24,14 +23,14 @@ from snakewalk.controller.cameras.markers.lens_residual import Distortion, marke
 from snakewalk.controller.cameras.overhead_camera import LineDetection, OverheadDetector
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_SEARCH_PERIOD_S: Final = 0.25
+_SEARCH_PERIOD_S = 0.25
 """Time between two searches for markers, which need longer than a frame."""
-_LINE_S: Final = 0.05
+_LINE_S = 0.05
 """Time between two frames in which the body is looked for."""
 _LINES = 400
 _READS = 1000
 """Number of latest samples for the latency: 20 s."""
-_SPARSE: Final = 8  # pixel step for the light
+_SPARSE = 8  # pixel step for the light
 
 
 @dataclass(frozen=True, slots=True)

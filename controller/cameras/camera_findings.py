@@ -1,7 +1,7 @@
 """Results of a camera check as findings, like those of the doctor."""
 
 from collections.abc import Mapping
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from snakewalk.controller.cameras.overhead_camera import MISPLACED_M
 from snakewalk.controller.console.finding import Finding
 
 Lock = Literal["locked", "automatic", "not reported"]
-_LEAST_RATE: Final = 0.8  # of the requested rate
-_GAP: Final = 3.0  # periods of a frame
-_LEAST_SEEN: Final = 0.9  # of the pictures: a marker with less is unreliable
-_SIDE: Final = 0.05  # of a marker's side: more is a wrong print, or wrong places
-_LIGHT: Final = 0.03  # of the brightness: more is flicker, or automatic exposure
-_LATENCY_TOLERANCE_S: Final = 0.01  # largest error of latency_s
-_MOVED_CAMERA_PX: Final = 0.5
+_LEAST_RATE = 0.8  # of the requested rate
+_GAP = 3.0  # periods of a frame
+_LEAST_SEEN = 0.9  # of the pictures: a marker with less is unreliable
+_SIDE = 0.05  # of a marker's side: more is a wrong print, or wrong places
+_LIGHT = 0.03  # of the brightness: more is flicker, or automatic exposure
+_LATENCY_TOLERANCE_S = 0.01  # largest error of latency_s
+_MOVED_CAMERA_PX = 0.5
 
 
 def camera_findings(

@@ -6,7 +6,6 @@ of the headings along the body, minus their mean, so sliding does not matter.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 
@@ -16,10 +15,10 @@ from snakewalk.controller.cameras.overhead_camera import LineDetection
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
-_PARTS: Final = 4  # of the record, whose latencies give the error
-_LEAST_SAMPLES: Final = 30  # frames, and joint reads
-_LEAST_MOTION_RAD: Final = 0.03  # standard deviation of a heading: less is picture noise (ours)
-_LEAST_LIKENESS: Final = 0.7  # least credible correlation (ours)
+_PARTS = 4  # of the record, whose latencies give the error
+_LEAST_SAMPLES = 30  # frames, and joint reads
+_LEAST_MOTION_RAD = 0.03  # standard deviation of a heading: less is picture noise (ours)
+_LEAST_LIKENESS = 0.7  # least credible correlation (ours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +34,7 @@ class LatencyFit:
     """Reason for rejecting the latency; empty if it is valid."""
 
 
-_NO_FIT: Final = LatencyFit(float("nan"), float("nan"), float("nan"))
+_NO_FIT = LatencyFit(float("nan"), float("nan"), float("nan"))
 
 
 def fit_latency(

@@ -4,7 +4,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
-from typing import Final
 
 import cv2
 import numpy as np
@@ -20,13 +19,13 @@ from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.page_server import open_page
 from snakewalk.drivers.clock import WallClock
 
-_EVERY_S: Final = 0.2
+_EVERY_S = 0.2
 """Time between two pictures on the page."""
-_REPORT_S: Final = 1.0
+_REPORT_S = 1.0
 """Time between two reports on the page."""
-_WIDTH_PX: Final = 700.0
-_COLOURS: Final = {"ok": "#1b7a3a", "warn": "#a15c00", "fail": "#b3121a"}
-_MARK: Final = (230, 60, 30)
+_WIDTH_PX = 700.0
+_COLOURS = {"ok": "#1b7a3a", "warn": "#a15c00", "fail": "#b3121a"}
+_MARK = (230, 60, 30)
 
 
 class CameraPage:

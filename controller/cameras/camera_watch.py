@@ -9,7 +9,6 @@ import threading
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Final
 
 import cv2
 import numpy as np
@@ -30,11 +29,11 @@ from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.types import JointCommand
 
-_WIGGLE_RAD: Final = 0.25
-_WIGGLE_HZ: Final = 0.6, 0.97  # incommensurable: one delay fits, not a period later
-_JOINTS: Final = 3  # number of wiggling joints at the head
-_RAMP_S: Final = 0.5
-_READS_HZ: Final = 50.0  # of the joints, with a real camera
+_WIGGLE_RAD = 0.25
+_WIGGLE_HZ = 0.6, 0.97  # incommensurable: one delay fits, not a period later
+_JOINTS = 3  # number of wiggling joints at the head
+_RAMP_S = 0.5
+_READS_HZ = 50.0  # of the joints, with a real camera
 
 OnFrame = Callable[[Image, CameraCheck, float], None]
 """(H, W, 3) red, green, blue; the check so far; time (s)."""

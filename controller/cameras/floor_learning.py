@@ -6,7 +6,6 @@ the floor.
 """
 
 from dataclasses import replace
-from typing import Final
 
 import cv2
 import numpy as np
@@ -19,10 +18,10 @@ from snakewalk.controller.cameras.floor_light import in_light_of
 from snakewalk.controller.cameras.overhead_camera import OverheadDetector
 from snakewalk.controller.cameras.pose_tracking import REACH_M, BodyPrior, TrackedPose
 
-LEARN_EVERY_S: Final = 1.0
-_LONGEST_STEP_S: Final = 5.0  # longest time that one frame counts for, s
-_FITS: Final = 0.15  # of the radius: largest residual of a pose to learn from
-_BLEACHED_LEVEL: Final = 249.0  # grey levels: a brighter pixel is saturated
+LEARN_EVERY_S = 1.0
+_LONGEST_STEP_S = 5.0  # longest time that one frame counts for, s
+_FITS = 0.15  # of the radius: largest residual of a pose to learn from
+_BLEACHED_LEVEL = 249.0  # grey levels: a brighter pixel is saturated
 
 
 class FloorLearning:

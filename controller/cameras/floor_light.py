@@ -5,21 +5,19 @@ and the robot is thin. So the median of the ratio over a square of twice the bod
 the body.
 """
 
-from typing import Final
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Image
 
-_UNIT_LIGHT: Final = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
-_DARKEST: Final = np.uint8(8)  # grey levels: a ratio to a darker level is meaningless
-_GLARE: Final = 0.3  # by which light may exceed that of the surroundings: soft edges (ours)
-_COARSE: Final = 4  # frame pixels per pixel of its wide light
-_COLUMNS: Final = 4  # column step for the light of a row
-_ROWS: Final = 4  # row distance for an edge of a band
-_BANDS: Final = 0.06  # change of the light at a band's edge (ours)
+_UNIT_LIGHT = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
+_DARKEST = np.uint8(8)  # grey levels: a ratio to a darker level is meaningless
+_GLARE = 0.3  # by which light may exceed that of the surroundings: soft edges (ours)
+_COARSE = 4  # frame pixels per pixel of its wide light
+_COLUMNS = 4  # column step for the light of a row
+_ROWS = 4  # row distance for an edge of a band
+_BANDS = 0.06  # change of the light at a band's edge (ours)
 
 
 def lit_floor(image: Image, floor: Image, body_area_px: float) -> Image:

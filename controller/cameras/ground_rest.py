@@ -1,7 +1,6 @@
 """A body at rest on known ground: height and attitude from place and shape."""
 
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from snakewalk.drivers.types import BodyPose
 
 Heights = Callable[[Floats], Floats]
 """Heights (...,) of the ground at places (..., 2)."""
-_ROUNDS: Final = 3
-_LEAST_SPREAD_M2: Final = 4e-4
+_ROUNDS = 3
+_LEAST_SPREAD_M2 = 4e-4
 """A body narrower than this across its line does not show the slope across it (ours)."""
 
 

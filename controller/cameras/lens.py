@@ -6,7 +6,7 @@ sample: ``image_width``, ``image_height``, ``camera_matrix``, ``distortion_coeff
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
@@ -17,10 +17,10 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.calibration_storage import read_storage
 
-_MATRICES: Final = "camera_matrix", "distortion_coefficients"
-_ENDINGS: Final = (".yml", ".yaml", ".xml", ".json")
-_COEFFICIENTS: Final = (4, 5, 8, 12, 14)
-_STEPS: Final = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
+_MATRICES = "camera_matrix", "distortion_coefficients"
+_ENDINGS = (".yml", ".yaml", ".xml", ".json")
+_COEFFICIENTS = (4, 5, 8, 12, 14)
+_STEPS = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
 
 
 def projected(homography: NDArray[Any], points: Floats) -> Floats:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -12,10 +11,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.calibration_board import BoardView
 from snakewalk.controller.cameras.lens import Lens
 
-FEWEST_VIEWS: Final = 5
-_OUTLIER: Final = 3.0  # times the median view's residual: a blurred or misread picture (ours)
-_CELLS: Final = 6  # in each direction, to count corners
-_FLAGS: Final = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which determine k3
+FEWEST_VIEWS = 5
+_OUTLIER = 3.0  # times the median view's residual: a blurred or misread picture (ours)
+_CELLS = 6  # in each direction, to count corners
+_FLAGS = cv2.CALIB_FIX_K3  # a board seldom reaches the corners, which determine k3
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ body are used.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Final
 
 import cv2
 import numpy as np
@@ -21,36 +20,36 @@ from snakewalk.controller.images.compression import Compression
 from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.least_squares import least_squares
 
-REACH_M: Final = 0.10
+REACH_M = 0.10
 """Largest distance of the body from its believed place."""
-_TURN_RAD: Final = 0.15
+_TURN_RAD = 0.15
 _STEP_M, _STEP_RAD = 0.0125, 0.0375  # of the search
-_ROUNDS: Final = 8
-_WIDE_SECTIONS: Final = 2.0  # initial half width of a section, radii
-_NARROW_SECTIONS: Final = 1.5  # final one
-_LEAST_STEP_M: Final = 3e-4  # a smaller step ends the fit
-_SAMPLES: Final = 17
-_OUTER_SPOTS: Final = 2  # of them, at each end of a section
-_FREE_SECTION: Final = 0.3  # share of the body's contrast there, without another object (ours)
-_LEAST_FREE_SHARE: Final = 0.5  # of the sections: with fewer free ones all are used
-_TIP_IN_BLOCKS_M: Final = 0.009  # of a tip in a compressed frame, whose sections are worse (ours)
-_SECTION_M: Final = 0.003  # usual error of a section's middle
-_TIP_M: Final = 0.012  # of a tip: heads and tails differ from the model
-_CAP: Final = 0.4  # of the radius: a tip beyond its link
-_REGULAR: Final = np.array([1e-6, 1e-6, 1e-6])
-_LEAST_SEEN_SHARE: Final = 0.7  # of the sections
-_LEAST_HALF_SHARE: Final = 0.5  # of those of each half of the body
-_LARGEST_ERROR_RADII: Final = 0.3  # of the radius: largest residual of an accepted fit
-_OFF_IN_BLOCKS: Final = 0.2  # the same in a compressed frame (ours)
-_TIP_OFF: Final = 1.3  # of the radius: largest distance of a tip
-_NO_TIP: Final = "a tip of the body is not where it must be"
-_NO_TIP_HIDDEN: Final = np.array([False, False])
-_ONE_TIP_HIDDEN: Final = np.array([True, False]), np.array([False, True])
-_SURE_SIGMA_M: Final = 0.008  # largest standard deviation of a pose with one hidden tip (ours)
-_UNKNOWN: Final = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows nothing
-_COMMON_VARIANCE: Final = 1.0  # adjacent sections have similar errors (ours)
-_COMMON_VARIANCE_IN_BLOCKS: Final = 4.0  # the same in a compressed frame (ours)
-_SHAPE: Final = 0.04  # radii: common error of all sections, from the body's look (ours)
+_ROUNDS = 8
+_WIDE_SECTIONS = 2.0  # initial half width of a section, radii
+_NARROW_SECTIONS = 1.5  # final one
+_LEAST_STEP_M = 3e-4  # a smaller step ends the fit
+_SAMPLES = 17
+_OUTER_SPOTS = 2  # of them, at each end of a section
+_FREE_SECTION = 0.3  # share of the body's contrast there, without another object (ours)
+_LEAST_FREE_SHARE = 0.5  # of the sections: with fewer free ones all are used
+_TIP_IN_BLOCKS_M = 0.009  # of a tip in a compressed frame, whose sections are worse (ours)
+_SECTION_M = 0.003  # usual error of a section's middle
+_TIP_M = 0.012  # of a tip: heads and tails differ from the model
+_CAP = 0.4  # of the radius: a tip beyond its link
+_REGULAR = np.array([1e-6, 1e-6, 1e-6])
+_LEAST_SEEN_SHARE = 0.7  # of the sections
+_LEAST_HALF_SHARE = 0.5  # of those of each half of the body
+_LARGEST_ERROR_RADII = 0.3  # of the radius: largest residual of an accepted fit
+_OFF_IN_BLOCKS = 0.2  # the same in a compressed frame (ours)
+_TIP_OFF = 1.3  # of the radius: largest distance of a tip
+_NO_TIP = "a tip of the body is not where it must be"
+_NO_TIP_HIDDEN = np.array([False, False])
+_ONE_TIP_HIDDEN = np.array([True, False]), np.array([False, True])
+_SURE_SIGMA_M = 0.008  # largest standard deviation of a pose with one hidden tip (ours)
+_UNKNOWN = np.array([REACH_M, REACH_M, _TURN_RAD])  # if the frame shows nothing
+_COMMON_VARIANCE = 1.0  # adjacent sections have similar errors (ours)
+_COMMON_VARIANCE_IN_BLOCKS = 4.0  # the same in a compressed frame (ours)
+_SHAPE = 0.04  # radii: common error of all sections, from the body's look (ours)
 _THINNEST_SECTION = 0.2
 _THICKEST_SECTION = 1.5  # of the body's width: limits of a section's content
 

@@ -7,7 +7,6 @@ them. The file names its track by a fingerprint.
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +21,7 @@ from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_LONGEST_LINE: Final = 4.0
+_LONGEST_LINE = 4.0
 """Longest line, as a multiple of the film's usual length (ours)."""
 
 

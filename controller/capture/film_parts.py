@@ -7,7 +7,6 @@ folder next to the result, and an interrupted capture continues after them.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -22,13 +21,13 @@ from snakewalk.controller.images.body_detector import Detection
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
-PART_FRAMES: Final = 1000
+PART_FRAMES = 1000
 """Frames of a part (ours)."""
-_LONGEST_PART: Final = 1500
-_CALM: Final = 5  # good frames before the end of a part
-_GIVEN_WEIGHT: Final = 1e9  # weight of a part whose head the user has named
-_SUREST: Final = 0.9999
-_ARRAYS: Final = ("points_px", "radius_px", "length_px", "expected_px", "distractors")
+_LONGEST_PART = 1500
+_CALM = 5  # good frames before the end of a part
+_GIVEN_WEIGHT = 1e9  # weight of a part whose head the user has named
+_SUREST = 0.9999
+_ARRAYS = ("points_px", "radius_px", "length_px", "expected_px", "distractors")
 
 
 @dataclass(slots=True)

@@ -4,14 +4,14 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any, Final
+from typing import IO, Any
 
 import cv2
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
 
-IN_MEMORY_BYTES: Final = 2**20
+IN_MEMORY_BYTES = 2**20
 """Arrays of this size and smaller ones stay in memory."""
 _ROWS = 500  # of a large array that are computed at once
 

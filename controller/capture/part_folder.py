@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from snakewalk.controller.console.result_files import atomic_write, write_result
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_SETTINGS: Final = "settings.json"
+_SETTINGS = "settings.json"
 
 
 @dataclass(frozen=True, slots=True)

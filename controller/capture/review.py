@@ -10,7 +10,7 @@ import math
 import shlex
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -22,14 +22,14 @@ from snakewalk.controller.images.silhouette import as_deep_as
 from snakewalk.controller.images.video import in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 
-_TEMPLATE: Final = Path(__file__).with_name("review.html")
-_LARGEST_SIDE_PX: Final = 1280
-_SMALLEST_SIDE_PX: Final = 320
+_TEMPLATE = Path(__file__).with_name("review.html")
+_LARGEST_SIDE_PX = 1280
+_SMALLEST_SIDE_PX = 320
 """Longest side of the pictures on the page."""
-_MOST_BYTES: Final = 150_000_000
+_MOST_BYTES = 150_000_000
 """Limit for all pictures together (ours): a browser opens such a page in seconds."""
-_QUALITY: Final = 85
-_STATUS_TEXTS: Final = [str(frame_status) for frame_status in FrameStatus]
+_QUALITY = 85
+_STATUS_TEXTS = [str(frame_status) for frame_status in FrameStatus]
 
 
 def picture_scale(some: Sequence[DeepImage], count: int, name: str) -> float:

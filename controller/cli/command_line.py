@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib.metadata import version
 from itertools import pairwise
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -155,7 +155,7 @@ _PANELS = {
 }
 """Options by their group in the help of a command; the others are in its first group."""
 _USAGE = "COMMAND ... | --version | --install-completion | --help (-h)"
-_CONTEXT: Final[dict[str, Any]] = {"help_option_names": ["-h", "--help"]}
+_CONTEXT: dict[str, Any] = {"help_option_names": ["-h", "--help"]}
 
 
 class CommandGroup(TyperGroup):

@@ -5,12 +5,12 @@ import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Final, Self
+from typing import Self
 
 from snakewalk.config.archive import read_bytes, read_text
 from snakewalk.config.errors import InputError
 
-_NO_ROW: Final[dict[str, str]] = {}
+_NO_ROW: dict[str, str] = {}
 
 
 def read_csv_table(

@@ -6,7 +6,6 @@ in a URDF. x is forward, y left, z up.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +14,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.runlog.record import RunRecord
 
-WORLD: Final = "world"
+WORLD = "world"
 """Name of the frame of the head's pose."""
 
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,9 @@ from snakewalk.controller.runlog.record import Header, RunRecord
 from snakewalk.controller.runlog.topics import ConfigTable, FrictionTable, PoseTable, WalkTable
 
 Cells = NDArray[Any] | Sequence[str]
-_XYZ: Final = ("x", "y", "z")
-_BOUNDS: Final = ("low", "high")
-_OF_THE_POSE: Final = (PoseTable, WalkTable, FrictionTable)
+_XYZ = ("x", "y", "z")
+_BOUNDS = ("low", "high")
+_OF_THE_POSE = (PoseTable, WalkTable, FrictionTable)
 """Tables whose numbers depend on the pose; each of their rows states its evidence."""
 
 

@@ -10,7 +10,7 @@ from importlib import import_module
 from itertools import cycle
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
@@ -45,8 +45,8 @@ from snakewalk.controller.runlog.topics import (
 from snakewalk.sim.physics.solids import solids
 
 Schema = dict[str, Any]
-_INTEGER: Final[Schema] = {"type": "integer"}
-_KINDS: Final = {"DOUBLE": "number", "FLOAT": "number", "STRING": "string", "BOOL": "boolean"}
+_INTEGER: Schema = {"type": "integer"}
+_KINDS = {"DOUBLE": "number", "FLOAT": "number", "STRING": "string", "BOOL": "boolean"}
 """JSON types by protobuf's; the others are integers."""
 
 
@@ -90,9 +90,9 @@ def _field(field: Any) -> Schema:
 Json = dict[str, Any]
 Row = tuple[float, str, Json]
 """Time in s, topic, message."""
-SCENE: Final = "/scene"
-FOXGLOVE_LOG: Final = "/log"
-TYPES: Final = {
+SCENE = "/scene"
+FOXGLOVE_LOG = "/log"
+TYPES = {
     SCENE: "foxglove.SceneUpdate",
     FRAMES: "foxglove.FrameTransforms",
     JOINT_STATES: "foxglove.JointStates",
@@ -102,7 +102,7 @@ TYPES: Final = {
     FOXGLOVE_LOG: "foxglove.Log",
 }
 """Well-known message of each topic."""
-SHOWN: Final[Shown] = {
+SHOWN: Shown = {
     CycleTable: ("sent_rad", "measured_rad", "velocity_rad_s"),
     ImuTable: tuple(ImuTable.topic.columns),
     PoseTable: ("head_m", "rotation", "links_m"),
@@ -111,24 +111,24 @@ SHOWN: Final[Shown] = {
     EventTable: tuple(EventTable.topic.columns),
 }
 """Fields that well-known messages contain; the others keep the log's topics and schemas."""
-_LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
+_LEVELS = {"info": 2, "warning": 3, "error": 4}
 """Levels of ``foxglove.Log``."""
-_HEAD: Final = (0.85, 0.33, 0.10, 1.0)
-_LINKS: Final = ((0.20, 0.45, 0.70, 1.0), (0.35, 0.65, 0.85, 1.0))
-_PATH: Final = (0.95, 0.75, 0.10, 1.0)
-_WAYPOINT: Final = (0.10, 0.65, 0.30, 0.35)
-_GROUND: Final = ((0.33, 0.36, 0.30, 1.0), (0.80, 0.78, 0.68, 1.0))
-_WATER: Final = (0.55, 0.80, 0.92, 0.25)
+_HEAD = (0.85, 0.33, 0.10, 1.0)
+_LINKS = ((0.20, 0.45, 0.70, 1.0), (0.35, 0.65, 0.85, 1.0))
+_PATH = (0.95, 0.75, 0.10, 1.0)
+_WAYPOINT = (0.10, 0.65, 0.30, 0.35)
+_GROUND = ((0.33, 0.36, 0.30, 1.0), (0.80, 0.78, 0.68, 1.0))
+_WATER = (0.55, 0.80, 0.92, 0.25)
 """Colours (ours): red, green, blue, opacity; of the ground's lowest and highest point."""
-_UPRIGHT: Final = (0.0, 0.0, 0.0, 1.0)
-_TURN_TO_X: Final = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+_TURN_TO_X = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
 """Turns a cylinder, which stands along z, along x."""
-_TURN_TO_Y: Final = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
+_TURN_TO_Y = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
 """Quaternion that turns a cylinder, which stands along z, along y."""
-_MARGIN_M: Final = 1.0
+_MARGIN_M = 1.0
 """Width of the flat floor that is drawn beyond the path (ours)."""
-_WIDTH_PX: Final = 3.0
-_PATH_HEIGHT_M: Final = 0.005
+_WIDTH_PX = 3.0
+_PATH_HEIGHT_M = 0.005
 """Height of a drawn line above the ground, so that it is visible (ours)."""
 
 

@@ -1,7 +1,6 @@
 """Measurements of a run's IMU, each reading once, in the frames of ``body_frames``."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.runlog.record import RunRecord
 
-_SAME_READING_S: Final = 1e-4
+_SAME_READING_S = 1e-4
 """Readings that were measured closer to each other are one: ages are rounded in the log."""
 
 

@@ -1,14 +1,14 @@
 """Fields of a log that no well-known message of an export contains."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from snakewalk.controller.runlog.column import Column, Table
 from snakewalk.controller.runlog.record import RunRecord
 
-TIME: Final = "time_s"
+TIME = "time_s"
 Shown = Mapping[type[Table], Collection[str]]
 """Fields that well-known messages contain, by table."""
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Final, Literal
+from typing import Literal
 from xml.etree import ElementTree as ET
 
 from snakewalk.config.constants import GRAVITY_M_S2
@@ -17,18 +17,18 @@ Actuators = Literal["dcmotor"]
 """MuJoCo's actuators that stand for the servos."""
 Contact = Literal["rollers", "isotropic", "none"]
 """Friction of an exported body."""
-CONTACT_NOTES: Final[dict[Contact, str]] = {
+CONTACT_NOTES: dict[Contact, str] = {
     "rollers": "friction: a passive roller under each link, 1.06 to 1.22 of the speed in snakewalk",
     "isotropic": "friction: equal in all directions, 0.00 to 1.19 of the speed in snakewalk",
     "none": "friction: none, 0.00 to 0.01 of the speed in snakewalk",
 }
 """Remaining difference of the friction, measured by ``benchmarks.exported_body``."""
-_ROLLER_OUT_M: Final = 5e-4
+_ROLLER_OUT_M = 5e-4
 """Distance by which a roller stands out of the belly (ours)."""
-_ROLLER_SHARE: Final = 0.01
+_ROLLER_SHARE = 0.01
 """Share of a link's mass that its roller has (ours)."""
-_DEVICE: Final = "/dev/ttyUSB0"
-_POSITION_MODE: Final = 3
+_DEVICE = "/dev/ttyUSB0"
+_POSITION_MODE = 3
 
 
 def urdf_text(robot: RobotConfig, ros2_control: Ros2Control | None = None) -> str:

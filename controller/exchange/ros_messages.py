@@ -4,7 +4,7 @@ Frames and joints have the names of the URDF that ``robot export`` writes; effor
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,24 +26,24 @@ from snakewalk.controller.runlog.topics import (
     SlowTable,
 )
 
-JOINT_STATES: Final = "/joint_states"
-JOINT_GOALS: Final = "/joint_goals"
-FRAMES: Final = "/tf"
-HEAD_POSE: Final = "/head_pose"
-ODOMETRY: Final = "/odom"
-IMU: Final = ImuTable.topic.name
-PATH: Final = PathTable.topic.name
-DIAGNOSTICS: Final = "/diagnostics"
-ROSOUT: Final = "/rosout"
-_LEVELS: Final = {"info": 20, "warning": 30, "error": 40}
+JOINT_STATES = "/joint_states"
+JOINT_GOALS = "/joint_goals"
+FRAMES = "/tf"
+HEAD_POSE = "/head_pose"
+ODOMETRY = "/odom"
+IMU = ImuTable.topic.name
+PATH = PathTable.topic.name
+DIAGNOSTICS = "/diagnostics"
+ROSOUT = "/rosout"
+_LEVELS = {"info": 20, "warning": 30, "error": 40}
 """Levels of ``rcl_interfaces/msg/Log``."""
-OK: Final = 0
-WARNING: Final = 1
-ERROR: Final = 2
+OK = 0
+WARNING = 1
+ERROR = 2
 """Levels of ``diagnostic_msgs/msg/DiagnosticStatus``."""
-_PATH: Final = "nav_msgs/msg/Path"
-_TEXT: Final = "std_msgs/msg/String"
-TYPES: Final = {
+_PATH = "nav_msgs/msg/Path"
+_TEXT = "std_msgs/msg/String"
+TYPES = {
     JOINT_STATES: "sensor_msgs/msg/JointState",
     JOINT_GOALS: "sensor_msgs/msg/JointState",
     FRAMES: "tf2_msgs/msg/TFMessage",
@@ -55,7 +55,7 @@ TYPES: Final = {
     ROSOUT: "rcl_interfaces/msg/Log",
 }
 """Well-known message of each topic."""
-SHOWN: Final[Shown] = {
+SHOWN: Shown = {
     CycleTable: ("sent_rad", "measured_rad", "velocity_rad_s"),
     SlowTable: tuple(SlowTable.topic.columns),
     ImuTable: tuple(ImuTable.topic.columns),
@@ -65,9 +65,9 @@ SHOWN: Final[Shown] = {
 """Fields that the messages of other packages contain; the others have messages of ``std_msgs``."""
 
 
-UNKNOWN_VARIANCE: Final = 1e6
+UNKNOWN_VARIANCE = 1e6
 """Variance of an unknown value, as `robot_localization` expects it."""
-_LEAST_VARIANCE: Final = 1e-6
+_LEAST_VARIANCE = 1e-6
 """Variance of an exact pose: zeros would mean that the covariance is unknown."""
 
 

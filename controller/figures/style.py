@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -33,7 +33,7 @@ SPEEDS = "viridis"
 WIDTH_IN = 8.0
 """Width of a figure: at 600 px, text of 8.5 points is 9 px high."""
 _POINTS = 900  # across a figure: more cannot be seen
-_RC: Final[dict[Any, Any]] = {
+_RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9.5,
     "axes.titlesize": 10.0,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from pkgutil import iter_modules
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller import gaits
@@ -30,7 +30,7 @@ _WITHOUT_GAITS = ("registry", "backbone", "spine_heading")
 """Modules that define no gait; two of them are slow to import."""
 ENTRY_POINTS = "snakewalk.gaits"
 """Group of the entry points of other packages, each of which names a gait."""
-BROKEN: Final[dict[str, str]] = {}
+BROKEN: dict[str, str] = {}
 """Why a gait of another package cannot be used, by the name of its entry point."""
 
 

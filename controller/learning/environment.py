@@ -5,7 +5,7 @@ A policy thus meets clamps, wire time, quantised readings and servo lag.
 """
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import gymnasium
 import numpy as np
@@ -34,10 +34,10 @@ from snakewalk.drivers.types import BodyPose, JointCommand, JointState
 if TYPE_CHECKING:
     from snakewalk.sim.rendering.chase_view import ChaseView, ChaseWindow
 
-_FLOATS: Final = readonly_array()
-_LARGEST_SPEED_RAD_S: Final = 20.0
-_LARGEST_SPEED_M_S: Final = 3.0
-_CURRENT_A: Final = 10.0
+_FLOATS = readonly_array()
+_LARGEST_SPEED_RAD_S = 20.0
+_LARGEST_SPEED_M_S = 3.0
+_CURRENT_A = 10.0
 """Ends of the observation space (ours): far beyond what a body of such servos does."""
 
 
@@ -70,7 +70,7 @@ class SimulatedRobot(Protocol):
         ...
 
 
-METADATA: Final[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
 
 class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):

@@ -5,8 +5,6 @@ information, 2008), in eight directions. The images are widened so that the left
 is outside OpenCV's range, is matched too.
 """
 
-from typing import Final
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -15,25 +13,25 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_BLOCK_PX: Final = 3
-_SMALL_PENALTIES: Final = {1: (12, 48), 3: (24, 96)}
+_BLOCK_PX = 3
+_SMALL_PENALTIES = {1: (12, 48), 3: (24, 96)}
 """Penalties, by channels, of a step of one pixel and of more, per pixel of a block (ours)."""
-_SPECKLE_PX: Final = 60
+_SPECKLE_PX = 60
 """Islands of fewer pixels are dropped (ours)."""
-_AGREE_PX: Final = 1.0
+_AGREE_PX = 1.0
 """Largest difference between the disparity of a pixel and that of its match (ours)."""
-_UNIQUE_PERCENT: Final = 15
+_UNIQUE_PERCENT = 15
 """Least lead of the best match over any other (ours): under the sky, where nothing is to be seen,
 the matches of a hill's edge go on."""
-_STEPS: Final = 2
-_WINDOW_PX: Final = 7
-_LEAST_STEEP: Final = 4.0
+_STEPS = 2
+_WINDOW_PX = 7
+_LEAST_STEEP = 4.0
 """Mean square of the grey levels' slope per pixel below which noise would shift a window (ours)."""
-_MOST_SHIFT_PX: Final = 0.5
-_RADIUS_PX: Final = 4
-_LEAST_SHARE: Final = 0.4
+_MOST_SHIFT_PX = 0.5
+_RADIUS_PX = 4
+_LEAST_SHARE = 0.4
 """Share of a window's pixels that must lie on the plane of its middle (ours)."""
-_TOUCH_PX: Final = 1.0
+_TOUCH_PX = 1.0
 """Largest distance from a plane of a pixel that belongs to it (ours)."""
 
 

@@ -8,7 +8,7 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +18,12 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_KINDS: Final = {
+_KINDS = {
     **{("F", size): f"<f{size}" for size in (4, 8)},
     **{("I", size): f"<i{size}" for size in (1, 2, 4, 8)},
     **{("U", size): f"<u{size}" for size in (1, 2, 4, 8)},
 }
-_HEADER_BYTES: Final = 4096
+_HEADER_BYTES = 4096
 """A header is searched for its last line so far (ours)."""
 
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -15,11 +14,11 @@ from snakewalk.config.reading import Fact, Facts, by_user, decided
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import UNSTATED_UNIT, degree_cell_m, height_fact
 
-_LATITUDE: Final = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
-_LONGITUDE: Final = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
-_MOST_DEGREES: Final = 1.0
+_LATITUDE = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
+_LONGITUDE = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
+_MOST_DEGREES = 1.0
 """Larger ground is not a ground for a robot (ours)."""
-_FAR_EXTENTS: Final = 20.0
+_FAR_EXTENTS = 20.0
 """Points that are this many times their extent from the origin may be places on earth (ours)."""
 
 

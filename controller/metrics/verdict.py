@@ -1,7 +1,7 @@
 """Verdict on a run: one sentence, how it is known, exit code, cause, and the next command."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 from snakewalk.controller.metrics.failure import Cause, Failure, failure
 from snakewalk.controller.metrics.summary import RunSummary
@@ -13,7 +13,7 @@ NOT_MEASURED = 3
 _EXIT_MISSED = 1
 """Exit code of a run that safety stopped, or that missed a waypoint."""
 _SIMULATED_BACKEND = "sim"
-_ADVICE: Final[dict[Cause, str]] = {
+_ADVICE: dict[Cause, str] = {
     "safety": "snakewalk log report {log}",
     "roll": "snakewalk plan {run}",
     "climb": "snakewalk plan {run}",

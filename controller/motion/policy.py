@@ -9,7 +9,7 @@ parameters.
 
 import json
 from pathlib import Path
-from typing import Annotated, Final, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -73,12 +73,12 @@ class PolicyWave(Strict):
         return cls.model_validate(fields)
 
 
-WAVE_ENDS: Final[tuple[Floats, Floats]] = (
+WAVE_ENDS: tuple[Floats, Floats] = (
     np.repeat([0.1, 0.0, 0.2, -1.0, -3.0, -1.0], [1, 4, 3, 2, 3, 3]),
     np.repeat([2.0, 0.8, 3.0, 1.0, 3.0, 1.0], [1, 4, 3, 2, 3, 3]),
 )
 """(P,) least and greatest values of a wave."""
-WAVE_SPAN: Final[Floats] = np.repeat([0.5, 0.15, 0.4, 0.2, 1.0, 0.3], [1, 4, 3, 2, 3, 3])
+WAVE_SPAN: Floats = np.repeat([0.5, 0.15, 0.4, 0.2, 1.0, 0.3], [1, 4, 3, 2, 3, 3])
 """(P,) what an action of 1 changes; the step of a search begins with a share of it (ours)."""
 
 

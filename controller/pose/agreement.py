@@ -5,7 +5,7 @@ that a body travels depends on the ground, and shows nothing about the source.
 """
 
 from collections import deque
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,51 +13,51 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.pose.motion_history import Moment
 from snakewalk.controller.pose.tracked_body import HeadMeasurement
 
-WINDOW_S: Final = 4.0
+WINDOW_S = 4.0
 """Duration of a comparison, one to two waves of a walk (ours)."""
-LEAST_S: Final = 2.5
+LEAST_S = 2.5
 """Least time that is compared."""
-SAMPLE_S: Final = 0.04
-JUDGE_S: Final = 0.5
+SAMPLE_S = 0.04
+JUDGE_S = 0.5
 """Time between two samples and between two judgements."""
-DOUBT_S: Final = 3.0
+DOUBT_S = 3.0
 """Longest time for which a body may move without agreement (ours)."""
-NAMED_S: Final = 1.5
+NAMED_S = 1.5
 """Longest time for which a body may move with a contradiction that has a name (ours)."""
-CAUTIOUS_S: Final = 8.0
+CAUTIOUS_S = 8.0
 """Longest time for which a run moves slowly before the first agreement (ours)."""
-LEAST_UP: Final = 0.7
+LEAST_UP = 0.7
 """Least cosine between the head's up axis and the vertical (ours)."""
-LEAST_TURN_RAD: Final = 0.12
-LEAST_SWING_M: Final = 0.025
+LEAST_TURN_RAD = 0.12
+LEAST_SWING_M = 0.025
 """Root mean square turning and swing below which a window shows nothing (ours)."""
-SHARE: Final = 0.8
+SHARE = 0.8
 """Least correlation of turns that agree (ours)."""
-TURNS: Final = (0.6, 1.5)
+TURNS = (0.6, 1.5)
 """Measured over expected turning that agrees: 0.84 to 1.23 in 13 walks of sound sources."""
-SCALES: Final = (0.6, 1.5)
+SCALES = (0.6, 1.5)
 """Measured over expected swing that agrees on a floor: 0.74 to 1.29 in five walks."""
-SCALES_FLOOR: Final = (0.8, 1.25)
+SCALES_FLOOR = (0.8, 1.25)
 """The same on a floor, as the median of ``WINDOWS`` windows: within 0.04 of 1 in five walks."""
-SCALES_HILLS: Final = (0.5, 1.7)
+SCALES_HILLS = (0.5, 1.7)
 """Measured over expected swing that agrees on hills, as the median of ``WINDOWS`` windows: dead
 reckoning knows no hills, and single windows of sound sources have 0.57 to 1.75."""
-TURNED_DEG: Final = 45.0
+TURNED_DEG = 45.0
 """Direction of the swing beyond which the frame is turned (ours)."""
-UNIT: Final = 20.0
+UNIT = 20.0
 """Least ratio of measured to expected swing that shows another unit (ours)."""
-WINDOWS: Final = 5
+WINDOWS = 5
 """Windows before the scale is judged on hills, or its accuracy stated (ours)."""
-ENDS: Final = 8
+ENDS = 8
 """Samples at each end of a window whose mean is a place."""
-STEP_RAD: Final = 0.12
-STEP_ROWS: Final = 10
+STEP_RAD = 0.12
+STEP_ROWS = 10
 """Least step of the heading that a frame or a marker made, and number of samples whose mean is
 compared with that of the samples before: 0.10 rad in a sound walk (ours)."""
-SCALE_SD: Final = 0.02
+SCALE_SD = 0.02
 """Least standard deviation of the scale (ours)."""
-SCALE_FLAT: Final = 0.05
-SCALE_HILLS: Final = 0.3
+SCALE_FLAT = 0.05
+SCALE_HILLS = 0.3
 """Difference of the swing of a sound source from the expected one, on a floor and on hills: means
 of 13 walks are within 0.04 and 0.2."""
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,11 @@ from snakewalk.controller.pose.sample import (
     rotation_of,
 )
 
-VERSION: Final = 1
-MOST_BYTES: Final = 4096
+VERSION = 1
+MOST_BYTES = 4096
 """Largest datagram that is read (ours)."""
-_KEYS: Final = {"sequence", "time_s", "frame", "position_m", "quaternion_wxyz"}
-_SYMMETRY: Final = 1e-6
+_KEYS = {"sequence", "time_s", "frame", "position_m", "quaternion_wxyz"}
+_SYMMETRY = 1e-6
 
 
 def encode_pose(sample: PoseSample) -> bytes:

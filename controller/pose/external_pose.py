@@ -7,7 +7,7 @@ An unusable pose is named and left out; dead reckoning bridges it with growing u
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,16 +25,16 @@ from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
 from snakewalk.drivers.types import BodyPose, JointState
 
-LONGEST_S: Final = 0.5
+LONGEST_S = 0.5
 """Longest delay that is looked for."""
-STEP_S: Final = 0.02
-SLOW_S: Final = 2.0
+STEP_S = 0.02
+SLOW_S = 2.0
 """Slower differences are drift of dead reckoning (ours)."""
-MEMORY_S: Final = 8.0
+MEMORY_S = 8.0
 """Time for which a measurement counts (ours)."""
-CONTRAST: Final = 0.7
+CONTRAST = 0.7
 """Share of the largest error below which the best shift is believed (ours)."""
-FOLLOW_S: Final = 2.0
+FOLLOW_S = 2.0
 """Time constant with which the estimate follows (ours)."""
 
 
@@ -96,12 +96,12 @@ class LatencyEstimate:
         self.latency_s += follow * float(shift_s - self.latency_s)
 
 
-AGAIN_S: Final = 10.0
+AGAIN_S = 10.0
 """Time after which the same fault is reported again (ours)."""
-FROZEN: Final = 10
-FROZEN_M: Final = 0.03
+FROZEN = 10
+FROZEN_M = 0.03
 """This many equal poses in a row are stale if the head has moved so far meanwhile (ours)."""
-_MOST_KEPT_POSES: Final = 1000
+_MOST_KEPT_POSES = 1000
 """Measurements that are kept for ``take_measured``."""
 
 

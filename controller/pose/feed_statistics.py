@@ -1,7 +1,7 @@
 """Statistics of the poses that arrive: rate, delay, noise, frame and senders."""
 
 from collections import deque
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,7 +12,7 @@ from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import tracked_link
 
-MOST: Final = 2000
+MOST = 2000
 """Newest poses that count."""
 
 

@@ -1,7 +1,6 @@
 """The first pose of an external source, before torque, compared with the start of the run."""
 
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
@@ -19,21 +18,21 @@ from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import tracked_link
 from snakewalk.drivers.clock import Clock
 
-WAIT_S: Final = 5.0
+WAIT_S = 5.0
 """Longest wait for the first pose (ours)."""
-LOOK_S: Final = 0.02
-WATCH_S: Final = 2.0
+LOOK_S = 0.02
+WATCH_S = 2.0
 """Time for which the poses of a robot at rest are watched (ours)."""
-BLOCKS: Final = 8
-DRIFT_M_S: Final = 0.01
-DRIFT_SD: Final = 5.0
+BLOCKS = 8
+DRIFT_M_S = 0.01
+DRIFT_SD = 5.0
 """Smallest speed of a robot at rest that is drift of its source, also in standard deviations
 (ours). It comes from the means of ``BLOCKS`` parts of the time."""
-LEAST_UP: Final = 0.5
+LEAST_UP = 0.5
 """Least cosine between the link's up axis and the vertical (ours)."""
-UNIT_M: Final = 10.0
+UNIT_M = 10.0
 """Distance from the start above which millimetres are considered (ours)."""
-HEIGHT_M: Final = 0.3
+HEIGHT_M = 0.3
 """Largest distance of the first pose from the height of the ground (ours)."""
 
 

@@ -8,7 +8,7 @@ links bear the body.
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,18 +28,18 @@ from snakewalk.controller.pose.external_pose import MeasuredHeads, TimedHead
 from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.drivers.attitude import about_up
 
-WINDOW_S: Final = 4.0
+WINDOW_S = 4.0
 """Duration of motion that is compared at once (ours): the noise of slow sources averages out."""
-LATE_S: Final = 0.5
+LATE_S = 0.5
 """Poses that arrive later after the end of a window do not count (ours)."""
-PRIOR: Final = 0.56
+PRIOR = 0.56
 """Standard deviation of the logarithms about the file's friction (ours): 95 % are within a third to
 three times. A level floor shows only the ratio of the frictions; this gives the rest of an
 interval."""
-ROUGH_M: Final = 0.005
+ROUGH_M = 0.005
 """Root mean square distance of the ground under the links from a plane, above which the motion does
 not count (ours)."""
-SPREAD: Final = 3.0
+SPREAD = 3.0
 """Largest ratio of an interval's ends at which the use of an estimate begins on a slope (ours). It
 ends when the estimate agrees with the file again."""
 

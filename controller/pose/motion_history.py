@@ -2,15 +2,14 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 
-HISTORY_S: Final = 2.0
+HISTORY_S = 2.0
 """Largest age of a late measurement."""
-_ROOM: Final = 4096
+_ROOM = 4096
 
 
 @dataclass(frozen=True, slots=True)

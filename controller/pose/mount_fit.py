@@ -7,7 +7,7 @@ predicts the way, and the best of them counts.
 
 from collections.abc import Iterator
 from itertools import product
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,15 +21,15 @@ from snakewalk.config.world import FrictionConfig
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.pose.dead_reckoning import DeadReckoning
 
-DELAYS_S: Final = np.arange(0.0, 0.8, 0.005)
+DELAYS_S = np.arange(0.0, 0.8, 0.005)
 """Delays that are tried."""
-SHARE: Final = 0.8
+SHARE = 0.8
 """Least share of the turning that the joints explain (ours)."""
-TURN: Final = (0.8, 1.25)
+TURN = (0.8, 1.25)
 """Measured turning over that of the joints (ours)."""
-FRICTION: Final = (0.5, 1.0, 2.0)
+FRICTION = (0.5, 1.0, 2.0)
 """Factors on the friction along the body that are tried (ours)."""
-MIRRORED: Final = 0.8
+MIRRORED = 0.8
 """Residual of a mirrored frame over that of a right-handed one, below which it is one (ours)."""
 
 

@@ -8,7 +8,6 @@ covariance; their coupling is neglected. Dead reckoning adds uncertainty with ti
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -20,29 +19,29 @@ from snakewalk.controller.pose.tracked_body import HeadMeasurement
 from snakewalk.drivers.attitude import about_up, rotation_by, rotations
 from snakewalk.drivers.types import BodyPose
 
-SLIP_SHARE: Final = 0.15
+SLIP_SHARE = 0.15
 """Standard deviation of dead-reckoned speed and rate, over their magnitude (ours)."""
-SLIP_TIME_S: Final = 0.5
+SLIP_TIME_S = 0.5
 """Duration of such an error of speed and rate (ours)."""
-DRIFT_M2_S: Final = 2e-4
+DRIFT_M2_S = 2e-4
 """Growth of the variance of each coordinate at rest: 14 mm in a second (ours)."""
-DRIFT_RAD2_S: Final = 1e-3
+DRIFT_RAD2_S = 1e-3
 """Growth of the variance of the heading at rest: 1.8 degrees in a second (ours)."""
-RISE_M2_S: Final = 2e-4
+RISE_M2_S = 2e-4
 """Growth of the variance of the height, which dead reckoning does not know (ours)."""
-TILT_RAD2_S: Final = 5e-2
+TILT_RAD2_S = 5e-2
 """Growth of the variance of roll and pitch of the body: it may roll over within half a second
 (ours)."""
-JUMP_SD: Final = 5.0
-JUMP_M: Final = 0.10
-JUMP_RAD: Final = 0.45
+JUMP_SD = 5.0
+JUMP_M = 0.10
+JUMP_RAD = 0.45
 """Jump of a measurement: more standard deviations and larger errors of position and heading than
 these (ours). Roll and pitch are free: a body may roll over quickly."""
-LEAST_LEVEL: Final = 0.5
+LEAST_LEVEL = 0.5
 """Least horizontal part of a direction that has a heading (ours)."""
-SLIDE_M_S: Final = 0.3
-SLIDE_RAD_S: Final = 0.5
-SLIDE_S: Final = 0.5
+SLIDE_M_S = 0.3
+SLIDE_RAD_S = 0.5
+SLIDE_S = 0.5
 """Largest speed and turn of a body that slides without its joints, and longest time of such a slide
 (ours)."""
 

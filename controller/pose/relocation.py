@@ -8,30 +8,30 @@ Swapped markers move a pose at once.
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.attitude import about_up
 
-SPEED_M_S: Final = 2.0
-RATE_RAD_S: Final = 3.0
+SPEED_M_S = 2.0
+RATE_RAD_S = 3.0
 """Greatest speed and turn of a sliding body between two poses (ours): 1 m down 10 degrees with
 friction 0.08 ends at 1.4 m/s."""
-STEP_M: Final = 0.15
-STEP_RAD: Final = 0.3
+STEP_M = 0.15
+STEP_RAD = 0.3
 """Largest step between two poses, however long apart: a body that nobody saw slide did not."""
-GAPS: Final = 1.5
+GAPS = 1.5
 """Intervals between poses in which a step may happen (ours): a tracker's step needs one."""
-STEP_SD: Final = 5.0
+STEP_SD = 5.0
 """Noise of two poses that may add to a step, in standard deviations (ours)."""
-SETTLED_S: Final = 1.0
-LEAST: Final = 5
+SETTLED_S = 1.0
+LEAST = 5
 """Time, and least number of poses in it, that must agree with the joints (ours)."""
-SETTLED_M: Final = 0.05
-SETTLED_RAD: Final = 0.2
-SETTLED_SD: Final = 5.0
+SETTLED_M = 0.05
+SETTLED_RAD = 0.2
+SETTLED_SD = 5.0
 """Farthest distance of a settled pose from their mean, or in standard deviations (ours)."""
 
 

@@ -2,14 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.attitude import rotations
 
-UNIT_TOLERANCE: Final = 0.02
+UNIT_TOLERANCE = 0.02
 """Largest deviation of a quaternion's length from 1 (ours)."""
 
 

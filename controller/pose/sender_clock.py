@@ -5,16 +5,15 @@ plus the smallest delay; its slope is the drift.
 """
 
 from collections import deque
-from typing import Final
 
 import numpy as np
 
-BIN_S: Final = 1.0
+BIN_S = 1.0
 """Time over which the smallest difference counts (ours)."""
-BINS: Final = 60
-DRIFT_AFTER: Final = 15
+BINS = 60
+DRIFT_AFTER = 15
 """Bins after which the drift is estimated (ours)."""
-MOST_DRIFT: Final = 5e-4
+MOST_DRIFT = 5e-4
 """Clocks of computers drift by at most some 100 ppm; more is not believed (ours)."""
 
 

@@ -4,14 +4,14 @@ The first sender counts, or the host that a file names. It may end and begin aga
 port of the same host after a silence, with a lower sequence, or with a clock that was set back.
 """
 
-from typing import Final, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePoseError
 
-RESTART_S: Final = 1.0
+RESTART_S = 1.0
 """Silence after which another sender on the same host replaces the first one, and step of the
 stamps back that is another clock (ours)."""
-MOST_LATE: Final = 1000
+MOST_LATE = 1000
 """Poses by which a late one may be behind the newest (ours)."""
 
 

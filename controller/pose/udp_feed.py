@@ -6,18 +6,17 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.pose.datagram import MOST_BYTES, decode_pose
 from snakewalk.controller.pose.sample import ArrivedPose, UnusablePoseError
 from snakewalk.drivers.clock import Clock
 
-LOCAL: Final = "127.0.0.1"
-MOST_WAITING: Final = 2000
+LOCAL = "127.0.0.1"
+MOST_WAITING = 2000
 """Poses that wait to be read; older ones are dropped (ours)."""
-_POLL_S: Final = 0.2
-SENDER: Final = "127.0.0.1:40000"
+_POLL_S = 0.2
+SENDER = "127.0.0.1:40000"
 """Address that a simulated tracker has in messages."""
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from snakewalk.controller.kinematics.frame import Frame
 Kind = Literal[
     "forward", "left", "right", "reverse", "reverse-left", "reverse-right", "brake", "rest"
 ]
-SIDES: Final[dict[str, int]] = {"left": 1, "right": -1, "reverse-left": 1, "reverse-right": -1}
+SIDES: dict[str, int] = {"left": 1, "right": -1, "reverse-left": 1, "reverse-right": -1}
 """Side to which the heading turns: 1 is left."""
 REVERSE = ("reverse", "reverse-left", "reverse-right")
 """[YT] 3.2: forward and turns; retreating and braking, which the paper makes from forward; and

@@ -5,21 +5,19 @@ intersect, the one whose motion makes them meet returns to its former place. Bod
 do not intersect, so a start without intersections keeps this property.
 """
 
-from typing import Final
-
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats, Ints, Singles
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.drivers.compiling import callable_in_loops, compiled
 
-NONE: Final = -1
-YIELDING_FRAMES: Final = 6
+NONE = -1
+YIELDING_FRAMES = 6
 """Frames after which a body that waits moves sideways, too (ours)."""
-YIELDING_LENGTHS: Final = 0.005
+YIELDING_LENGTHS = 0.005
 """Sideways distance of a waiting body in a frame, body lengths (ours)."""
-_LINKS: Final = "float32[:, :, ::1]"
-_ROW: Final = "float64[::1]"
+_LINKS = "float32[:, :, ::1]"
+_ROW = "float64[::1]"
 
 
 class SeparatedCrowd:

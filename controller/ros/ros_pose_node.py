@@ -6,7 +6,7 @@ from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import rclpy
@@ -18,7 +18,7 @@ from snakewalk.controller.pose.datagram import encode_pose
 from snakewalk.controller.pose.sample import PoseSample, UnusablePoseError, rotation_of
 from snakewalk.controller.ros.ros_options import READY
 
-KINDS: Final[dict[str, tuple[Any, bool]]] = {
+KINDS: dict[str, tuple[Any, bool]] = {
     "geometry_msgs/msg/PoseStamped": (PoseStamped, False),
     "geometry_msgs/msg/PoseWithCovarianceStamped": (PoseWithCovarianceStamped, True),
     "nav_msgs/msg/Odometry": (Odometry, True),

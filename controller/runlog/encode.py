@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Sequence
 from functools import cache, lru_cache
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,12 +17,12 @@ from snakewalk.config.arrays import Bytes, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_DECIMALS: Final = 6  # a thousandth of an encoder count, a microsecond, a micrometre
-_GROUND_POINTS: Final = 160  # along the longer edge
-_NUMBER_BYTES: Final = 24
+_DECIMALS = 6  # a thousandth of an encoder count, a microsecond, a micrometre
+_GROUND_POINTS = 160  # along the longer edge
+_NUMBER_BYTES = 24
 """More than a number of a million, its sign, its brackets and its comma."""
-_EXACT: Final = ".17g"  # gives every float64 back
-DIGITS: Final = {"exact": _EXACT, "rounded": f".{_DECIMALS}f"}
+_EXACT = ".17g"  # gives every float64 back
+DIGITS = {"exact": _EXACT, "rounded": f".{_DECIMALS}f"}
 """Formats of single numbers."""
 encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 

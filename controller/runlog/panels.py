@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.runlog.column import Curve, Panel, by_rows
 from snakewalk.controller.runlog.record import RunRecord
 
-_REDUCE: Final[Mapping[str, Callable[..., Floats]]] = {
+_REDUCE: Mapping[str, Callable[..., Floats]] = {
     "largest": np.nanmax,
     "least": np.nanmin,
     "mean": np.nanmean,

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from itertools import chain, pairwise
 from pathlib import Path
 from sys import intern
-from typing import Any, Final, TypeVar, cast, get_type_hints
+from typing import Any, TypeVar, cast, get_type_hints
 
 import numpy as np
 
@@ -33,7 +33,7 @@ from snakewalk.controller.runlog.topics import (
 
 Row = Mapping[str, Any]
 T = TypeVar("T", bound=Table)
-_TABLES: Final[Mapping[str, type[Table]]] = {
+_TABLES: Mapping[str, type[Table]] = {
     name: kind
     for name, kind in get_type_hints(RunRecord).items()
     if isinstance(kind, type) and issubclass(kind, Table)

@@ -5,7 +5,7 @@ It is built from points, triangles or rasters, and gives a height field for plan
 
 import math
 from dataclasses import dataclass, replace
-from typing import Final, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
@@ -20,9 +20,9 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 CellHeight = Literal["lowest", "median", "highest"]
 """Which of the points in a cell is its height."""
-_ROUNDS: Final = 2000
+_ROUNDS = 2000
 """Steps of the solver that fills holes, at most: of holes a thousand samples wide."""
-_QUANTILE: Final = {"lowest": 0.0, "median": 0.5, "highest": 1.0}
+_QUANTILE = {"lowest": 0.0, "median": 0.5, "highest": 1.0}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
 """Distance that paths keep from the obstacle of a world."""
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
@@ -10,11 +9,11 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import Obstacle
 from snakewalk.controller.terrain.path import SplinePath
 
-_SPACING_M: Final = 0.05
-_BEYOND_M: Final = 1.0
-_CROWDED: Final = 5.0
+_SPACING_M = 0.05
+_BEYOND_M = 1.0
+_CROWDED = 5.0
 """Additional cost of a metre on which the wave touches an obstacle, metres of path (ours)."""
-_FALL_M: Final = 0.1
+_FALL_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)

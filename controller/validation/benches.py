@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
@@ -41,7 +40,7 @@ _LAG_STEP_S = 2.5e-3
 _MOST_LAG_S = 0.4
 """Lags are searched in these steps and up to this limit, as in ``feetech-bench-figures``."""
 _SPIN_UP_S = 3.0
-_TRAJECTORIES: Final[dict[str, Callable[[Floats], Floats]]] = {
+_TRAJECTORIES: dict[str, Callable[[Floats], Floats]] = {
     "sin_sin": lambda t: np.sin(t) * np.pi / 2 + 0.5 * np.sin(5.0 * t) * np.sin(2.0 * t),
     "sin_time_square": lambda t: np.sin(t**2),
 }

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
@@ -18,7 +18,7 @@ from snakewalk.config.archive import parse_json
 from snakewalk.controller.motion.command import LATE_S
 from snakewalk.controller.view.dead_man import STALE_S, hold_command
 
-KEYS: Final = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
+KEYS = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
     12: "up",
     13: "down",
     14: "left",
@@ -26,23 +26,23 @@ KEYS: Final = {0: "n", 1: "m", 2: "p", 3: "d", 8: "space", 9: "q"} | {
 }
 """A, B, X, Y, select, start and cross of the standard gamepad (w3.org/TR/gamepad) to the keys of an
 ``Operator``."""
-STICK: Final = (("left", "right"), ("up", "down"))
+STICK = (("left", "right"), ("up", "down"))
 """Left stick: the keys at the low and at the high end of its axes."""
-DEAD_MAN: Final = (4, 5)
+DEAD_MAN = (4, 5)
 """Buttons of the dead man's switch: the shoulder buttons, left and right."""
-STOP: Final = (11, 16)
+STOP = (11, 16)
 """Stop buttons: the right stick pressed, and the button in the middle."""
-_HALF_DEFLECTION: Final = 0.5
-_MESSAGE_BYTES: Final = 2000
-_MESSAGES_S: Final = 100
+_HALF_DEFLECTION = 0.5
+_MESSAGE_BYTES = 2000
+_MESSAGES_S = 100
 """More messages in a second cannot come from our script: its line is closed (ours)."""
-_KEYS_MAX: Final = 100
-PATH: Final = "/gamepad"
+_KEYS_MAX = 100
+PATH = "/gamepad"
 """Path of the socket."""
 _PERIOD_MS, _KEEP_MS, _AGAIN_MS = 20, 100, 2000
 
 
-SCRIPT: Final = f"""(() => {{
+SCRIPT = f"""(() => {{
   let socket = null, waiting = false, last = "", sent = 0;
   const open = () => {{
     const line = new WebSocket(location.origin.replace(/^http/, "ws") + "{PATH}");

@@ -1,13 +1,12 @@
 """Commands of the page on their way to the run: each carries the time at which it began."""
 
 from collections.abc import Callable, Iterable
-from typing import Final
 
 from snakewalk.controller.motion.command import LATE_S, Refused
 from snakewalk.controller.motion.refusals import NAME_MAX
 from snakewalk.controller.view.dead_man import HOLD, DeadMan
 
-_MOST_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
 
 

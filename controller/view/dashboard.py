@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Final
 
 import numpy as np
 import viser
@@ -19,17 +18,17 @@ from snakewalk.controller.runlog.record import POSE_CHECK, Event, Header, RunRec
 from snakewalk.controller.runlog.topics import TABLES
 from snakewalk.controller.view.scene import contour_step_m
 
-SPAN_S: Final = 30.0
+SPAN_S = 30.0
 """Time span of the past that the curves show (ours)."""
-_POINTS: Final = 150
+_POINTS = 150
 """Points of a curve: more would only be sent."""
-_EVENTS: Final = 7
-_AMBIENT_C: Final = 20.0
-_LATE_CYCLES: Final = 3.0
+_EVENTS = 7
+_AMBIENT_C = 20.0
+_LATE_CYCLES = 3.0
 """Readings that are this number of cycles old are shown in another colour (ours)."""
-_SPEED: Final = Curve(Panel.SPEED, "centre of mass, mean of 2 s", "blue")
+_SPEED = Curve(Panel.SPEED, "centre of mass, mean of 2 s", "blue")
 _GOOD, _WARN, _BAD_COLOUR, _INK = colours.MEASURED, colours.WARNING, colours.FAULT, "#666"
-_LEVELS: Final = {"info": _INK, "warning": _WARN, "error": _BAD_COLOUR}
+_LEVELS = {"info": _INK, "warning": _WARN, "error": _BAD_COLOUR}
 
 
 class Dashboard:

@@ -3,15 +3,14 @@
 import math
 import time
 from collections.abc import Callable
-from typing import Final
 
-STALE_S: Final = 0.3
+STALE_S = 0.3
 """A gamepad that sends nothing for this time is not held (ours)."""
-_MOST_AHEAD_S: Final = 0.1
+_MOST_AHEAD_S = 0.1
 """A later time is not believed (ours): both processes read the same clock."""
-HOLD: Final = "pad="
+HOLD = "pad="
 """Begins a state of a gamepad."""
-WITHOUT: Final = "pad=none"
+WITHOUT = "pad=none"
 """Command that ends the need to hold a gamepad."""
 
 

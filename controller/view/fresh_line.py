@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit
 
 from websockets.asyncio.server import ServerConnection
@@ -21,10 +21,10 @@ from websockets.frames import DATA_OPCODES, Frame, Opcode
 
 from snakewalk.controller.motion.command import LATE_S
 
-_PERIOD_S: Final = 0.1
-_UNANSWERED_MAX: Final = 100
+_PERIOD_S = 0.1
+_UNANSWERED_MAX = 100
 """Pings without an answer (ours): a stalled connection gets no more."""
-_TRY_AGAIN: Final = 1013
+_TRY_AGAIN = 1013
 """Code of a closed connection."""
 
 

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from html import escape
 from queue import SimpleQueue
-from typing import Any, Final
+from typing import Any
 
 import viser
 
@@ -16,13 +16,13 @@ from snakewalk.controller.gaits.gait import Range, ranges
 from snakewalk.controller.gaits.registry import GAITS, make_gait
 from snakewalk.controller.motion.refusals import NAME_MAX
 
-_EVERY_S: Final = 0.2
+_EVERY_S = 0.2
 """A slider that is drawn along commands no more often (ours)."""
-_SETTLING_S: Final = 1.0
+_SETTLING_S = 1.0
 """An input shows the run's value this time after its last change: also a refusal (ours)."""
-_LAST: Final = 1e9
+_LAST = 1e9
 """Place in the tab below all inputs: no slip of the finger ends the run."""
-_BUTTONS: Final = {"halt, go on": "space", "defaults": "d"}
+_BUTTONS = {"halt, go on": "space", "defaults": "d"}
 """Keys of an ``Operator``."""
 
 

@@ -2,18 +2,17 @@
 
 from html import escape
 from queue import SimpleQueue
-from typing import Final
 
 import viser
 
 from snakewalk.controller.view.browser_gamepad import BrowserGamepad
 from snakewalk.controller.view.dead_man import WITHOUT
 
-_NO_GAMEPAD: Final = (
+_NO_GAMEPAD = (
     "No gamepad. Press a button of a gamepad at the computer of this browser; the browser "
     "reports it only then."
 )
-_STOP: Final = "right stick pressed: E-STOP"
+_STOP = "right stick pressed: E-STOP"
 
 
 class GamepadPanel:

@@ -17,7 +17,7 @@ from functools import partial
 from html import escape
 from http.cookies import CookieError, SimpleCookie
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 from urllib.parse import parse_qs, urlsplit
 
 import websockets.asyncio.server
@@ -26,18 +26,18 @@ from websockets.http11 import Request, Response
 
 from snakewalk.controller.view.fresh_line import FreshConnection, Freshness
 
-_LOCAL: Final = frozenset({"127.0.0.1", "localhost", "::1"})
-_ANY_ADDRESS: Final = frozenset({"0.0.0.0", "::"})
-_HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[\w.-]+)(:\d+)?")
-_ASK: Final = (
+_LOCAL = frozenset({"127.0.0.1", "localhost", "::1"})
+_ANY_ADDRESS = frozenset({"0.0.0.0", "::"})
+_HOST = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[\w.-]+)(:\d+)?")
+_ASK = (
     "<!doctype html><title>snakewalk</title><meta name=viewport content='width=device-width'>"
     "<body style='font:16px system-ui;margin:3em'><form><p>{}</p><input name=token autofocus "
     "type=password aria-label=token> <button>open</button></form>"
 )
-_CHECK_S: Final = 5.0
-_PAGES: Final = ("/", "/index.html")
-_WORKER: Final = "/stop.js"
-_WORKER_SCRIPT: Final = Path(__file__).with_name("end_worker.js").read_text(encoding="utf-8")
+_CHECK_S = 5.0
+_PAGES = ("/", "/index.html")
+_WORKER = "/stop.js"
+_WORKER_SCRIPT = Path(__file__).with_name("end_worker.js").read_text(encoding="utf-8")
 """Program of the browser that shows the end of a run without its server."""
 Serve = Callable[..., Any]
 

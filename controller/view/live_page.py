@@ -9,7 +9,7 @@ import sys
 from collections import defaultdict, deque
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import viser
 
@@ -48,15 +48,15 @@ from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.priority import give_way
 from snakewalk.drivers.safety.stop_button import PressedButton
 
-_PERIOD_S: Final = 0.05
+_PERIOD_S = 0.05
 """Time between two drawings of the body."""
-_SERVOS_S: Final = 0.2
-_CURVES_S: Final = 0.5
-_SILENT_S: Final = 0.5
+_SERVOS_S = 0.2
+_CURVES_S = 0.5
+_SILENT_S = 0.5
 """A run that sends nothing for this time may have ended."""
-_LAST_VERDICT_S: Final = 1.5
+_LAST_VERDICT_S = 1.5
 """Longest time for the verdict to reach the browsers."""
-_ROWS: Final = round(SPAN_S / _PERIOD_S)
+_ROWS = round(SPAN_S / _PERIOD_S)
 
 
 def serve(line: socket.socket, host: str, port: int) -> None:

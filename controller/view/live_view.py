@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
@@ -22,9 +21,9 @@ from snakewalk.controller.view.command_line import fresh_commands
 from snakewalk.controller.view.dead_man import DeadMan
 from snakewalk.controller.view.operators import OPERATOR_BACK, OPERATOR_LOST
 
-_PICTURE_S: Final = 0.5
+_PICTURE_S = 0.5
 """Pictures of a camera are shown no more often (ours)."""
-_QUALITY: Final = 70
+_QUALITY = 70
 
 
 class LiveView(ObserverProcess):

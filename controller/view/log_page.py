@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import viser
@@ -19,11 +18,11 @@ from snakewalk.controller.view.page_server import float_above, open_page
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.drivers.clock import Clock
 
-_PERIOD_S: Final = 0.05
-_CURVES_S: Final = 0.5
-_GAP_M: Final = 0.5
+_PERIOD_S = 0.05
+_CURVES_S = 0.5
+_GAP_M = 0.5
 """Gap between the grounds of two logs (ours)."""
-_SPEEDS: Final = ("0.25", "0.5", "1", "2", "5", "10")
+_SPEEDS = ("0.25", "0.5", "1", "2", "5", "10")
 
 
 class LogPage:

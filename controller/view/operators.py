@@ -1,15 +1,14 @@
 """Browsers that steer the run: without one, nobody is at its E-STOP."""
 
 from collections.abc import Callable
-from typing import Final
 
 from snakewalk.controller.runlog.row_line import SILENT_S, STEP_MAX_S
 
-_RECENT_S: Final = 2.0
+_RECENT_S = 2.0
 """Longest time from an input in a browser until its command is sent (ours)."""
-_TABS_MAX: Final = 1000
-OPERATOR_LOST: Final = "operator lost"
-OPERATOR_BACK: Final = "operator back"
+_TABS_MAX = 1000
+OPERATOR_LOST = "operator lost"
+OPERATOR_BACK = "operator back"
 """Lines that the page sends to the run."""
 
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 import trimesh
@@ -22,32 +21,32 @@ from snakewalk.controller.runlog.record import POSE_CHECK, Header, RunRecord
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.solids import Solid, solids
 
-_HEAD: Final = (205, 72, 12)
-_LINKS: Final = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
+_HEAD = (205, 72, 12)
+_LINKS = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
 """Two colours in turn, of the first run in a page and of the second."""
-_HOT: Final = (214, 32, 38)
-_GOAL: Final = rgb(colours.GOAL)
-_PATH: Final = rgb(colours.PATH)
-_OLD_PATH: Final = rgb(colours.GREY)
-_TRAIL: Final = rgb(colours.CENTRE)
-_WATER: Final = (140, 204, 235)
-_WAYPOINT: Final = rgb(colours.TO_COME)
-_REACHED_COLOUR: Final = rgb(colours.REACHED)
-_GROUND: Final = np.array([rgb(colours.LOWLAND), rgb(colours.HIGHLAND)])
+_HOT = (214, 32, 38)
+_GOAL = rgb(colours.GOAL)
+_PATH = rgb(colours.PATH)
+_OLD_PATH = rgb(colours.GREY)
+_TRAIL = rgb(colours.CENTRE)
+_WATER = (140, 204, 235)
+_WAYPOINT = rgb(colours.TO_COME)
+_REACHED_COLOUR = rgb(colours.REACHED)
+_GROUND = np.array([rgb(colours.LOWLAND), rgb(colours.HIGHLAND)])
 """Colours (ours); a link's hot at full current, the ground's from lowest to highest."""
-_CONTOUR: Final = (92, 84, 66)
-_CONTOUR_ABOVE_M: Final = 0.002
-_CONTOURS: Final = 12
+_CONTOUR = (92, 84, 66)
+_CONTOUR_ABOVE_M = 0.002
+_CONTOURS = 12
 """Most contours of a ground (ours)."""
-_LINE_HEIGHT_M: Final = 0.006
+_LINE_HEIGHT_M = 0.006
 """Height of lines above the ground, so that they are visible (ours)."""
 _GOAL_ABOVE, _GOAL_WIDTH = 1.4, 0.14
 """Height above the body's axis and thickness of the line of the goals, in radii of the body
 (ours)."""
-_LINE: Final = 3.0
-_FLOOR_M: Final = 12.0
+_LINE = 3.0
+_FLOOR_M = 12.0
 """Side of the piece of a flat floor that is drawn (ours)."""
-_TRAIL_POINTS: Final = 400
+_TRAIL_POINTS = 400
 _VISIBLE_M = 60.0
 _RAY_STEP_M = 0.02
 """Reach of a click, and the steps in which the ground is searched (ours)."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
@@ -21,12 +21,12 @@ from snakewalk.config import colours
 from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.operators import Operators
 
-_POLL_S: Final = 0.05
+_POLL_S = 0.05
 """Time between two looks at the state to be shown (ours)."""
-_BEAT_LOOKS: Final = 5
+_BEAT_LOOKS = 5
 """Looks after which a state is sent again: a browser reports 1 s without one."""
-_LATE_MAX: Final = 100
-_NAME_MAX: Final = 9
+_LATE_MAX = 100
+_NAME_MAX = 9
 """Length of a tab's name, or of an age in ms."""
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from html import escape
 from queue import SimpleQueue
-from typing import Final
 
 import viser
 
@@ -11,8 +10,8 @@ from snakewalk.config import colours
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.walk.live_course import ADD, CLEAR, END, NEXT
 
-_HINT: Final = "Shift and a click on the ground add a waypoint, too"
-_FAULT_COLOUR: Final = colours.FAULT
+_HINT = "Shift and a click on the ground add a waypoint, too"
+_FAULT_COLOUR = colours.FAULT
 
 
 class WaypointPanel:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Literal
 
 from snakewalk.config.servo_catalogue import servo_model, shipped_models
 from snakewalk.drivers.bus.feetech_bus import FeetechBus
@@ -21,7 +21,7 @@ _TURN_S = 0.3e-3
 _SETTLE_S = 0.03
 _TRIES = 3
 """Tries of a read from a servo that replied to a ping (ours)."""
-_ORDERS: Final[dict[int, Literal["little", "big"]]] = {0: "little", 1: "big"}
+_ORDERS: dict[int, Literal["little", "big"]] = {0: "little", 1: "big"}
 """Orders of the bytes of a value, by the content of register 2."""
 
 

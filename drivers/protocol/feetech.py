@@ -8,7 +8,6 @@ Source: Feetech, "Servo SCS Communication Protocol", and the memory tables of ST
 
 from collections.abc import Mapping
 from enum import IntEnum, IntFlag
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +78,7 @@ class FeetechAlarm(IntFlag):
     OVERLOAD = 0x20
 
 
-_ALARMS: Final[Mapping[int, int]] = {
+_ALARMS: Mapping[int, int] = {
     FeetechAlarm.VOLTAGE: Alarm.INPUT_VOLTAGE,
     FeetechAlarm.ENCODER: Alarm.MOTOR_ENCODER,
     FeetechAlarm.OVERHEATING: Alarm.OVERHEATING,

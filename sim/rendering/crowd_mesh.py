@@ -6,7 +6,6 @@ level are one MuJoCo skin; only the faces in use are drawn.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -19,7 +18,7 @@ from snakewalk.sim.rendering.shade import DARK, under_sun
 
 MESHES = ((7, 4), (13, 6), (33, 12))
 """Rings and sides of a body at each level, farthest first (ours)."""
-COLOURS: Final[tuple[tuple[Rgba, Rgba], ...]] = (
+COLOURS: tuple[tuple[Rgba, Rgba], ...] = (
     ((0.80, 0.56, 0.20, 1), (0.36, 0.22, 0.11, 1)),
     ((0.42, 0.55, 0.24, 1), (0.20, 0.27, 0.12, 1)),
     ((0.62, 0.30, 0.22, 1), (0.28, 0.13, 0.10, 1)),

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -13,15 +12,15 @@ from snakewalk.config.colours import rgba
 from snakewalk.config.heightfield import HeightField
 
 Rgba = tuple[float, float, float, float]
-PATH: Final[Rgba] = rgba(colours.PATH)
+PATH: Rgba = rgba(colours.PATH)
 """Colour of the path that the run follows."""
-FORMER: Final[Rgba] = rgba(colours.PATH, 0.35)
+FORMER: Rgba = rgba(colours.PATH, 0.35)
 """Colour of a path that another one replaced."""
-TRAIL: Final[Rgba] = rgba(colours.HEAD)
+TRAIL: Rgba = rgba(colours.HEAD)
 """Colour of the trail of the head."""
-CENTRE: Final[Rgba] = rgba(colours.CENTRE)
+CENTRE: Rgba = rgba(colours.CENTRE)
 """Colour of the trail of the body's centre."""
-AXES: Final[tuple[Rgba, Rgba]] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
+AXES: tuple[Rgba, Rgba] = ((0.80, 0.12, 0.12, 1), (0.10, 0.50, 0.15, 1))
 """Colours of the world's x and y axes."""
 AXES_GEOMS = 5
 _AXES_SAMPLES = 9

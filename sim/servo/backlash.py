@@ -6,8 +6,6 @@ without the motor. When the gap closes, both continue with their common momentum
 rebound; Moreau, "Unilateral contact and dry friction in finite freedom dynamics", 1988).
 """
 
-from typing import Final
-
 from snakewalk.config.arrays import Floats
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.servo.motor import friction_n_m
@@ -21,11 +19,11 @@ KICK = 3
 KICKED = 4
 """Rows of a MuJoCo joint besides: speed by which the rotor was faster when the gap closed, until it
 acts, and until it is taken into account."""
-BACKLASH: Final = 12
+BACKLASH = 12
 """Row of the backlash among the fields of a ``Gearbox``."""
-WHEEL_SHARE: Final = 0.02
+WHEEL_SHARE = 0.02
 """Share of the armature on the shaft's side of the gap: the last wheel (ours)."""
-LEAST_ROTOR_KG_M2: Final = 1e-7
+LEAST_ROTOR_KG_M2 = 1e-7
 """Inertia of a rotor whose gearbox has none (ours)."""
 
 

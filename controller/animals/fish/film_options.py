@@ -1,6 +1,6 @@
 """Options of a film of a fish, on the command line and in Python."""
 
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 from pydantic import Field
@@ -16,7 +16,7 @@ Build = Annotated[
         autocompletion=completion.words("carp", "eel"),
     ),
 ]
-BUILD: Final = "carp"
+BUILD = "carp"
 
 
 class FishFilmOptions(Strict):

@@ -7,7 +7,6 @@ the angle between the skin and the camera. If none sees it, the picture is mirro
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -16,19 +15,19 @@ from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.controller.animals.mesh.body_model import BodyModel
 from snakewalk.controller.animals.mesh.skin_texture import ALONG, colours_across
 
-AROUND: Final = 256
+AROUND = 256
 """Rows of a picture around the body, from the belly over the right side and the back."""
-VIEWS: Final = {"left": 0.0, "top": 0.5 * math.pi, "right": math.pi, "below": -0.5 * math.pi}
+VIEWS = {"left": 0.0, "top": 0.5 * math.pi, "right": math.pi, "below": -0.5 * math.pi}
 """Directions from the body to the camera, angles around the body: 0 is its left side."""
-_GRAZING: Final = math.cos(math.radians(75.0))
+_GRAZING = math.cos(math.radians(75.0))
 """Least cosine between the skin and the camera at which a photograph shows it (ours)."""
-_LEAST_COMPARED_COSINE: Final = math.cos(math.radians(65.0))
+_LEAST_COMPARED_COSINE = math.cos(math.radians(65.0))
 """Least cosine at which brightnesses are compared (ours)."""
-_LEAST_COMMON_POINTS: Final = 200
+_LEAST_COMMON_POINTS = 200
 """Least number of points that two photographs show, to compare their brightness (ours)."""
-_TONES: Final = (8.0, 247.0)
+_TONES = (8.0, 247.0)
 """Values that are neither black nor overexposed."""
-_FEATHER: Final = 1e-4
+_FEATHER = 1e-4
 """Weight of a mirrored point over a seen one: it fades in where the seen one fades out."""
 
 

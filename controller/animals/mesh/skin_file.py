@@ -6,7 +6,7 @@ has y up: one node above the bones turns the world.
 
 import io
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import pygltflib
@@ -19,9 +19,9 @@ from snakewalk.controller.animals.mesh.rig import Rig
 from snakewalk.controller.images.mesh_files import SKIN_RGB
 from snakewalk.controller.track.bone_motion import BoneMotion
 
-MOST_BONES: Final = 256
+MOST_BONES = 256
 """Bones count in bytes."""
-Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _ROOT_QUATERNION = [-float(np.sqrt(0.5)), 0.0, 0.0, float(np.sqrt(0.5))]
 _STILL_SHARE = 1e-6
 """Share of the body's length: a bone that moves less relative to the one before does not slide."""

@@ -6,7 +6,6 @@ stature (ours). A limb begins with a curve on the trunk's surface, as in the pap
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,11 +27,11 @@ from snakewalk.controller.animals.people.skeleton import (
     PersonSkeleton,
 )
 
-AROUND: Final = 32
+AROUND = 32
 """Points of a curve, from the front over the left."""
-_V: Final = np.arange(AROUND) * TURN / AROUND
+_V = np.arange(AROUND) * TURN / AROUND
 
-TRUNK: Final = (
+TRUNK = (
     # height, half width, half depth, middle ahead of the pelvis
     (1.000, 0.000, 0.000, 0.000), (0.993, 0.024, 0.030, -0.002), (0.975, 0.038, 0.048, 0.000),
     (0.950, 0.0435, 0.056, 0.002), (0.930, 0.044, 0.057, 0.003), (0.912, 0.0425, 0.054, 0.005),
@@ -43,9 +42,9 @@ TRUNK: Final = (
     (0.575, 0.087, 0.060, -0.003), (0.535, 0.095, 0.066, -0.007), (0.503, 0.092, 0.064, -0.008),
     (0.478, 0.066, 0.048, -0.006), (0.463, 0.030, 0.028, -0.004), (0.458, 0.000, 0.000, -0.003),
 )  # fmt: skip
-NOSE: Final = {0.930: 0.002, 0.912: 0.011, 0.900: 0.007}
+NOSE = {0.930: 0.002, 0.912: 0.011, 0.900: 0.007}
 """Height of the nose over the face, at the stations that have it."""
-LEG: Final = (
+LEG = (
     # height, half width, half depth, middle ahead of the hip, share of the upper bone
     (0.480, 0.0485, 0.064, -0.006, 0.45), (0.445, 0.0495, 0.060, -0.004, 0.80),
     (0.400, 0.047, 0.055, -0.001, 1.0),
@@ -56,7 +55,7 @@ LEG: Final = (
     (0.039, 0.019, 0.023, -0.002, -0.5), (0.026, 0.016, 0.020, -0.002, -1.0),
 )  # fmt: skip
 """A share below 0 is that of the foot; the rest is the shank's."""
-ARM: Final = (
+ARM = (
     # distance from the shoulder, half thickness, half breadth, share of the forearm, of the hand
     (0.030, 0.030, 0.034, 0.0, 0.0), (0.065, 0.0295, 0.033, 0.0, 0.0),
     (0.110, 0.026, 0.029, 0.0, 0.0), (0.155, 0.0225, 0.025, 0.0, 0.0),
@@ -66,7 +65,7 @@ ARM: Final = (
     (0.380, 0.012, 0.023, 0.0, 1.0), (0.405, 0.010, 0.019, 0.0, 1.0),
     (0.422, 0.006, 0.011, 0.0, 1.0), (0.428, 0.0, 0.0, 0.0, 1.0),
 )  # fmt: skip
-SHOE: Final = (
+SHOE = (
     # ahead of the ankle, half width, height
     (HEEL, 0.000, 0.028), (-0.031, 0.014, 0.046), (-0.016, 0.0195, 0.056), (0.008, 0.020, 0.058),
     (0.036, 0.0215, 0.046), (0.058, 0.0245, 0.037), (BALL, 0.026, 0.031), (0.095, 0.0235, 0.026),

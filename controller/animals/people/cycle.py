@@ -17,7 +17,6 @@ initial height for half of the cycle.
 """
 
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -99,9 +98,9 @@ def feet(law: FeetLaw, given: FootParameters, phase: Floats) -> Feet:
     return Feet(ahead, height, foot_phase, (height <= low).astype(float), 0.5)
 
 
-REACH: Final = 0.998
+REACH = 0.998
 """Largest extension of a leg over its length (ours)."""
-FRAMES: Final = 24
+FRAMES = 24
 """Poses of a cycle ([GC] 3)."""
 
 
@@ -138,7 +137,7 @@ class PersonGait:
     """Share of the cycle since a foot came down, and its pitch; above 0 the toes are up."""
 
 
-WALK: Final = PersonGait(
+WALK = PersonGait(
     name="walk", cycle_s=1.08, height=0.022, length=0.228, duty=0.62, middle=-0.046, side=0.036,
     bob=-0.0075, lean=2.0, turn=6.0, drop=3.5, arm=(4.0, 19.0), elbow=(17.0, 9.0), spread=8.0,
     pitch=((0.0, 18.0), (0.09, 0.0), (0.34, 0.0), (0.41, -0.7), (0.50, -10.0), (0.62, -58.0),
@@ -149,14 +148,14 @@ WALK: Final = PersonGait(
 Middle, rise and pitch are fitted to the knee angles of the same book: the leg stretches behind the
 hip until 50 % of a cycle, while the heel rises.
 """
-RUN: Final = PersonGait(
+RUN = PersonGait(
     name="run", cycle_s=0.72, height=0.060, length=0.215, duty=0.35, middle=-0.050, side=0.022,
     bob=0.020, lean=9.0, turn=8.0, drop=3.0, arm=(12.0, 34.0), elbow=(108.0, 14.0), spread=14.0,
     pitch=((0.0, 6.0), (0.05, 0.0), (0.16, 0.0), (0.26, -28.0), (0.35, -58.0), (0.50, -98.0),
            (0.66, -70.0), (0.82, -12.0), (0.93, 6.0)),
 )  # fmt: skip
 """A run at 3 m/s: 35 % of a cycle on the ground."""
-GAITS: Final = dict(zip(MOTIONS, (WALK, RUN), strict=True))
+GAITS = dict(zip(MOTIONS, (WALK, RUN), strict=True))
 
 
 @dataclass(frozen=True, slots=True)

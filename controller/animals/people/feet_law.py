@@ -1,9 +1,8 @@
 """Names of the motions of people, and of the equations of their feet."""
 
 from enum import StrEnum
-from typing import Final
 
-MOTIONS: Final = ("walk", "run")
+MOTIONS = ("walk", "run")
 
 
 class FeetLaw(StrEnum):

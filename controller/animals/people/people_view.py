@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -16,14 +15,14 @@ from snakewalk.sim.rendering.figure_view import FigureView, OrbitCamera
 from snakewalk.sim.rendering.looks import SkinLook
 from snakewalk.sim.rendering.movie_file import MovieFile
 
-FPS: Final = 25
-FILM_PX: Final = (960, 540)
-STAGE_PX: Final = (460, 600)
-STAGES: Final = 8
+FPS = 25
+FILM_PX = (960, 540)
+STAGE_PX = (460, 600)
+STAGES = 8
 """Pictures of a cycle."""
-_DISTANCE_ASIDE: Final = 0.36
+_DISTANCE_ASIDE = 0.36
 """Distance of person and mesh from the middle plane, in shares of the stature."""
-_CLOTH: Final = (128, 132, 146)
+_CLOTH = (128, 132, 146)
 """Colour of a mesh without a texture."""
 
 

@@ -6,33 +6,32 @@ The arms are held away from the body, which keeps their curves off the trunk.
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
 
-THIGH: Final = 0.245
-SHANK: Final = 0.246
-ANKLE: Final = 0.039
+THIGH = 0.245
+SHANK = 0.246
+ANKLE = 0.039
 """Height of the ankle over the sole."""
-FOOT: Final = 0.152
+FOOT = 0.152
 """Length of a foot."""
-UPPER_ARM: Final = 0.186
-FOREARM: Final = 0.146
-HAND: Final = 0.108
-HIP_SIDE: Final = 0.052
+UPPER_ARM = 0.186
+FOREARM = 0.146
+HAND = 0.108
+HIP_SIDE = 0.052
 """Distance of a hip from the middle plane (ours)."""
-SHOULDER: Final = (-0.006, 0.112, 0.795)
+SHOULDER = (-0.006, 0.112, 0.795)
 """Centre of the left shoulder (ours): below the acromion, whose height is 0.818."""
-HEEL: Final = -0.035
+HEEL = -0.035
 """Rearmost place of the foot, ahead of the ankle (ours)."""
-BALL: Final = 0.075
+BALL = 0.075
 """Place where the toes bend, ahead of the ankle (ours)."""
-ABDUCTION_RAD: Final = 0.42
+ABDUCTION_RAD = 0.42
 """Angle of the arms at rest from the vertical (ours)."""
 
-BONES: Final = (
+BONES = (
     ("pelvis", -1),
     ("waist", 0),
     ("chest", 1),
@@ -54,7 +53,7 @@ BONES: Final = (
     ("right toes", 17),
 )
 """Name and parent of each bone."""
-INDEX: Final = {name: k for k, (name, _) in enumerate(BONES)}
+INDEX = {name: k for k, (name, _) in enumerate(BONES)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ A marker is a square of ArUco's smallest dictionary: at a side of 16 px a cell h
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,22 +15,22 @@ from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.lens import Lens, projected
 
-DICTIONARY: Final = "DICT_4X4_50"
-COUNT: Final = 50
+DICTIONARY = "DICT_4X4_50"
+COUNT = 50
 """Numbers of markers are below."""
-FEWEST: Final = 4
+FEWEST = 4
 """Markers that fix a floor."""
-_CELLS: Final = 6  # across a marker, its black border included
-_LARGER: Final = 2  # enlargement of the picture for the search: cells of 2 px (ours)
-_INCH_M: Final = 0.0254
-_DRAWN: Final = 6, 24  # px per cell of the print fitted to a picture, least and most
-_STEPS: Final = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
-_SMOOTH: Final = 3  # px of the smoothing before a print is fitted
-_FURTHEST_CORNER: Final = 0.5  # of a cell: largest correction of a corner (ours)
-_AGREE_PX: Final = 1.5  # largest residual of a marker that moved with the picture (ours)
-_FEWEST_MOVED: Final = 3  # markers seen before and now, for the picture's move
-_TURNED_CAMERA_PX: Final = 0.5  # largest residual of a purely rotated camera (ours)
-_LEAST_SPREAD: Final = 0.05  # of markers' places: less is a line
+_CELLS = 6  # across a marker, its black border included
+_LARGER = 2  # enlargement of the picture for the search: cells of 2 px (ours)
+_INCH_M = 0.0254
+_DRAWN = 6, 24  # px per cell of the print fitted to a picture, least and most
+_STEPS = cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 1e-4
+_SMOOTH = 3  # px of the smoothing before a print is fitted
+_FURTHEST_CORNER = 0.5  # of a cell: largest correction of a corner (ours)
+_AGREE_PX = 1.5  # largest residual of a marker that moved with the picture (ours)
+_FEWEST_MOVED = 3  # markers seen before and now, for the picture's move
+_TURNED_CAMERA_PX = 0.5  # largest residual of a purely rotated camera (ours)
+_LEAST_SPREAD = 0.05  # of markers' places: less is a line
 Markers = Mapping[int, Floats]
 """Corners (4, 2) of each marker by its number, pixels, the upper left of the print first."""
 

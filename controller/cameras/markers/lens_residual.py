@@ -7,7 +7,6 @@ it only if it is significant.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -17,15 +16,15 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.cameras.lens import projected
 from snakewalk.controller.cameras.markers.floor_markers import FEWEST, Markers, middle_of
 
-_CORNER_PX: Final = 0.3  # standard deviation of a corner (ours)
-_PLACE_M: Final = 0.004  # of a marker's measured place, per coordinate (ours)
-_SIDE: Final = 0.02  # of the side of all prints, as a share (ours)
-_SURE_SIGMAS: Final = 3.0  # standard deviations of the coefficient from 0 (ours)
-_STARTS: Final = 0.0, 0.1  # of the coefficient: strong distortion has a second minimum (ours)
-_GRID: Final = 9  # points across the picture for the error
-_SQUARE: Final = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
-_SPAN_M: Final = 1.0  # of floor over which a distortion rotates a body (ours)
-NOTICEABLE_M: Final = 0.005
+_CORNER_PX = 0.3  # standard deviation of a corner (ours)
+_PLACE_M = 0.004  # of a marker's measured place, per coordinate (ours)
+_SIDE = 0.02  # of the side of all prints, as a share (ours)
+_SURE_SIGMAS = 3.0  # standard deviations of the coefficient from 0 (ours)
+_STARTS = 0.0, 0.1  # of the coefficient: strong distortion has a second minimum (ours)
+_GRID = 9  # points across the picture for the error
+_SQUARE = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
+_SPAN_M = 1.0  # of floor over which a distortion rotates a body (ours)
+NOTICEABLE_M = 0.005
 """A smaller error of a place on the floor is not reported."""
 
 

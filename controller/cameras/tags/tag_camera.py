@@ -9,7 +9,7 @@ import queue
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -29,11 +29,11 @@ from snakewalk.controller.pose.sample import turned
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.types import BodyPose
 
-_CELL_PX: Final = 12
-_BACKGROUND: Final = 110
-_BLUR_PX: Final = 0.7
-_NOISE: Final = 3.0
-_LEAST_FACING: Final = 0.1
+_CELL_PX = 12
+_BACKGROUND = 110
+_BLUR_PX = 0.7
+_NOISE = 3.0
+_LEAST_FACING = 0.1
 """Least cosine between the normal of a tag and the direction to the lens."""
 
 
@@ -130,7 +130,7 @@ def _window(to_picture: Floats, side_px: int, shape: tuple[int, ...]) -> tuple[i
     return int(left), int(top), int(right), int(low)
 
 
-_POLL_S: Final = 0.02
+_POLL_S = 0.02
 
 
 class TagPictures(Protocol):

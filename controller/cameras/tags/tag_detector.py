@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,7 +12,7 @@ from snakewalk.config.errors import InputError
 
 Corners = Mapping[int, Floats]
 """Corners (4, 2) of each tag by its number, pixels: upper left of the print first, clockwise."""
-_LEAST_SIDE_PX: Final = 8.0
+_LEAST_SIDE_PX = 8.0
 """Tags with a shorter side are left out: their numbers are guesses (ours)."""
 
 

@@ -9,7 +9,6 @@ then give the pose by least squares, with its covariance.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import cv2
 import numpy as np
@@ -24,15 +23,15 @@ from snakewalk.controller.pose.sample import turned
 from snakewalk.drivers.attitude import rotation_by
 from snakewalk.drivers.types import BodyPose
 
-_TRIED_TAGS: Final = 3
+_TRIED_TAGS = 3
 """Tags whose poses are tried, the largest in the picture first (ours)."""
-_MISFIT: Final = 6.0
+_MISFIT = 6.0
 """A tag farther off than this many standard deviations is left out (ours)."""
-_AMBIGUOUS: Final = 2.0
+_AMBIGUOUS = 2.0
 """Poses whose errors differ by a smaller factor are ambiguous (ours)."""
-_ROUNDS: Final = 3
-_ROBUST_ROUNDS: Final = 10
-_LEAST_DEPTH_M: Final = 0.02
+_ROUNDS = 3
+_ROBUST_ROUNDS = 10
+_LEAST_DEPTH_M = 0.02
 """Least distance ahead of the lens (ours)."""
 _JOINT_SD_M, _JOINT_SD_RAD = 1e-3, 5e-3
 """Error of the chain that all corners share: backlash and mounting (ours)."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final, Self
+from typing import Self
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from snakewalk.controller.cameras.lens import Lens
 from snakewalk.controller.cameras.tags.tag_detector import Corners
 from snakewalk.controller.pose.sample import turned
 
-_MISFIT_PX: Final = 4.0
+_MISFIT_PX = 4.0
 """Largest error of fixed tags by which a camera's place is found (ours)."""
 
 

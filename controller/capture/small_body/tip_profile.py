@@ -4,8 +4,6 @@ The sum is the width times the contrast, whatever the blur. A pointed tail falls
 contrast, or below the noise, before it ends. The profile is continued in a straight line to 0.
 """
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
@@ -39,7 +37,7 @@ _MOST_DOUBT_PX = 2.0
 _INNER_POINT = 4  # chords from a tip: its direction
 _SIGMA_SHARE = 0.7  # standard deviation of a tip, of its distance from the end of its profile
 # (constants measured on rendered films)
-NO_ENDS: Final = np.full((2, 3), np.nan)
+NO_ENDS = np.full((2, 3), np.nan)
 """Ends of a frame without a body."""
 
 

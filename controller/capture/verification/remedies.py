@@ -3,7 +3,6 @@
 import shlex
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -14,10 +13,10 @@ from snakewalk.controller.capture.opened_film import OpenedFilm
 from snakewalk.controller.capture.several.animal_films import share_of_several
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector, whole_share
 
-_FRAMES: Final = 20
-_THRESHOLDS: Final = (0.4, 0.6, 1.6)  # of the contrast at the boundary
-_LEAST_GAIN: Final = 0.25  # of the frames: this share more must show a whole animal
-_LEAST_SHARE: Final = 0.5  # of the frames, at least
+_FRAMES = 20
+_THRESHOLDS = (0.4, 0.6, 1.6)  # of the contrast at the boundary
+_LEAST_GAIN = 0.25  # of the frames: this share more must show a whole animal
+_LEAST_SHARE = 0.5  # of the frames, at least
 
 
 def remedy(options: CaptureOptions, film: OpenedFilm, detector: BodyDetector) -> str | None:

@@ -2,7 +2,6 @@
 
 import re
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import ANGLES_RAD, TIMES_S
@@ -17,10 +16,10 @@ from snakewalk.controller.motion.joint_motion import (
     time_unit,
 )
 
-_TIME: Final = re.compile("(?:time|t|timestamp)(?:_(s|ms|us|ns))?|(s)econds")
+_TIME = re.compile("(?:time|t|timestamp)(?:_(s|ms|us|ns))?|(s)econds")
 """Name of the column of time, and the unit that it states."""
-_MIDLINE_COLUMNS: Final = {"frame", "point", "frame_idx", "scorer"}
-_UNIT: Final = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
+_MIDLINE_COLUMNS = {"frame", "point", "frame_idx", "scorer"}
+_UNIT = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
 
 
 @plugin("joints", "csv")

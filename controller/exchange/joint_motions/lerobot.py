@@ -6,7 +6,7 @@ episodes in one file.
 
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from snakewalk.controller.motion.joint_motion import (
     radians,
 )
 
-_FEATURES: Final = ("observation.state", "action")
+_FEATURES = ("observation.state", "action")
 
 
 @plugin("joints", "lerobot")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,9 @@ from snakewalk.controller.motion.joint_motion import (
 )
 from snakewalk.controller.motion.parted_recording import gaps
 
-_STATE: Final = "sensor_msgs/msg/JointState"
-_TRAJECTORY: Final = "trajectory_msgs/msg/JointTrajectory"
-_MAGIC: Final = b"\x89MCAP0\r\n"
+_STATE = "sensor_msgs/msg/JointState"
+_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+_MAGIC = b"\x89MCAP0\r\n"
 
 
 @plugin("joints", "ros2")

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Final, Literal
+from typing import Literal
 
 import mujoco
 import numpy as np
@@ -12,11 +12,11 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 
-_ON_AXIS: Final = 0.2
+_ON_AXIS = 0.2
 """Distance of a wheel's centre of mass from its axis over its distance from the link's (ours)."""
 
 
-_STRAIGHT_SHARE: Final = 0.9
+_STRAIGHT_SHARE = 0.9
 """Distance of a spine's ends over the way along its joints (ours)."""
 
 

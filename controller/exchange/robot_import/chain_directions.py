@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
 
 import numpy as np
 
@@ -11,9 +10,9 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.exchange.robot_import.body_tree import Hinge
 
-ROUNDED_RAD: Final = 0.01
+ROUNDED_RAD = 0.01
 """Angle by which neighbouring axes may miss 0 or 90 degrees: 1.57 misses by 0.0008 (ours)."""
-TOLD_RAD: Final = 1e-6
+TOLD_RAD = 1e-6
 """Smaller deviations are not reported (ours)."""
 
 

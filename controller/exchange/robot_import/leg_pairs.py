@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -14,11 +13,11 @@ from snakewalk.controller.exchange.robot_import.body_tree import BodyTree, Branc
 from snakewalk.controller.exchange.robot_import.chain_directions import ROUNDED_RAD, ChainDirections
 from snakewalk.controller.exchange.robot_import.link_figures import LinkFigures
 
-_LEG_TOLERANCE: Final = 0.02
+_LEG_TOLERANCE = 0.02
 """Share of a leg's reach that a joint may be off the straight leg (ours)."""
-_MOST_JOINTS: Final = 4
-_LARGEST_RANGE_RAD: Final = 3.05
-_FOOT_M: Final = 0.012
+_MOST_JOINTS = 4
+_LARGEST_RANGE_RAD = 3.05
+_FOOT_M = 0.012
 """Radius of a foot that no shape states: that of a robot file."""
 
 

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -13,22 +12,22 @@ from snakewalk.controller.exchange.robot_import.body_tree import BodyTree
 from snakewalk.controller.exchange.robot_import.chain_directions import ChainDirections
 from snakewalk.controller.exchange.robot_import.model_source import ModelSource
 
-_LINE_TOLERANCE: Final = 1e-3
+_LINE_TOLERANCE = 1e-3
 """Share of the body's length that a joint may be off the line of the others (ours)."""
-_SHORTEST_LINK_M: Final = 0.005
+_SHORTEST_LINK_M = 0.005
 """Length of a link that a robot file accepts."""
-_SHAPE_TOLERANCE: Final = 2e-3
+_SHAPE_TOLERANCE = 2e-3
 """Difference of two links' shapes, over their length, that counts as the same shape (ours)."""
-_LENGTH_TOLERANCE: Final = 1e-6
+_LENGTH_TOLERANCE = 1e-6
 """Difference of two lengths that a cylinder's centre and inertia state (ours)."""
-_SPREAD: Final = 0.2
+_SPREAD = 0.2
 """Difference of an inertia that is reported (ours)."""
-_POINT: Final = 1e-3
+_POINT = 1e-3
 """Below this, the inertia is that of a point, which stands for a missing shape (ours)."""
 _THINNEST = 0.05
 _THICKEST = 1.0
 """Radius over length of a mean link: an inertia that asks for another is a placeholder (ours)."""
-_ASSUMED_RADIUS: Final = 0.4
+_ASSUMED_RADIUS = 0.4
 """Radius over length of links without a stated thickness (ours)."""
 
 

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.errors import Assumptions, InputError
 from snakewalk.controller.exchange.robot_import.model_source import (
@@ -18,7 +17,7 @@ from snakewalk.controller.exchange.robot_import.model_source import (
     parse,
 )
 
-_NOT_READ: Final = frozenset(
+_NOT_READ = frozenset(
     {
         "option",
         "size",
@@ -38,15 +37,15 @@ _NOT_READ: Final = frozenset(
         "extension",
     }
 )
-_SILENT: Final = frozenset({"option", "size", "visual", "statistic"})
+_SILENT = frozenset({"option", "size", "visual", "statistic"})
 """Elements that do not describe the robot."""
-_OLD_ATTRIBUTES: Final = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
+_OLD_ATTRIBUTES = {"compiler": ("convexhull", "exactmeshinertia", "coordinate")}
 """Attributes of older MuJoCo versions that this one does not know."""
-_FILES: Final = ("file",)
-_MOST_INCLUDES: Final = 50
-_ROLLER: Final = re.compile(r"roller\d+")
+_FILES = ("file",)
+_MOST_INCLUDES = 50
+_ROLLER = re.compile(r"roller\d+")
 """Name of a body that an exported robot rolls on."""
-_MARK_M: Final = "0.0001"
+_MARK_M = "0.0001"
 """Radius of the ball that carries a missing mesh's mass."""
 
 

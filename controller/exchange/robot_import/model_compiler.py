@@ -4,7 +4,6 @@ import shutil
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
 
 import mujoco
 
@@ -24,8 +23,8 @@ from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 _MOST_MEMORY_BYTES = 2_000_000_000
 _MOST_CPU_S = 10
 """Limits of MuJoCo's compiler and of xacro: memory and CPU time (ours)."""
-_REPORTED_EXIT: Final = 3
-_LIMITS: Final = """
+_REPORTED_EXIT = 3
+_LIMITS = """
 import sys
 *words, memory_bytes, cpu_s = sys.argv[1:]
 try:
@@ -36,7 +35,7 @@ else:
     for which, most in (("AS", memory_bytes), ("CPU", cpu_s), ("FSIZE", memory_bytes)):
         resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
 """
-_COMPILER: Final = f"""{_LIMITS}
+_COMPILER = f"""{_LIMITS}
 source, made = words
 import mujoco
 try:
@@ -45,7 +44,7 @@ except (ValueError, RuntimeError, MemoryError) as error:
     print(error or type(error).__name__)
     sys.exit({_REPORTED_EXIT})
 """
-_XACRO: Final = f"""{_LIMITS}
+_XACRO = f"""{_LIMITS}
 import xacro
 sys.argv = words
 xacro.main()

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 from xml.etree import ElementTree as ET
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
@@ -12,14 +11,14 @@ from xml.sax.saxutils import quoteattr
 from snakewalk.config.archive import read_bytes
 from snakewalk.config.errors import InputError
 
-MOST_BYTES: Final = 20_000_000
+MOST_BYTES = 20_000_000
 """Size of a model's file (ours)."""
-MOST_PARTS: Final = 1000
+MOST_PARTS = 1000
 """Bodies and joints of a model (ours)."""
-_DEEPEST_NESTING: Final = 600
+_DEEPEST_NESTING = 600
 """Depth of elements (ours)."""
-_DECLARATION: Final = re.compile(r"^\s*<\?xml[^>]*\?>")
-_LINE: Final = re.compile(r"\bline (\d+)")
+_DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
+_LINE = re.compile(r"\bline (\d+)")
 
 
 class LineElement(ET.Element):

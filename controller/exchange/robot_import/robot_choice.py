@@ -1,6 +1,6 @@
 """Facts about a robot model that its file may not state."""
 
-from typing import Annotated, Final
+from typing import Annotated
 
 from pydantic import Field
 
@@ -25,5 +25,5 @@ class RobotChoice(Answers):
     )
 
 
-NOTHING: Final = RobotChoice()
+NOTHING = RobotChoice()
 """Choice of nothing: the model states all."""

@@ -9,7 +9,6 @@ changes no motion.
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 import mujoco
 import numpy as np
@@ -42,15 +41,15 @@ from snakewalk.controller.exchange.robot_import.robot_choice import NOTHING, Rob
 from snakewalk.controller.kinematics.links import body_in_world, chain_points_m
 from snakewalk.drivers.types import BodyPose
 
-_LARGEST_RANGE_RAD: Final = 3.05
+_LARGEST_RANGE_RAD = 3.05
 """Half range of a joint that may turn for ever: a servo in position mode knows one turn."""
-_NEXT_TO_NOTHING_KG: Final = 2e-4
+_NEXT_TO_NOTHING_KG = 2e-4
 """Mass of a link between two hinges of one body (ours): physics needs a mass."""
-_POSES: Final = 20
+_POSES = 20
 _TORQUE_N_M = (0.1, 100.0)
 _PLAUSIBLE_SPEEDS_RAD_S = (0.1, 20.0)
 """Limits of torque and speed beyond which a stated limit is a placeholder (ours)."""
-_HELD_SHARE: Final = 2.0 / 2.3
+_HELD_SHARE = 2.0 / 2.3
 """Share of a servo's stall torque, up to which a run goes on: as for its current (ours)."""
 _LENGTH_M = (0.0, 1.0)
 _MASS_KG = (0.0001, 20.0)
@@ -294,7 +293,7 @@ def _plan_limits(
     return keys
 
 
-_DEGREES: Final = 4.0 * math.pi, 360.0
+_DEGREES = 4.0 * math.pi, 360.0
 """Half ranges that may be degrees: over two turns in radians, and at most one in degrees (ours)."""
 
 

@@ -5,7 +5,6 @@ Python package on PyPI, and MuJoCo reads no SDF.
 """
 
 from pathlib import Path
-from typing import Final
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -21,9 +20,9 @@ from snakewalk.controller.exchange.robot_import.model_source import (
     numbers,
 )
 
-_MODEL: Final = "__model__"
-_ONE_FILE: Final = "write it as one model, for example by: gz sdf -p FILE > FLAT.sdf"
-_SHAPES: Final = {
+_MODEL = "__model__"
+_ONE_FILE = "write it as one model, for example by: gz sdf -p FILE > FLAT.sdf"
+_SHAPES = {
     "box": {"size": "size"},
     "cylinder": {"radius": "radius", "length": "length"},
     "capsule": {"radius": "radius", "length": "length"},
@@ -31,9 +30,9 @@ _SHAPES: Final = {
     "mesh": {"filename": "uri", "scale": "scale"},
 }
 """Shapes that URDF has too: URDF's attributes, and SDF's elements."""
-_JOINTS: Final = ("revolute", "continuous", "prismatic", "fixed")
-_LIMITS: Final = ("lower", "upper", "effort", "velocity")
-_ENDLESS: Final = 1e6
+_JOINTS = ("revolute", "continuous", "prismatic", "fixed")
+_LIMITS = ("lower", "upper", "effort", "velocity")
+_ENDLESS = 1e6
 """Limits beyond it are ignored: the default of SDF is 1e16."""
 
 

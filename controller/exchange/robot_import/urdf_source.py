@@ -1,7 +1,6 @@
 """URDF prepared for MuJoCo: it floats, repeated elements are resolved, missing meshes are gone."""
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from snakewalk.controller.exchange.robot_import.model_source import (
     parents_of,
 )
 
-_SINGLE_ELEMENTS: Final = {
+_SINGLE_ELEMENTS = {
     "joint": (
         "origin",
         "parent",
@@ -34,11 +33,11 @@ _SINGLE_ELEMENTS: Final = {
     "collision": ("origin", "geometry"),
 }
 """Elements that urdfdom reads once: the first counts."""
-_NOT_READ: Final = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
-_MESHES: Final = (".stl", ".obj")
-_FREE_JOINT_TYPES: Final = ("floating", "planar")
+_NOT_READ = ("gazebo", "transmission", "ros2_control", "mujoco", "material")
+_MESHES = (".stl", ".obj")
+_FREE_JOINT_TYPES = ("floating", "planar")
 """Kinds of joints that let a robot move freely in its world."""
-_SLIVER_KG: Final = 1e-9
+_SLIVER_KG = 1e-9
 """Mass that MuJoCo gets for a body that states none."""
 
 

@@ -4,8 +4,6 @@ A label of a pixel p is a place in its window of the second picture and a scale.
 ``base[p] + offset``. Labels are equal if flow and scale are equal.
 """
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,9 +12,9 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 Costs = NDArray[np.float32]
 """(rows, columns, scales, window, window) data term of each label; infinite outside of SEARCH."""
-_COST: Final = readonly_array("float32", dimensions=5, layout="C")
-_INTS: Final = readonly_array("int64", dimensions=3, layout="C")
-_LABELS: Final = "int64[:, ::1]"
+_COST = readonly_array("float32", dimensions=5, layout="C")
+_INTS = readonly_array("int64", dimensions=3, layout="C")
+_LABELS = "int64[:, ::1]"
 
 
 def labelled(costs: Costs, base: Ints, penalty: float, rounds: int = 10) -> Ints:

@@ -5,7 +5,7 @@ counterpart the share of the second texture is 0.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,13 +15,13 @@ from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.controller.mapping.mosaic.local_model import joined
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-NEAREST_M: Final = 0.01
+NEAREST_M = 0.01
 """Triangles with a nearer corner are not drawn (ours)."""
-_UNSEEN: Final = np.full(3, 150, np.uint8)
+_UNSEEN = np.full(3, 150, np.uint8)
 """Colour of unseen pixels (ours)."""
-_MATRIX: Final = readonly_array("float64", 2, "C")
-_FLOATS: Final = readonly_array("float64", 3, "C")
-_BOOLS: Final = readonly_array("bool_", 2, "A")
+_MATRIX = readonly_array("float64", 2, "C")
+_FLOATS = readonly_array("float64", 3, "C")
+_BOOLS = readonly_array("bool_", 2, "A")
 
 
 @dataclass(slots=True)

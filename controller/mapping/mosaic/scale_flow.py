@@ -5,7 +5,6 @@ The paper minimises ``D = corr``, whose least value is the worst match. This mod
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,17 +16,17 @@ from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_matches import SCALES, grey, reduced
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-STRIDE_PX: Final = 3
+STRIDE_PX = 3
 """Distance of the labelled pixels (ours)."""
-SEARCH_PX: Final = 6
+SEARCH_PX = 6
 """Half the width of ``R_p`` (ours)."""
-ZONE_PX: Final = 2.5
+ZONE_PX = 2.5
 """Half the width of the zone around an epipolar line (ours)."""
-PATCH_PX: Final = 3
+PATCH_PX = 3
 """Radius of a patch (ours)."""
-PENALTY: Final = 0.12
+PENALTY = 0.12
 """Potts constant (ours), of data terms from 0 to 2."""
-LEAST_CORRELATION: Final = 0.5
+LEAST_CORRELATION = 0.5
 """Correlation below which a pixel has no physical counterpart (ours)."""
 
 Picture = NDArray[np.float32]

@@ -1,7 +1,6 @@
 """The figures of the page, in order, each with a caption that says how to read it."""
 
 from collections.abc import Callable
-from typing import Final
 
 from matplotlib.figure import Figure
 
@@ -19,7 +18,7 @@ from snakewalk.controller.runlog.record import RunRecord
 
 _IN_CURVES = frozenset({"Effort"})
 """Quantities that the curves of the page show as well, to be zoomed."""
-_SECTIONS: Final[tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...]] = (
+_SECTIONS: tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...] = (
     (
         "The way",
         "Seen from above. A waypoint's disc is its radius: green when the centre of mass has come "

@@ -2,7 +2,7 @@
 
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -29,14 +29,14 @@ from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
 from snakewalk.drivers.clock import WallClock
 
-SECONDS: Final = 10.0
-SWING_RAD: Final = 0.7
+SECONDS = 10.0
+SWING_RAD = 0.7
 """Amplitude of the head's joint; that of the neck is half of it (ours)."""
-SWING_RAD_S: Final = 2.5
+SWING_RAD_S = 2.5
 """Frequency of the head; that of the neck is 0.61 of it (ours)."""
-NECK: Final = slice(1, 4)
+NECK = slice(1, 4)
 """Joints of the neck among those behind the head's: they move the head aside."""
-LEAST: Final = 100
+LEAST = 100
 """Least number of poses (ours)."""
 
 

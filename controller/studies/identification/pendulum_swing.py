@@ -5,7 +5,6 @@ The same with the simulated servo of a robot's file predicts a run of that robot
 
 import math
 from dataclasses import fields
-from typing import Final
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from snakewalk.sim.servo.motor import (
     p_gain_per_rad,
 )
 
-_GEAR: Final[Indices] = np.array([NAMES.index(field.name) for field in fields(Gearbox)])
+_GEAR: Indices = np.array([NAMES.index(field.name) for field in fields(Gearbox)])
 FINE_S = 1e-3
 """Longest step of a result (ours); half of it moves no angle of the XL330's logs by 0.004 rad."""
 _ROW = readonly_array(layout="C")

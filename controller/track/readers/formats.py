@@ -1,6 +1,6 @@
 """File formats of recordings, recognised by their first bytes."""
 
-from typing import Final, Literal
+from typing import Literal
 
 from snakewalk.controller.track.readers.bvh import is_bvh
 from snakewalk.controller.track.readers.marker_tables import is_trc
@@ -21,7 +21,7 @@ Format = Literal[
 ]
 """``zip`` is an .npz or a zipped WCON; ``binary`` and ``empty`` cannot be recordings."""
 
-_MARKS: Final[tuple[tuple[bytes, Format], ...]] = (
+_MARKS: tuple[tuple[bytes, Format], ...] = (
     (b"PK\x03\x04", "zip"),
     (b"\x93NUMPY", "npy"),
     (b"\x89HDF\r\n\x1a\n", "hdf5"),

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.archive import ending, read_head, read_text
 from snakewalk.config.errors import InputError
@@ -174,7 +173,7 @@ def _read(file: Path, kind: Format, choice: Choice) -> Track | Keypoints:
     raise InputError(f"{file}: {reason}; known: {KNOWN}")
 
 
-_MARKERS: Final[dict[str, Callable[[Path, Choice], Track | Keypoints]]] = {
+_MARKERS: dict[str, Callable[[Path, Choice], Track | Keypoints]] = {
     "qtm": load_qtm,
     "bvh": load_bvh,
     "trc": load_trc,

@@ -3,7 +3,6 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
@@ -27,9 +26,9 @@ from snakewalk.controller.track.readers.marker_tables import (
 from snakewalk.controller.track.readers.sleap import load_table
 from snakewalk.controller.track.track import Track, frame_numbers, track_from_points
 
-_PLACE: Final = re.compile(r"(m?)x_?(m|[a-z]{2,})(_1)?")
+_PLACE = re.compile(r"(m?)x_?(m|[a-z]{2,})(_1)?")
 """Column of places: x, their unit, and in wide rows the number of the first point."""
-_NO_LENGTHS: Final = ("lengths", "px")
+_NO_LENGTHS = ("lengths", "px")
 """Body lengths and pixels, which have no scale."""
 
 

@@ -5,7 +5,6 @@ import os
 import select
 import sys
 from pathlib import Path
-from typing import Final
 
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_with_progress
@@ -17,10 +16,10 @@ from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.log_page import LogPage, play
 from snakewalk.drivers.clock import WallClock
 
-RECORDED: Final = Path(__file__).resolve().parents[1] / "demonstration.mcap"
+RECORDED = Path(__file__).resolve().parents[1] / "demonstration.mcap"
 """Log of ``snakewalk run`` on its defaults; it is part of the program."""
-_LIVE_COMMAND: Final = "snakewalk run --view"
-_NICE: Final = 10
+_LIVE_COMMAND = "snakewalk run --view"
+_NICE = 10
 """Loops are compiled behind the page (ours)."""
 
 
