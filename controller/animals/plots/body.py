@@ -87,7 +87,7 @@ def _sections(axes: Axes, model: BodyModel) -> None:
 
 
 def draw_skin(file: Path, skin: Skin, motion: BoneMotion | None, texture: Image | None) -> None:
-    """Draw a skin at rest, or in four frames of its motion, all to one scale.
+    """Draw a skin at rest, or in four frames of its motion.
 
     Raises:
         InputError: the ending is not a picture's.
