@@ -221,11 +221,11 @@ def _judge(
     settled = after_rad[len(after_rad) // 2 :]
     is_wrong = bool(settled) and float(np.median(settled)) > sound_rad + WRONG_RAD
     if tripped is not None:
-        result.outcome = "torque off"
+        result.outcome = "off"
     elif bench.link.recoveries:
         result.outcome = "goes on after a check"
     elif bench.reports:
-        result.outcome = "reported; goes on"
+        result.outcome = "reported"
     else:
         result.outcome = "goes on"
     worst = max([0.0, *after_rad])
@@ -365,20 +365,9 @@ def main() -> None:
     lines = ["| servos | baud | cycles until a second master is named |", "| ---: | ---: | ---: |"]
     lines += [f"| {joints} | {baud:,} | {cycles} |" for joints, baud, cycles in goal_reads()]
     write_tables(PAGE, "goal reads", "\n".join(lines))
-    lines = [
-        f"{len(buses)} buses, {sum(each.cycles for each in buses):,} cycles, "
-        f"{sum(len(each.alarms) for each in buses)} false alarms.",
-        "",
-        "| servos | baud | rate, Hz | latency, ms | amplitude, rad | false alarms |",
-        "| ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    lines += [
-        f"| {each.joints} | {each.baud:,} | {1.0 / each.period_s:.0f} "
-        f"| {1e3 * each.usb_latency_s:.0f} | {each.amplitude_rad:.2f} "
-        f"| {len(each.alarms)} |"
-        for each in buses
-    ]
-    write_tables(PAGE, "sound buses", "\n".join(lines))
+    alarms = [line for each in buses for line in each.alarms]
+    total = f"{len(buses)} buses, {sum(each.cycles for each in buses):,} cycles"
+    write_tables(PAGE, "sound buses", f"{total}, {len(alarms)} false alarms.")
     for _, result in results:
         print(result.detected_by, "|", *result.reports[:1])
 

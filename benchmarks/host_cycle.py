@@ -3,8 +3,9 @@
 ``python -m benchmarks.host_cycle --old COMMIT`` runs a gait and a walk at 50 Hz with the command of
 a user, with its log, on 16 servos that another process serves on a pseudo-terminal. The code of
 this folder and of the other commit take turns. CPU time is that of all threads of the program, in
-a window of the run without its start and end. With ``--write`` it replaces the table of
-``docs/benchmarks/host-cycle.md``.
+a window of the run without its start and end. With ``--profile`` a sampling profiler (``py-spy``)
+shows instead in which functions the main thread of a gait spends its time. With ``--write`` it
+replaces the table of ``docs/benchmarks/host-cycle.md``.
 """
 
 import argparse
@@ -14,7 +15,7 @@ import subprocess
 import sys
 import tarfile
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -42,6 +43,21 @@ WARM_S = 4.0
 """Time after the first logged cycle that does not count: ramp, caches."""
 START_S = 600.0
 """Longest start of a program; code without a cache is compiled first."""
+PARTS = {
+    "log": r"cycle_row\.py|runlog/",
+    "one register for each cycle": r"chain/liveness\.py|goal_check\.py|_read_slow",
+    "receiving the state": r"_receive \(",
+    "decoding the state": r"control_cycle\.py|group_read\.py|_decode_state",
+    "limits: state and goals": r"safety/(?!safe_link)|SafeLink\._check \(|_following_fault",
+    "writing goals": r"SafeLink\.write|ServoChain\.write",
+    "pose": r"controller/pose/",
+    "gait": r"controller/motion/",
+    "sleeping until the next cycle": r"sleep_until_s",
+    "reading: the rest": r"SafeLink\.read",
+    "the rest": "",
+}
+"""Parts of a cycle by the functions of a stack; the first that is found counts."""
+RATE_HZ = 500
 SHARE, MEMORY_MB = 0.6, 200.0
 """Targets: CPU time against the other commit, and peak of the resident memory."""
 
@@ -105,8 +121,11 @@ def peak_mb(process: int) -> float:
     return int(re.search(r"VmHWM:\s+(\d+)", text)[1]) * 1024e-6  # type: ignore[index]
 
 
-def cost(code: Path, motion: str, seconds: float) -> Cost:
-    """Run once, and measure in a window of ``seconds``."""
+@contextmanager
+def running(
+    code: Path, motion: str, seconds: float
+) -> Iterator[tuple[subprocess.Popen[str], Path]]:
+    """Run a motion that is warm for the next ``seconds``; its program, and its folder."""
     length_s = WARM_S + seconds + 4.0
     with TemporaryDirectory() as folder, served() as port:
         out = Path(folder) / "run"
@@ -123,17 +142,53 @@ def cost(code: Path, motion: str, seconds: float) -> Cost:
                     raise SystemExit(f"{motion}: no run: {run.communicate()[1]}")
                 time.sleep(0.1)
             time.sleep(WARM_S)
-            begun_s, cpu = time.monotonic(), cpu_s(run.pid)
-            time.sleep(seconds)
-            cpu, window_s = cpu_s(run.pid) - cpu, time.monotonic() - begun_s
-            memory = peak_mb(run.pid)
-            errors = run.communicate()[1]
+            yield run, out
+
+
+def cost(code: Path, motion: str, seconds: float) -> Cost:
+    """Run once, and measure in a window of ``seconds``."""
+    with running(code, motion, seconds) as (run, out):
+        begun_s, cpu = time.monotonic(), cpu_s(run.pid)
+        time.sleep(seconds)
+        cpu, window_s = cpu_s(run.pid) - cpu, time.monotonic() - begun_s
+        memory = peak_mb(run.pid)
+        errors = run.communicate()[1]
         cycle = read_log(out / "log.mcap").cycle
         ran_s = float(cycle.time_s[-1] - cycle.time_s[0])
         if ran_s < WARM_S + seconds:
             raise SystemExit(f"{motion}: ended after {ran_s:.1f} s: {errors}")
         cycles = len(cycle.time_s) / ran_s * window_s
     return Cost(1e3 * cpu / cycles, memory)
+
+
+def part_of(stack: str) -> str:
+    """Part of a cycle to which a stack belongs: functions and files, the innermost last."""
+    return next(part for part, words in PARTS.items() if re.search(words, stack))
+
+
+def profile(seconds: float) -> Counter[str]:
+    """Samples of the main thread in each part of a cycle of a gait."""
+    found = Counter[str]()
+    with running(ROOT, "gait", seconds) as (run, out):
+        stacks = out / "stacks.txt"
+        words = ["-p", str(run.pid), "-d", f"{seconds:.0f}", "-r", str(RATE_HZ), "-o", str(stacks)]
+        subprocess.run(
+            ["py-spy", "record", "-f", "raw", *words], check=True, stdout=subprocess.DEVNULL
+        )
+        for line in stacks.read_text(encoding="utf-8").splitlines():
+            stack, _, count = line.rpartition(" ")
+            if "Drive.run" in stack:
+                found[part_of(stack)] += int(count)
+        run.communicate()
+    return found
+
+
+def shares(found: Counter[str]) -> str:
+    """Markdown: parts of a cycle by their share."""
+    total = found.total()
+    lines = ["| part | share |", "| --- | ---: |"]
+    lines += [f"| {part} | {count / total:.0%} |" for part, count in found.most_common()]
+    return "\n".join(lines)
 
 
 def table(found: dict[tuple[str, bool], list[Cost]], old: str) -> str:
@@ -164,7 +219,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=20.0, help="of each window")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--write", action="store_true", help="replace the table of the page")
+    parser.add_argument("--profile", action="store_true", help="shares of functions instead")
     given = parser.parse_args()
+    command = f"python -m benchmarks.host_cycle {' '.join(sys.argv[1:])}".strip()
+    if given.profile:
+        samples = profile(given.seconds)
+        load = f"{samples.total():,} samples. Load average at the end: {os.getloadavg()[0]:.1f}."
+        text = f"{provenance(command)} {load}\n\n{shares(samples)}"
+        print(text)
+        if given.write:
+            write_tables("host-cycle", "shares", text)
+        return
     found: dict[tuple[str, bool], list[Cost]] = defaultdict(list)
     with TemporaryDirectory() as folder:
         old = given.old_code or code_of(given.old, Path(folder))
@@ -175,7 +240,6 @@ def main() -> None:
                     found[motion, is_new].append(each)
                     which = "this code" if is_new else given.old
                     print(f"round {number + 1}: {motion}, {which}: {each}", file=sys.stderr)
-    command = f"python -m benchmarks.host_cycle {' '.join(sys.argv[1:])}".strip()
     load = f"Load average at the end: {os.getloadavg()[0]:.1f}."
     text = f"{provenance(command)} {load}\n\n{table(found, given.old)}"
     print(text)

@@ -155,6 +155,8 @@ def swing(
                 change(line)
                 change = None
             if load_n_m:
+                assert isinstance(line, SimLine)
+                assert isinstance(line.firmware.plant, BenchPlant)
                 line.firmware.plant.set_load(range(0, JOINTS, 2), min(1.0, now_s) * load_n_m)
             link.read()
             goal_rad = amplitude_rad * np.sin(speed_rad_s * now_s + phases_rad)
