@@ -17,6 +17,7 @@ import zipfile
 import zlib
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO, TYPE_CHECKING, Any
 
 from snakewalk.config.errors import InputError
@@ -57,6 +58,7 @@ DAMAGE = (
     NotImplementedError,  # an unknown packing
     RuntimeError,  # a password
     struct.error,
+    TokenError,  # a header of .npy that is no expression
     zipfile.BadZipFile,
     zlib.error,
 )
@@ -264,7 +266,9 @@ def read_arrays(
             requested_members = {n: m for n, m in members.items() if names is None or n in names}
             check_members(file, list(requested_members.values()))
             arrays = {name: _array(archive, member) for name, member in requested_members.items()}
-    except DAMAGE as error:
+    except (*DAMAGE, OSError) as error:
+        if getattr(error, "filename", None):  # not a place before the file's begin
+            raise
         raise ValueError(str(error) or type(error).__name__) from None
     return arrays, [name for name in members if name not in arrays]
 

@@ -6,7 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, parse_json, read_text
+from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, parse_json, read_bytes
 from snakewalk.config.errors import InputError
 
 
@@ -58,7 +58,7 @@ def _json_lists(file: Path) -> dict[str, Any] | None:
     """
     if file.suffix.lower() != ".json":
         return None
-    text = read_text(file, MOST_STORAGE_BYTES)
+    text = read_bytes(file, MOST_STORAGE_BYTES).decode("utf-8-sig", errors="replace")
     try:
         data = parse_json(text)
     except ValueError as error:

@@ -65,11 +65,14 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
         scene: Any = trimesh.load_scene(file)
         _check_pictures(file, scene)
         solid: Any = scene.to_mesh()
+        normals = np.asarray(solid.vertex_normals, dtype=float)
     except InputError:
         raise
     except Exception as error:  # trimesh passes on any error of its parsers
         raise InputError(f"{file}: cannot be read as a mesh: {error}") from None
-    if len(solid.faces) == 0 or not np.isfinite(solid.vertices).all():
+    if not (
+        len(solid.faces) and solid.vertices.shape[1] == 3 and np.isfinite(solid.vertices).all()
+    ):
         raise InputError(f"{file}: holds no triangles")
     longest = "xyz"[int(np.argmax(np.ptp(solid.vertices, axis=0)))]
     ahead = f"+{longest}" if forward is None else forward
@@ -84,7 +87,7 @@ def read_mesh(file: Path, forward: str | None = None, up: str | None = None) -> 
     texture = None if picture is None else np.asarray(picture.convert("RGB"))
     uv = getattr(solid.visual, "uv", None)
     vertices = np.asarray(solid.vertices, dtype=float) @ turned.T
-    normals = np.asarray(solid.vertex_normals, dtype=float) @ turned.T
+    normals = normals @ turned.T
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     mesh = Mesh(
         vertices=vertices,

@@ -186,8 +186,8 @@ class Footage:
                 if number % every or number < first:
                     yield None, at_s
                 else:
-                    is_decoded, frame = film.retrieve()
-                    if not is_decoded:
+                    _, frame = film.retrieve()
+                    if not np.ndim(frame):  # None: damaged
                         break
                     yield np.asarray(frame, dtype=np.uint8), at_s
                 number += 1

@@ -73,13 +73,13 @@ def true_scale(
         NaN twice if the place is not on the earth.
 
     """
-    from rasterio import errors, warp  # noqa: PLC0415  an extra
+    from rasterio import warp  # noqa: PLC0415  an extra
 
     (x, y), (dx, dy) = place, step
     at_x, at_y = [x - dx, x + dx, x, x], [y, y, y - dy, y + dy]
     try:
         longitude, latitude = warp.transform(crs, "EPSG:4326", at_x, at_y)
-    except (errors.RasterioError, ValueError):
+    except Exception:  # the errors of PROJ have no public base
         return math.nan, math.nan
     if not all(map(math.isfinite, [*longitude, *latitude])):
         return math.nan, math.nan
@@ -109,7 +109,7 @@ def ground_lengths(
     """
     middle = true_scale(crs, places[0], step)
     if (
-        math.isnan(middle[0])
+        not min(middle) > 0.0
         or max(abs(length / per_unit_m - 1.0) for length in middle) <= _TRUE_SCALE_TOLERANCE
     ):
         return per_unit_m, per_unit_m, []

@@ -203,6 +203,7 @@ def read_ply(file: Path) -> tuple[Floats, Any]:
         if points.ndim != 2 or points.shape[1] != 3:
             raise ValueError("holds no vertices")
         faces = getattr(mesh, "faces", None)
+        getattr(mesh, "triangles", None)  # fails if a face has a vertex that is not there
     except InputError:
         raise
     except Exception as error:  # trimesh raises the exceptions of its parsers

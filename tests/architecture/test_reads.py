@@ -83,11 +83,32 @@ def limited() -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (2_000_000_000, 2_000_000_000))
 
 
+FOLDERS: Final = {"zero.dataset": "meta/info.json", "zero.bag": "metadata.yaml"}
+"""Readers of folders: the file in them that has no end."""
 READERS: Final = (
-    *(("animal", "analyse", f"zero.{end}") for end in ("csv", "npz", "mp4", "bvh")),
-    *(("world", "from", f"zero.{end}", "-o", "w.toml") for end in ("csv", "pcd", "ply", "png")),
-    ("play", "zero.csv"),
-    ("robot", "import", "zero.urdf", "-o", "r.toml"),
+    *(
+        ("animal", "analyse", f"zero.{end}")
+        for end in ("csv", "npz", "mp4", "bvh", "c3d", "hdf5", "h5", "mat", "trc", "wcon", "tsv")
+    ),
+    *(
+        ("world", "from", f"zero.{end}", "-o", "w.toml")
+        for end in (
+            "csv",
+            "pcd",
+            "ply",
+            "png",
+            "xyz",
+            "las",
+            "laz",
+            "tif",
+            "asc",
+            "obj",
+            "glb",
+            "stl",
+        )
+    ),
+    *(("play", f"zero.{end}") for end in ("csv", "mcap", "db3", "dataset", "bag")),
+    *(("robot", "import", f"zero.{end}", "-o", "r.toml") for end in ("urdf", "sdf", "xml")),
 )
 
 
@@ -99,7 +120,9 @@ def test_a_file_without_end_is_rejected_within_limits(
 ) -> None:
     for word in words:
         if word.startswith("zero."):
-            (tmp_path / word).symlink_to("/dev/zero")
+            link = tmp_path / word / FOLDERS.get(word, "")
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to("/dev/zero")
     program = Path(sys.executable).with_name("snakewalk")
     done = subprocess.run(
         [program, *words],

@@ -90,7 +90,7 @@ def load_motive(file: Path, rows: list[list[str]], choice: Choice) -> Keypoints:
         [cell.strip() for cell in row + [""] * len(heads[-1])] for row in heads
     )
     starts: dict[str, list[int]] = {}
-    for k in range(2, len(axes) - 2):
+    for k in range(2, len(heads[-1])):
         if parts[k] == "Position" and axes[k : k + 3] == ["X", "Y", "Z"]:
             starts.setdefault(kinds[k], []).append(k)
     kind = next((kind for kind in _MOTIVE_KINDS if kind in starts), None)
