@@ -58,7 +58,8 @@ DAMAGE = (
     NotImplementedError,  # an unknown packing
     RuntimeError,  # a password
     struct.error,
-    TokenError,  # a header of .npy that is no expression
+    SyntaxError,
+    TokenError,  # a damaged header of .npy
     zipfile.BadZipFile,
     zlib.error,
 )

@@ -12,7 +12,7 @@ import numpy as np
 import scipy  # scipy.io loads when it is first used
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import MOST_BYTES, check_expansion, read_arrays, read_bytes
+from snakewalk.config.archive import DAMAGE, MOST_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError, first_line
 from snakewalk.controller.track.choice import Choice
@@ -242,7 +242,7 @@ def load_npy(file: Path, choice: Choice) -> Track:
     """
     try:
         values = np.load(file, mmap_mode="r", allow_pickle=False)  # maps no more than the file has
-    except (ValueError, OSError, EOFError) as error:
+    except (OSError, *DAMAGE) as error:
         raise InputError(f"{file}: is not an .npy of plain numbers: {error}") from None
     joints = _floats(file, "joint angles", np.asarray(values))
     if joints.ndim != 2 or joints.shape[1] < 3:
