@@ -69,6 +69,7 @@ def test_matches_that_are_wrong_do_not_count() -> None:
     assert found.motions[0] == pytest.approx(MOTIONS[0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_standard_deviations_are_those_of_the_errors() -> None:
     """20 seeds: the squared error over the variance is 1 in the mean, and a third pair helps."""
     ratio = {2: [], 3: []}
