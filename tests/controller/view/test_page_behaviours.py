@@ -19,7 +19,10 @@ from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
 from tests.helpers.proxy import Proxied
 from tests.helpers.stepped_page import SteppedPage
 
-pytestmark = [pytest.mark.slow, IN_A_BROWSER]
+pytestmark = [
+    pytest.mark.nightly("49 looks at one page in a browser, which a busy computer delays"),
+    IN_A_BROWSER,
+]
 WIDTHS: Final = ((390, 844), (768, 1024), (1400, 900))
 SIZES: Final = pytest.mark.parametrize("size", WIDTHS, ids=[str(width) for width, _ in WIDTHS])
 CONFIRMED: Final = "stop requested"
