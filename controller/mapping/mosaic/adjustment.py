@@ -9,14 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import cv2
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.sparse import coo_array, csr_array
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Bools, Floats
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, moved, project, sampled
 from snakewalk.controller.mapping.mosaic.scale_matches import ScaleMatches
 from snakewalk.controller.mapping.stereo_ground import DISPARITY_ERROR_PX
 
@@ -48,7 +47,9 @@ class Sightings:
         """Look up the points and the disparities of matches."""
         first, second = models
         column, row = np.rint(matches.first_px).astype(int).T
-        depth_m = _sampled_depth(second, matches.second_px)
+        depth_m = sampled(
+            second.points_m[..., 2].astype(np.float32), matches.second_px[:, None]
+        ).ravel()
         disparity_px = second.camera[0, 0] * second.baseline_m / depth_m
         seen_px = np.column_stack([matches.second_px, disparity_px])
         return cls(*numbers, first.points_m[row, column], seen_px, matches.scale, models)
@@ -66,7 +67,7 @@ class Sightings:
         The disparity error of the first position moves a point along its ray.
         """
         first = self.cameras[0]
-        moved_m = self.points_m @ motion[:, :3].T + motion[:, 3]
+        moved_m = moved(self.points_m, motion)
         disparity_px = first.camera[0, 0] * first.baseline_m / self.points_m[:, 2]
         change = -self.points_m @ motion[:, :3].T * (0.01 / disparity_px)[:, None]
         along = (self.predicted_px(moved_m + change) - self.predicted_px(moved_m)) / 0.01
@@ -147,20 +148,6 @@ def composed(motions: Floats, first: int, second: int) -> Floats:
     return np.column_stack([turn, shift])
 
 
-def _sampled_depth(model: LocalModel, places_px: Floats) -> Floats:
-    """(n,) bilinear depths; NaN outside the valid region."""
-    map_px = places_px.astype(np.float32)[:, None]
-    sampled = cv2.remap(
-        model.points_m[..., 2].astype(np.float32),
-        map_px[..., 0],
-        map_px[..., 1],
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=(np.nan,) * 4,
-    )
-    return np.asarray(sampled, float).ravel()
-
-
 def _values(motion: Floats) -> Floats:
     """(6,) rotation vector, and the place of the second camera in the axes of the first."""
     place = -motion[:, :3].T @ motion[:, 3]
@@ -180,7 +167,7 @@ def _errors(
     errors = []
     for group, weight in zip(groups, weights, strict=True):
         motion = composed(motions, group.first, group.second)
-        moved_m = group.points_m @ motion[:, :3].T + motion[:, 3]
+        moved_m = moved(group.points_m, motion)
         off = group.predicted_px(moved_m) - group.seen_px
         has_depth = np.isfinite(group.seen_px[:, 2])
         off[~has_depth, 2] = 0.0

@@ -1,10 +1,11 @@
 """Local model of a position: points, colours and valid region of a stereo pair ([KP] 3.2)."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
@@ -98,6 +99,26 @@ def project(camera: Floats, points_m: Floats) -> Floats:
         u = camera[0, 0] * points_m[..., 0] / depth + camera[0, 2]
         v = camera[1, 1] * points_m[..., 1] / depth + camera[1, 2]
     return np.stack([u, v], axis=-1)
+
+
+def sampled(image: NDArray[Any], places_px: Floats) -> Floats:
+    """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside."""
+    map_px = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
+    return np.asarray(
+        cv2.remap(
+            image,
+            map_px[..., 0],
+            map_px[..., 1],
+            cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=(np.nan,) * 4,
+        )
+    )
+
+
+def moved(points_m: Floats, motion: Floats) -> Floats:
+    """Points (..., 3) after a motion (3, 4) to the axes of another position."""
+    return points_m @ motion[:, :3].T + motion[:, 3]
 
 
 def joined(depth_m: Floats, axis: int) -> Bools:

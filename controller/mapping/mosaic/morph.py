@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project, sampled
 from snakewalk.controller.mapping.mosaic.poisson import continued
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_flow import LEAST_CORRELATION, ScaleFlow
@@ -40,21 +40,6 @@ class MorphableModel:
         other = sampled(self.second.image.astype(np.float32), self.counterpart_px)
         there = np.where(self.common[..., None], other, first_colour)
         return (1.0 - share) * first_colour + share * there
-
-
-def sampled(image: Floats, places_px: Floats) -> Floats:
-    """(H, W, k) bilinear samples of an image at columns and rows (H, W, 2); NaN outside."""
-    map_px = np.nan_to_num(places_px, nan=-1e4).astype(np.float32)
-    return np.asarray(
-        cv2.remap(
-            image,
-            map_px[..., 0],
-            map_px[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=(np.nan,) * 4,
-        )
-    )
 
 
 def dense_flow(

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.mapping.mosaic.adjustment import Sightings, adjusted
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, moved, project
 from snakewalk.controller.mapping.mosaic.scale_matches import (
     ScaleMatches,
     match_around,
@@ -135,7 +135,7 @@ def matches_around(
     first: LocalModel, second: LocalModel, motion: Floats, radius_px: int
 ) -> ScaleMatches:
     """Match around the places that a motion (3, 4) from the first to the second predicts."""
-    moved_m = first.points_m @ motion[:, :3].T + motion[:, 3]
+    moved_m = moved(first.points_m, motion)
     with np.errstate(invalid="ignore", divide="ignore"):
         scale = np.where(moved_m[..., 2] > 0.0, first.points_m[..., 2] / moved_m[..., 2], np.nan)
         scale *= second.camera[0, 0] / first.camera[0, 0]

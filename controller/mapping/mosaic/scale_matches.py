@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats, Image
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, sampled
 
 SCALES = tuple(10.0 / k for k in range(10, 0, -1))
 """Scales of the set S of the paper: 1, 1 / 0.9, ..., 1 / 0.1."""
@@ -169,15 +169,8 @@ def _redrawn(picture: NDArray[np.float32], places_px: Floats, scale: Floats) -> 
     out = np.full(scale.shape, np.nan)
     for k in np.unique(nearest[known]):
         chosen = nearest == k
-        map_px = (np.where(chosen[..., None], places_px, -1e4) / SCALES[k]).astype(np.float32)
-        drawn = cv2.remap(
-            reduced(picture, SCALES[k]),
-            map_px[..., 0],
-            map_px[..., 1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_CONSTANT,
-            borderValue=(np.nan,) * 4,
-        )
+        places = np.where(chosen[..., None], places_px, np.nan) / SCALES[k]
+        drawn = sampled(reduced(picture, SCALES[k]), places)
         out[chosen] = drawn[chosen]
     return out.astype(np.float32)
 

@@ -17,7 +17,7 @@ from snakewalk.controller.mapping.mosaic.adjustment import (
     adjusted,
     composed,
 )
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, moved
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
 from snakewalk.controller.mapping.mosaic.mosaic import mosaic
 from snakewalk.controller.mapping.mosaic.relative_pose import (
@@ -172,7 +172,7 @@ def _step(
 ) -> tuple[MorphableModel, Step]:
     motion = joint.motions[number]
     agrees = joint.agrees[number]
-    moved_m = sightings.points_m[agrees] @ motion[:, :3].T + motion[:, 3]
+    moved_m = moved(sightings.points_m[agrees], motion)
     off_px = (sightings.predicted_px(moved_m) - sightings.seen_px[agrees])[:, :2]
     error_px = float(np.sqrt((off_px**2).sum(axis=1).mean()))
     pose = RelativePose(motion[:, :3], motion[:, 3], agrees, error_px)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable, sampled
+from snakewalk.controller.mapping.mosaic.local_model import sampled
+from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
 from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
