@@ -66,10 +66,12 @@ def drawn(seed: int) -> PoseConfig:
     )
 
 
-def found(seed: int, deviation: Deviation, change: Change) -> PoseConfig:
+def found(
+    seed: int, deviation: Deviation, change: Change, robot_name: str | None = None
+) -> PoseConfig:
     """Calibrate a drawn mount."""
     config = drawn(seed)
-    prepared = prepare_calibration(None, None)
+    prepared = prepare_calibration(robot_name, None)
     robot = prepared.robot.model_copy(update={"pose": config})
     tracker = TrackerConfig(
         noise_m=0.005, noise_deg=1.5, delay_s=config.latency_s or 0.0, clock_offset_s=1e6
@@ -132,6 +134,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--wrong", action="store_true", help="wrong bodies")
     parser.add_argument("--deviation", action="store_true", help="other friction and law")
+    parser.add_argument("--robot", help="yaw16 if not given")
     given = parser.parse_args()
     right = 0
     for seed in range(given.cases):
@@ -140,7 +143,9 @@ def main() -> int:
         deviation = Deviation(along, across, law=LAWS[seed % len(LAWS)])
         name, change = wrong(seed) if given.wrong else ("", lambda sample, time_s: sample)
         try:
-            config = found(seed, deviation if given.deviation else NO_DEVIATION, change)
+            config = found(
+                seed, deviation if given.deviation else NO_DEVIATION, change, given.robot
+            )
         except InputError as error:
             right += given.wrong
             print(seed, name, error.faults[0])

@@ -19,6 +19,8 @@ import numpy as np
 from benchmarks.drawn_grounds import KINDS, drawn_ground, drawn_requests
 from benchmarks.rows import Row
 from snakewalk.config.errors import InputError
+from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.run.factory import prepare_job
 from snakewalk.controller.run.request import RunRequest
 from snakewalk.controller.run.run_robot import run_robot
@@ -36,6 +38,8 @@ SEEDS = range(4)
 LIMIT_S = 20.0
 MOST = 1.3
 GROUNDS = 40
+PASSES = 3
+"""Passes of the same steps: a busy machine delays single cycles, other ones each time."""
 MOST_S = 5e-3
 
 
@@ -66,8 +70,7 @@ def _drawn_rows() -> list[Row]:
             drawn_kind, ground, config = drawn_ground(seed)
             if drawn_kind != kind:
                 continue
-            for request in drawn_requests(seed, TerrainPlanner(ground, config)):
-                steps_s, is_planned = timed_steps(request)
+            for steps_s, is_planned in _repeated_steps(seed, ground, config):
                 longest_s, cycles = max(longest_s, *steps_s), max(cycles, len(steps_s))
                 counts[is_planned] += 1
         what = f"{kind}: longest planning in a cycle, {counts[1]} paths, {counts[0]} without a way"
@@ -75,6 +78,20 @@ def _drawn_rows() -> list[Row]:
         rows.append(Row(what, 1e3 * longest_s, "ms", f"{1e3 * MOST_S:g} ms", ratio, 1.0))
         rows.append(Row(f"{kind}: cycles until a path is planned", float(cycles), "at most"))
     return rows
+
+
+def _repeated_steps(
+    seed: int, ground: HeightField, config: PlannerConfig
+) -> Iterator[tuple[list[float], bool]]:
+    """Yield the least CPU times of each request's cycles, of three passes of the same steps."""
+    passes = [
+        [timed_steps(request) for request in drawn_requests(seed, TerrainPlanner(ground, config))]
+        for _ in range(PASSES)
+    ]
+    for same in zip(*passes, strict=True):
+        each_s = [steps_s for steps_s, _ in same]
+        assert len({len(steps_s) for steps_s in each_s}) == 1
+        yield [min(step) for step in zip(*each_s, strict=True)], same[0][1]
 
 
 def timed_steps(steps: Steps[SplinePath]) -> tuple[list[float], bool]:

@@ -143,7 +143,9 @@ def markdown(rows: list[dict[str, Any]]) -> str:
 def main() -> int:
     """Rehearse and print a table; 1 if a claim is false, or a body is blind for too long."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.wrong_poses", description=__doc__)
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(changes()))
+    parser.add_argument(
+        "kinds", nargs="*", metavar="KIND", help=", ".join(changes()).replace("%", "%%")
+    )
     parser.add_argument("--run", default="flat-slalom")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--errors", action="store_true", help="robot and ground have errors, too")

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle, Polygon
 from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import CENTRE, GREY, HEAD, INK, MEASURED, PATH, REACHED, TO_COME
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import Obstacle
 from snakewalk.controller.figures.style import GROUND, WIDTH_IN, legend_above
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.column import by_rows
@@ -22,6 +23,8 @@ _POINTS = 20_000
 """Most points of a track (ours)."""
 _CURSOR_POINTS = 120
 """Points of the track on which the page moves a cursor; matplotlib thins a line of 128."""
+_GRID = 500
+"""Points of each axis at which an obstacle is drawn."""
 _BODIES = 200
 """Most bodies drawn (ours)."""
 
@@ -41,6 +44,8 @@ def path_figure(record: RunRecord) -> Figure | None:
     axes.set_ylim(low[1], high[1])
     if record.header.ground is not None:
         draw_ground(axes, record.header.ground)
+    if record.header.world.obstacle is not None:
+        _draw_obstacle(axes, record.header.world.obstacle)
     _plan(axes, record)
     _bodies(axes, record)
     step = _step(pose)
@@ -86,6 +91,15 @@ def _corners_m(column: Floats) -> Floats:
         return np.stack([np.fmin.reduce(points), np.fmax.reduce(points)])
 
     return np.asarray(by_rows(corners_m, column))
+
+
+def _draw_obstacle(axes: Axes, obstacle: Obstacle) -> None:
+    """Fill what stands on the ground; a level obstacle above it has no place there."""
+    x, y = (np.linspace(*limits, _GRID) for limits in (axes.get_xlim(), axes.get_ylim()))
+    gap_m = obstacle.gap_m(*np.meshgrid(x, y))
+    if np.isfinite(gap_m).all() and gap_m.min() < 0.0:
+        axes.contourf(x, y, gap_m, levels=[gap_m.min(), 0.0], colors=[INK])
+        axes.plot([], [], "s", color=INK, label=obstacle.kind)
 
 
 def draw_ground(axes: Axes, ground: HeightField) -> None:

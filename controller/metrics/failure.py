@@ -22,6 +22,12 @@ CLAMP_SHARE = 0.2
 PROGRESS_SHARE = 0.5
 """Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
 
+GRIP_SHARE = 0.35
+"""Way of the body over the advance of its links, below which they slip: 0.06 to 0.15 on ice, 0.7
+where it goes in circles (ours)."""
+SLID_BODIES = 0.5
+"""Slide across the body, in its lengths, that leads it off its path (ours)."""
+
 
 @dataclass(frozen=True, slots=True)
 class Failure:
@@ -56,7 +62,7 @@ def failure(record: RunRecord) -> Failure | None:
         return Failure(
             "roll",
             f"rolled over after {pose.time_s[over[0]]:.0f} s, "
-            f"up to {np.degrees(roll.max()):.0f} deg",
+            f"up to {np.degrees(roll.max()):.0f} deg{_slope_text(record, over[0])}",
         )
     limit_s = record.header.run.time_limit_s
     speed_m_s = plan.predicted_speed_m_s
@@ -79,6 +85,16 @@ def failure(record: RunRecord) -> Failure | None:
     return _of_advance(record, rows)
 
 
+def _slope_text(record: RunRecord, row: int) -> str:
+    """Return the slope under a body that rolled over, where it is steeper than friction holds."""
+    ground = record.header.ground
+    slope_rad = 0.0
+    if ground is not None:
+        slope_rad = float(np.median(ground.slope_rad(*record.pose.links_m[row, :, :2].T)))
+    is_steep = slope_rad > max(_holds_rad(record), CLIMBED_RAD)
+    return f", on a slope of {np.degrees(slope_rad):.0f} deg" if is_steep else ""
+
+
 def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     """Judge the rows (n,) of the pose in which the shape travels."""
     pose = record.pose
@@ -87,19 +103,23 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     predicted = pose.predicted_speed_m_s[rows].mean()
     share = advanced / predicted if predicted > 0.0 else 1.0
     if share < header.run.safety.advance_fraction:
-        up_rad, holds_rad = float(np.mean(_inclination_rad(pose.links_m[rows]))), _holds_rad(record)
-        cause: Cause = "climb" if up_rad > holds_rad else "slip"
-        words = f"{np.degrees(up_rad):.0f} deg uphill" if cause == "climb" else "no steep climb"
-        return Failure(cause, f"advanced {share:.0%} of the prediction, {words}")
+        up_rad = float(np.mean(_inclination_rad(pose.links_m[rows])))
+        said = f"advanced {share:.0%} of the prediction"
+        if up_rad <= _holds_rad(record):
+            return Failure("slip", f"{said}, no steep climb")
+        return _of_climb(record, f"{said}, {np.degrees(up_rad):.0f} deg uphill")
     times = pose.time_s[rows]
     remaining = _remaining_m(record, rows)
     progress = float(remaining[0] - remaining[-1])
     travelled = float(advanced * (times[-1] - times[0]))
     if progress < PROGRESS_SHARE * travelled:
-        steep_rad = _steepest_ahead_rad(record, float(np.median(pose.path_s_m[rows])))
+        due_m = float(np.median(pose.path_s_m[rows])) + 0.25 * header.robot.length_m * np.arange(
+            5.0
+        )
+        steep_rad = _steepest_rad(record, -1, due_m)
         if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
-            return Failure(
-                "climb",
+            return _of_climb(
+                record,
                 f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path, which "
                 f"climbs by {np.degrees(steep_rad):.0f} deg there",
             )
@@ -110,6 +130,13 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
                 f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg while it "
                 f"advanced {travelled:.1f} m",
             )
+        forward_m = _forward_m(record, rows)
+        if abs(forward_m) < GRIP_SHARE * travelled:
+            return Failure(
+                "slip",
+                f"its links moved {travelled:.1f} m along themselves, and the body only "
+                f"{abs(forward_m):.1f} m",
+            )
         error = path_error_m(record)[rows]
         return Failure(
             "steering",
@@ -117,6 +144,36 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
             f"up to {np.nanmax(error):.2f} m off it",
         )
     return Failure("time", f"out of time with {remaining[-1]:.1f} m of path left")
+
+
+def _of_climb(record: RunRecord, text: str) -> Failure:
+    """Return a climb, or the slide that led a body off its first path, which does not climb."""
+    body_m = record.header.robot.length_m
+    pose = record.pose
+    replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
+    rows = np.flatnonzero((pose.pulse_m_s > 0.0) & (pose.time_s < replanned_s))
+    if len(rows) > 1 and record.paths:
+        due_m = np.arange(0.0, length_m(record.paths[0][1]), 0.25 * body_m)
+        slid_m, fall_rad = _slide(record, rows)
+        if (
+            _steepest_rad(record, 0, due_m) <= max(_holds_rad(record), CLIMBED_RAD)
+            and slid_m > SLID_BODIES * body_m
+            and fall_rad > _holds_rad(record)
+        ):
+            return Failure(
+                "slip",
+                f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg off its path, "
+                f"and did not come back: {text}",
+            )
+    return Failure("climb", text)
+
+
+def _forward_m(record: RunRecord, rows: np.ndarray) -> float:
+    """Distance that the body moved along the line from its tail to its head."""
+    pose = record.pose
+    along = pose.links_m[rows, 0, :2] - pose.links_m[rows, -1, :2]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return float((np.diff(pose.centre_m[rows, :2], axis=0) * along[:-1]).sum())
 
 
 def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
@@ -148,18 +205,17 @@ def _inclination_rad(links_m: Floats) -> Floats:
     return np.asarray(np.arctan2(z, np.hypot(x, y)))
 
 
-def _steepest_ahead_rad(record: RunRecord, along_m: float) -> float:
-    """Steepest inclination of the path over a body length from an arc length on, uphill positive.
+def _steepest_rad(record: RunRecord, which: int, due_m: Floats) -> float:
+    """Steepest inclination of a path between arc lengths (n,), uphill positive.
 
-    Between points of the path a quarter of a body length apart; 0 without a ground or a path.
+    0 without a ground or a path.
     """
     ground = record.header.ground
-    length = record.header.robot.length_m
-    if ground is None or not record.paths or not np.isfinite(along_m):
+    if ground is None or not record.paths or not np.isfinite(due_m).all():
         return 0.0
-    path_m = record.paths[-1][1][:, :2]
+    path_m = record.paths[which][1][:, :2]
     at_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(path_m, axis=0).T)))
-    due_m = np.clip(along_m + 0.25 * length * np.arange(5), 0.0, at_m[-1])
+    due_m = np.clip(due_m, 0.0, at_m[-1])
     x, y = (np.interp(due_m, at_m, path_m[:, axis]) for axis in range(2))
     steps_m = np.diff(due_m)
     rises_m = np.diff(ground.elevation_m(x, y))

@@ -138,7 +138,8 @@ def _sentence(numbers: RunSummary) -> str:
     parts = []
     if numbers.waypoints:
         noun = "waypoint" if numbers.waypoints == 1 else "waypoints"
-        parts.append(f"{_reached_count(numbers)} of {numbers.waypoints} {noun}")
+        believes = "believes " * (numbers.pose_evidence == Kind.UNCONFIRMED)
+        parts.append(f"{believes}{_reached_count(numbers)} of {numbers.waypoints} {noun}")
         if error_m is not None:
             parts.append(f"{100.0 * error_m:.1f} cm from its path")
     elif travelled_m is not None:

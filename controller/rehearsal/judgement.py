@@ -9,6 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.verdict import verdict
+from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
 
@@ -24,7 +25,7 @@ class Judgement:
 
     waypoints: int
     claimed: int
-    """Waypoints that the run says it reached."""
+    """Waypoints that the run says it reached; 0 if it says that its pose is unconfirmed."""
     truly_reached: int
     """Waypoints that the body truly came to, in order, within their radius and 2 cm."""
     reached_as_stated: int
@@ -87,6 +88,7 @@ def judge(
 
     """
     plan = record.header.plan
+    is_unconfirmed = numbers.pose_evidence == Kind.UNCONFIRMED
     near_m = plan.waypoint_radius_m + SD * LEAST_SD_M
     stated_m = plan.waypoint_radius_m + SD * max(numbers.pose_position_sd_m or 0.0, LEAST_SD_M)
     track_m = truth.centre_m[:, :2]
@@ -96,7 +98,7 @@ def judge(
     steps_m = truth.centre_m[:: _stride(truth), :2]
     return Judgement(
         waypoints=len(plan.waypoints_m),
-        claimed=len(waypoint_times_s(record.pose, plan)),
+        claimed=0 if is_unconfirmed else len(waypoint_times_s(record.pose, plan)),
         truly_reached=reached,
         reached_as_stated=true_arrivals(track_m, plan.waypoints_m, stated_m)[0],
         closest_m=tuple(round(float(value), 3) for value in closest),

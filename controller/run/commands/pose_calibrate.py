@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
@@ -18,7 +19,7 @@ from snakewalk.controller.console.result_files import refuse_to_overwrite, write
 from snakewalk.controller.kinematics.smoothstep import cubic
 from snakewalk.controller.motion.parted_recording import recording
 from snakewalk.controller.pose.mount_fit import fit_mount, predicted_ways
-from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample
+from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, turned
 from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.run.backend import RehearsedPort
 from snakewalk.controller.run.external.external_source import ExternalSource
@@ -38,6 +39,11 @@ NECK = slice(1, 4)
 """Joints of the neck among those behind the head's: they move the head aside."""
 LEAST = 100
 """Least number of poses (ours)."""
+REST_S, NOD_S = 1.0, 3.0
+NOD_RAD = 0.35
+"""Rest after the swing, and duration and angle of the nod of each of two pitch joints (ours)."""
+SEEN_RAD = 0.1
+"""Least turn of a body that was seen to nod (ours)."""
 
 
 @command(
@@ -58,6 +64,8 @@ def calibrate_source(
     as_json: Json = False,
 ) -> None:
     """Swing the head for 10 s, and find the source's axes, scale, mount and delay.
+
+    A robot with pitch joints then lifts its head, which shows whether the vertical is mirrored.
 
     The robot lies straight on level ground. The place of its head becomes 0, 0, and it points along
     x. Another body, and a left-handed frame, end the command with exit code 2.
@@ -125,26 +133,57 @@ def calibrated(
         raise InputError(f"pose calibrate: {result.outcome.tripped or 'few poses arrived'}")
     robot = prepared.robot
     before = robot.pose or PoseConfig()
-    poses = [np.array(column) for column in zip(*rows, strict=True)]
+    stamps_s, places_m, rotations = (np.array(column) for column in zip(*rows, strict=True))
     cycle = result.record.cycle
+    nodded_s = cycle.time_s[(cycle.sent_rad[:, robot.pitch_joints[:2]] > 0.9 * NOD_RAD).any(axis=1)]
+    swung_s = nodded_s[0] - REST_S if len(nodded_s) else np.inf
+    swings, poses = cycle.time_s < swung_s, stamps_s < swung_s
     ways = predicted_ways(
-        robot, prepared.world.friction, cycle.time_s, cycle.measured_rad, before.link
+        robot,
+        prepared.world.friction,
+        cycle.time_s[swings],
+        cycle.measured_rad[swings],
+        before.link,
     )
-    fits = (fit_mount(cycle.time_s, way, *poses) for way in ways)
+    seen = stamps_s[poses], places_m[poses], rotations[poses]
+    fits = (fit_mount(cycle.time_s[swings], way, *seen) for way in ways)
     mount = min(fits, key=lambda fit: fit.residual_m)
+    if len(nodded_s):
+        late_s = nodded_s[[0, -1]] + (mount.config.latency_s or 0.0)
+        nodding = (stamps_s > late_s[0]) & (stamps_s < late_s[1])
+        resting = poses & (stamps_s > swung_s - 0.5)
+        _check_vertical(mount.config, rotations[resting], rotations[nodding])
     ahead_m, left_m, up_m = mount.config.offset_m
     offset_m = ahead_m, left_m, round(up_m - robot.body_radius_m, 4)
     found = mount.config.model_dump(exclude_unset=True) | {"offset_m": offset_m}
     return before.model_copy(update=found), mount.residual_m
 
 
+def _check_vertical(config: PoseConfig, before: Floats, during: Floats) -> None:
+    """Compare rotations (n, 3, 3) before a nod with those (m, 3, 3) while the head is lifted.
+
+    Raises:
+        InputError: the head went down.
+
+    """
+    if not len(before) or not len(during):
+        return
+    lifted, level = (Rotation.from_matrix(each).mean() for each in (during, before))
+    turn = turned(config.world_deg) @ (lifted * level.inv()).as_rotvec()
+    if turn[1] > SEEN_RAD:  # about the axis to the left, which lowers a head that points along x
+        raise InputError("mirrored axes: the head was lifted, and its poses go down; send z up")
+
+
 def _swing(robot: RobotConfig) -> tuple[Floats, Floats]:
-    """Return times (n,) and angles (n, J): head and neck swing at different frequencies."""
-    time_s = np.arange(0.0, SECONDS, 0.04)
+    """Return times (n,) and angles (n, J): head and neck swing; then the head is lifted."""
+    nods = robot.pitch_joints[:2]
+    time_s = np.arange(0.0, SECONDS + (REST_S + NOD_S if nods else 0.0), 0.04)
     amplitude_rad = SWING_RAD * cubic(np.clip(np.minimum(time_s, SECONDS - time_s), 0.0, 1.0))
+    nod = np.clip((time_s - SECONDS - REST_S) / NOD_S, 0.0, 1.0)
     angle = SWING_RAD_S * time_s
     joint_rad = np.zeros((len(time_s), robot.joint_count))
     head, *neck = robot.yaw_joints
     joint_rad[:, head] = amplitude_rad * np.sin(angle)
     joint_rad[:, neck[NECK]] = (0.5 * amplitude_rad * np.sin(0.61 * angle + 0.7))[:, None]
+    joint_rad[:, nods] = (NOD_RAD * np.sin(np.pi * nod) ** 2)[:, None]
     return time_s, joint_rad

@@ -12,6 +12,7 @@ from matplotlib.patches import Circle, Polygon
 
 from snakewalk.config.colours import GREY, PATH, REACHED
 from snakewalk.config.heightfield import HeightField
+from snakewalk.config.world import Obstacle, PoleObstacle
 from snakewalk.controller.figures.path import body_outline_m, draw_ground, path_figure
 from snakewalk.controller.figures.style import WIDTH_IN
 from snakewalk.controller.runlog.record import RunRecord
@@ -38,6 +39,23 @@ def test_the_plan_is_strong_and_paths_that_were_laid_again_are_pale(record: RunR
     assert named[2].startswith("_"), "once in the legend"
     assert lines[0].get_linewidth() > lines[1].get_linewidth()
     assert not any(line.get_linestyle() == "-" for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "is_drawn"),
+    [
+        (PoleObstacle(radius_m=0.05, at_m=(1.0, 0.2)), True),
+        (PoleObstacle(radius_m=0.05, at_m=(90.0, 0.2)), False),
+        (PoleObstacle(radius_m=0.05, upright=False), False),
+    ],
+)
+def test_what_stands_on_the_ground_is_in_the_map(
+    record: RunRecord, obstacle: Obstacle, is_drawn: bool
+) -> None:
+    world = record.header.world.model_copy(update={"obstacle": obstacle})
+    axes = axes_of(replace(record, header=replace(record.header, world=world)))
+    names = [str(line.get_label()) for line in axes.lines]
+    assert (obstacle.kind in names) == is_drawn
 
 
 @pytest.mark.parametrize(

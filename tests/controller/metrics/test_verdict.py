@@ -62,7 +62,10 @@ UNCONFIRMED = DEAD_RECKONED | {"pose_evidence": "unconfirmed", "pose_source": "u
         ({"waypoints": 0}, "moved 1.50 m, 12.3 s"),
         ({"waypoints": 0, "travelled_m": None, "duration_s": None}, ""),
         (DEAD_RECKONED, "2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by dead reckoning"),
-        (UNCONFIRMED, "2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by an unconfirmed pose"),
+        (
+            UNCONFIRMED,
+            "believes 2 of 2 waypoints, 5.0 cm from its path, 12.3 s, by an unconfirmed pose",
+        ),
         (DEAD_RECKONED | {"waypoints": 0}, "moved 2.50 m, 12.3 s, by dead reckoning"),
         ({"waypoints_reached": 1}, "1 of 2 waypoints, 1.2 cm from its path, 12.3 s"),
         ({"waypoints": 0, "trip": "heat"}, "stopped by safety, moved 1.50 m, 12.3 s"),

@@ -26,3 +26,11 @@ def test_a_picture_of_a_board_belongs_to_another_command() -> None:
     ended = snakewalk("pose", "calibrate", "joints", "--port", "sim")
     assert ended.returncode == 2
     assert "snakewalk pose lens" in ended.stderr
+
+
+@pytest.mark.slow
+def test_a_lifted_head_shows_a_mirrored_vertical() -> None:
+    name, change = wrong(4)
+    assert name == "mirrored"
+    with pytest.raises(InputError, match="the head was lifted"):
+        found(4, NO_DEVIATION, change, "alternating16")
