@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -53,10 +54,12 @@ def measured(words: Sequence[str]) -> tuple[float, float, int]:
     return usage.ru_maxrss / 1e3, usage.ru_utime + usage.ru_stime, child.returncode
 
 
-def write_truth(log: Path, path: Path) -> None:
-    """Write the poses of a log as the truth of a served robot."""
+def write_truth(log: Path, path: Path, times: int) -> None:
+    """Write the poses of a log, repeated as by ``repeat_log``, as the truth of a served robot."""
     record = read_log(log)
     header = record.header
+    deadline_s = record.cycle.deadline_s
+    period_s = deadline_s[-1] + deadline_s[1] - 2.0 * deadline_s[0]
     with path.open("w", encoding="utf-8") as file:
         first = {
             "snakewalk_truth": 1,
@@ -71,11 +74,12 @@ def write_truth(log: Path, path: Path) -> None:
             pose.rotation,
             pose.centre_m,
         )
-        for k in range(len(time_s)):
+        for count, k in product(range(times), range(len(time_s))):
+            moved_s = round(float(time_s[k] + count * period_s), 6)
             row = {
-                "sequence": k,
-                "time_s": round(float(time_s[k]), 6),
-                "sent_s": round(float(time_s[k]), 6),
+                "sequence": count * len(time_s) + k,
+                "time_s": moved_s,
+                "sent_s": moved_s,
                 "head_m": np.round(head_m[k], 6).tolist(),
                 "rotation": np.round(rotation[k].ravel(), 7).tolist(),
                 "centre_m": np.round(centre_m[k], 6).tolist(),
@@ -99,7 +103,7 @@ def main() -> None:
         if not log.exists():
             repeat_log(RECORDED, log, REPEATS_PER_HOUR * hours)
         if "log judge" in given.commands and not truth.exists():
-            write_truth(log, truth)
+            write_truth(RECORDED, truth, REPEATS_PER_HOUR * hours)
         for name in given.commands:
             out = given.folder / f"out{hours}"
             words = [word.format(log=log, truth=truth, out=out) for word in COMMANDS[name]]

@@ -104,7 +104,9 @@ RunSeconds = Annotated[
 TableParquet = Annotated[
     Path | None, typer.Option(help="write the table --out as Parquet here, in addition")
 ]
-RunLog = Annotated[Path, typer.Argument(help="log.mcap of a run, or the .part of a killed one")]
+RunLog = Annotated[
+    Path, typer.Argument(help="log.mcap of a run with all its parts, or a part or .part of it")
+]
 Dask = Annotated[str | None, typer.Option(help="address of a Dask scheduler, e.g. tcp://host:8786")]
 FirstSeed = Annotated[int, typer.Option(min=0, max=10**15, help="first seed; the others follow it")]
 Motion = Annotated[
@@ -137,6 +139,14 @@ RunPort = Annotated[
         "(sim: simulated servos); robot: the ports of the robot's file; default: the "
         "simulator",
     ),
+]
+PartMb = Annotated[
+    float | None,
+    typer.Option(min=1.0, help="megabytes after which the log continues in a new file"),
+]
+PartMinutes = Annotated[
+    float | None,
+    typer.Option(min=0.1, help="minutes after which the log continues in a new file"),
 ]
 Film = Annotated[bool, typer.Option("--film/--no-film", help="draw a film of the run")]
 Marked = Annotated[

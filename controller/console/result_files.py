@@ -22,6 +22,8 @@ REPORT = "report.html"
 SUMMARY = "summary.json"
 MAP = "map.npz"
 """Map of a run that maps its ground; a world of kind ``map`` accepts it."""
+_PARTS = "log.part*.mcap"
+"""Further parts of a long log; the one that is being written has one more ending."""
 RUN_FILES = (LOG, f"{LOG}.part", FILM, REPORT, SUMMARY, MAP)
 """Files of a run in its folder, which holds the files of one run only."""
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
@@ -163,11 +165,11 @@ def refuse_another_run(folder: Path, force: bool) -> None:
 
 
 def _refuse_run_files(folder: Path, force: bool) -> None:
-    there = [name for name in RUN_FILES if (folder / name).exists()]
+    there = run_files(folder)
     if there and not force:
+        names = ", ".join(file.name for file in there)
         raise InputError(
-            f"{folder}: holds a run ({', '.join(there)}); give another --out, or --force, which "
-            "deletes these"
+            f"{folder}: holds a run ({names}); give another --out, or --force, which deletes these"
         )
 
 
@@ -192,8 +194,13 @@ def refuse_mixture(log: Path, folder: Path, force: bool) -> None:
 
 def clear_run(folder: Path) -> None:
     """Delete the files of an earlier run, so that none is mistaken for one of the next."""
-    for name in RUN_FILES:
-        (folder / name).unlink(missing_ok=True)
+    for file in run_files(folder):
+        file.unlink(missing_ok=True)
+
+
+def run_files(folder: Path) -> list[Path]:
+    """Return the files of a run in its folder, and the further parts of its log."""
+    return [file for name in (*RUN_FILES, f"{_PARTS}*") for file in folder.glob(name)]
 
 
 def check_picture(path: Path | None) -> None:

@@ -10,6 +10,8 @@ from snakewalk.controller.console.options import (
     Film,
     Force,
     Json,
+    PartMb,
+    PartMinutes,
     Ros,
     RunFolder,
     RunPort,
@@ -30,6 +32,8 @@ class RunOptions(Strict):
     view_at: ViewAt = VIEW_AT
     ros: Ros = False
     film: Film = True
+    part_mb: PartMb = None
+    part_minutes: PartMinutes = None
     out: RunFolder = None
     force: Force = False
     as_json: Json = False

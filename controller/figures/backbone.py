@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from snakewalk.config.colours import AMBER, BLUE, INK, RED
+from snakewalk.config.colours import AMBER, BLUE, HEAD, INK
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.backbone import BackboneFit
 
@@ -18,7 +18,7 @@ def draw_fit(fit: BackboneFit, curve_m: list[list[float]], robot: str, path: Pat
         space = figure.add_subplot(1, 2, 1, projection="3d")
         space.plot(*points.T, color=AMBER, linewidth=2.0, label="curve")
         space.plot(*fit.points_m.T, "o-", color=BLUE, markersize=3.5, label="chain")
-        space.plot(*fit.points_m[:1].T, "o", color=RED, label="head")
+        space.plot(*fit.points_m[:1].T, "o", color=HEAD, label="head")
         space.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
         space.set_box_aspect(np.maximum(np.ptp(points, axis=0), 0.1 * np.ptp(points)))
         space.locator_params(nbins=4)

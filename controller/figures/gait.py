@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.colours import AMBER, BLUE, GREY, PALE, RED
+from snakewalk.config.colours import AMBER, BLUE, GREY, HEAD, PALE
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
 from snakewalk.controller.gaits.gait import Gait
@@ -32,6 +32,8 @@ class Bodies(NamedTuple):
     """(phases, L, 3) link centres; columns: forward, left, up."""
     up: Floats
     """(phases, L) vertical part of the direction in which the back of each link points, -1 to 1."""
+    rolled_m: float
+    """Distance to the left in a cycle of a body that rolls; 0 for other gaits."""
 
 
 def bodies_m(gait: Gait, robot: RobotConfig) -> Bodies:
@@ -42,20 +44,26 @@ def bodies_m(gait: Gait, robot: RobotConfig) -> Bodies:
     frame: Frame | None = None
     shown = []
     backs = []
+    rolls = []
     for k, row in enumerate(joints):
         body = body_in_world(robot, pose, row)
         frame = virtual_chassis(body.link_m, np.array([0.0, 0.0, 1.0]), frame)
+        back = body.rotation[robot.link_count // 2, :, 2] @ frame.rotation
+        rolls.append(np.arctan2(-back[1], back[2]))
         if k % 12 == 0:
             shown.append(frame.to_local_m(body.link_m))
             backs.append(body.rotation[:, :, 2] @ frame.rotation)
     bodies = np.array(shown)
     back = np.array(backs)
+    turned = np.unwrap([*rolls, rolls[0]])
+    rolled_m = -robot.body_radius_m * (turned[-1] - turned[0])
     reach = np.abs(joints).max(axis=0)
     sideways, upwards = (reach[list(j)].max(initial=0.0) for j in (yaw, robot.pitch_joints))
     # the chassis lies in the plane of the strongest bends: stand it up where these lift
     if upwards > 1.5 * sideways:
-        return Bodies(bodies[..., [0, 2, 1]] * [1, -1, 1], back[..., 1])
-    return Bodies(bodies, back[..., 2])
+        return Bodies(bodies[..., [0, 2, 1]] * [1, -1, 1], back[..., 1], 0.0)
+    bodies[..., 1] += rolled_m * np.arange(PHASES)[:, None] / PHASES
+    return Bodies(bodies, back[..., 2], rolled_m)
 
 
 def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
@@ -88,7 +96,11 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
                 axes.yaxis.set_major_locator(MaxNLocator(2, symmetric=True))
                 if column > 0:
                     axes.set_yticklabels([])
-            panels[2 * row][column].set_title(f"{k}/{PHASES} of the cycle")
+            above = panels[2 * row][column]
+            above.set_title(f"{k}/{PHASES} of the cycle")
+            if bodies.rolled_m:
+                way_m = (0.0, bodies.rolled_m), (0.0, 0.0)
+                above.annotate("", *way_m, arrowprops={"arrowstyle": "->"})
         side = "up (m)" if stretch == 1.0 else f"up (m), {stretch:.0f} x"
         for row in (0, 2):
             panels[row][0].set_ylabel("left (m)")
@@ -98,9 +110,12 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
         marks = [
             Line2D([], [], color=BLUE, linewidth=4, label="back up"),
             Line2D([], [], color=AMBER, linewidth=4, label="belly up"),
-            Line2D([], [], color=RED, marker="o", linestyle="", label="head"),
+            Line2D([], [], color=HEAD, marker="o", linestyle="", label="head"),
         ]
-        figure.legend(handles=marks, loc="outside lower center", ncols=3)
+        if bodies.rolled_m:
+            rolls = f"rolls {abs(bodies.rolled_m):.2f} m a cycle without slip"
+            marks.append(Line2D([], [], color="black", marker=">", label=rolls))
+        figure.legend(handles=marks, loc="outside lower center", ncols=len(marks))
         figure.suptitle(f"{gait.name} on {robot.name}", x=0.01, ha="left", fontweight="bold")
         save_picture(figure, path, dpi=110)
 
@@ -113,5 +128,5 @@ def _body(axes: Axes, line: Floats, up: Floats) -> None:
     axes.add_collection(
         LineCollection(list(pieces), colors=colours, linewidths=widths, capstyle="round")
     )
-    axes.plot(*line[0], "o", color=RED, markersize=6, zorder=4)
+    axes.plot(*line[0], "o", color=HEAD, markersize=6, zorder=4)
     axes.axhline(0.0, color=GREY, linewidth=0.5, zorder=0)

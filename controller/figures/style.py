@@ -66,19 +66,16 @@ def style() -> Iterator[None]:
         yield
 
 
-def canvas(
-    rows: int, height_in: float, *, ratios: list[float] | None = None
-) -> tuple[Figure, list[Axes]]:
+def canvas(rows: int, height_in: float) -> tuple[Figure, list[Axes]]:
     """Make a figure with ``rows`` panels one below the other."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-    panels = figure.subplots(
-        rows,
-        1,
-        sharex=True,
-        squeeze=False,
-        gridspec_kw={"height_ratios": ratios or [1.0] * rows},
-    )
-    return figure, list(panels[:, 0])
+    return figure, list(figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0])
+
+
+def label_time(axes: Axes, end_s: float) -> None:
+    """Label the axis of the time of a run, from torque on to its end."""
+    axes.set_xlabel("time (s)")
+    axes.set_xlim(0.0, max(end_s, 1e-3))
 
 
 def trace(axes: Axes, time_s: Floats, values: Floats, colour: str, label: str) -> None:

@@ -1,15 +1,18 @@
 """Path error: waypoints reached in order, and distance of the body from its path."""
 
+from functools import partial
+from itertools import pairwise, starmap
+
 import numpy as np
 import scipy  # its modules load when they are first used
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import PlanSummary, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable
 
 _WINDOW_M = 0.5  # around the place reached, so that a crossing branch is not the nearest
 _ROUNDING_M = 2e-6  # of the log
-_ROWS = 2000
 _TRACK_S = 0.2
 _SMOOTH_S = 2.0
 
@@ -39,14 +42,13 @@ def path_error_m(record: RunRecord) -> Floats:
     pose = record.pose
     if len(record.header.plan.waypoints_m) == 0:
         return np.full(len(pose.time_s), np.nan)
-    starts = [start for start, _ in record.paths]
     until_s = np.append(pose.time_s, np.inf)[1:]
-    which = np.searchsorted(starts, until_s) - 1
+    starts = np.searchsorted(until_s, [start for start, _ in record.paths], side="right")
     error = np.full(len(pose.time_s), np.nan)
-    for k, (_, path) in enumerate(record.paths):
-        rows = np.flatnonzero(which == k)
-        for part in np.split(rows, range(_ROWS, len(rows), _ROWS)):
-            error[part] = distance_m(pose.centre_m[part, :2], path[:, :2], pose.path_s_m[part])
+    for rows, (_, path) in zip(
+        starmap(slice, pairwise([*starts, None])), record.paths, strict=True
+    ):
+        error[rows] = distance_m(pose.centre_m[rows, :2], path[:, :2], pose.path_s_m[rows])
     return error
 
 
@@ -56,6 +58,10 @@ def distance_m(points_m: Floats, path_m: Floats, along_m: Floats) -> Floats:
     The path is taken to come straight to its start: a body that lies behind it is not off it.
     Where ``along_m`` is NaN the whole path is searched.
     """
+    return np.asarray(by_rows(partial(_distance_m, path_m), points_m, along_m))
+
+
+def _distance_m(path_m: Floats, points_m: Floats, along_m: Floats) -> Floats:
     step = np.diff(path_m, axis=0)
     length = np.hypot(*step.T)
     has_length = length > 1e-9

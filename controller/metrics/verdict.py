@@ -42,6 +42,8 @@ class RunVerdict:
     """Command that shows more of the cause; None without one."""
     failure: Cause | None = None
     """Class of the cause; None without a failure, or if no class fits."""
+    report: str | None = None
+    """Path of the run's report, which is drawn last; None if no folder keeps it."""
 
     @property
     def is_unconfirmed(self) -> bool:

@@ -1,6 +1,7 @@
 """Judgement of a run on a served robot by the truth of the server."""
 
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.verdict import verdict
+from snakewalk.controller.runlog.column import by_rows, release
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
@@ -93,9 +95,10 @@ def judge(
     stated_m = plan.waypoint_radius_m + SD * max(numbers.pose_position_sd_m or 0.0, LEAST_SD_M)
     track_m = truth.centre_m[:, :2]
     reached, closest = true_arrivals(track_m, plan.waypoints_m, near_m)
-    off_path_m = _off_path_m(truth, record)
+    coarse_m = truth.centre_m[:: _stride(truth), :2].copy()
+    off_path_m = _off_path_m(coarse_m, record)
     head_m, heading_rad = pose_errors(truth, record)
-    steps_m = truth.centre_m[:: _stride(truth), :2]
+    release([truth.centre_m])
     return Judgement(
         waypoints=len(plan.waypoints_m),
         claimed=0 if is_unconfirmed else len(waypoint_times_s(record.pose, plan)),
@@ -109,7 +112,7 @@ def judge(
         pose_error_rms_m=_rms(head_m),
         pose_error_max_m=_largest_value(head_m),
         heading_error_rms_deg=_rms(np.degrees(heading_rad)),
-        travelled_m=round(float(np.hypot(*np.diff(steps_m, axis=0).T).sum()), 3),
+        travelled_m=round(float(np.hypot(*np.diff(coarse_m, axis=0).T).sum()), 3),
     )
 
 
@@ -121,7 +124,7 @@ def true_arrivals(
     reached = 0
     closest = []
     for waypoint_m in waypoints_m:
-        away_m = np.hypot(*(centre_m[first:] - waypoint_m).T)
+        away_m = by_rows(partial(_distances_m, waypoint_m), centre_m[first:])
         closest.append(float(away_m.min()) if len(away_m) else np.inf)
         within = np.flatnonzero(away_m <= radius_m)
         if reached < len(closest) - 1:
@@ -145,14 +148,20 @@ def pose_errors(truth: Truth, record: RunRecord) -> tuple[Floats, Floats]:
     within = (at_s >= truth.time_s[0]) & (at_s <= truth.time_s[-1])
     at_s = at_s[within]
     true_m = np.stack([np.interp(at_s, truth.time_s, truth.head_m[:, k]) for k in range(2)], 1)
-    heading = np.unwrap(np.arctan2(truth.rotation[:, 1, 0], truth.rotation[:, 0, 0]))
-    true_rad = np.interp(at_s, truth.time_s, heading)
-    rotations = pose.rotation[within]
-    turn = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0]) - true_rad
+    true_rad = np.interp(at_s, truth.time_s, np.unwrap(by_rows(_heading_rad, truth.rotation)))
+    turn = by_rows(_heading_rad, pose.rotation)[within] - true_rad
     return (
-        np.hypot(*(pose.head_m[within, :2] - true_m).T),
+        np.hypot(*(pose.head_m[:, :2][within] - true_m).T),
         np.abs(np.angle(np.exp(1j * turn))),
     )
+
+
+def _distances_m(place_m: Floats, track_m: Floats) -> Floats:
+    return np.asarray(np.hypot(*(track_m - place_m).T))
+
+
+def _heading_rad(rotation: Floats) -> Floats:
+    return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
 
 
 def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
@@ -160,18 +169,16 @@ def clock_offset_s(truth: Truth, record: RunRecord) -> float | None:
     source = record.pose_source
     if not len(source.time_s):
         return None
-    row = {int(sequence): k for k, sequence in enumerate(truth.sequence)}
-    rows = np.array([row.get(int(sequence), -1) for sequence in source.sequence])
-    is_known = (rows >= 0) & np.isfinite(source.arrival_s)
+    rows = np.searchsorted(truth.sequence, source.sequence, side="right") - 1
+    is_known = (truth.sequence[rows] == source.sequence) & np.isfinite(source.arrival_s)
     is_known[is_known] = np.isfinite(truth.sent_s[rows[is_known]])
     if not is_known.any():
         return None
     return float((source.arrival_s[is_known] - truth.sent_s[rows[is_known]]).min())
 
 
-def _off_path_m(truth: Truth, record: RunRecord) -> Floats:
-    """Distance (n,) of the true body from the nearest of the run's paths."""
-    centre_m = truth.centre_m[:: _stride(truth), :2]
+def _off_path_m(centre_m: Floats, record: RunRecord) -> Floats:
+    """Distance (n,) of the true body (n, 2) from the nearest of the run's paths."""
     unknown_along_m = np.full(len(centre_m), np.nan)
     off = [distance_m(centre_m, path_m[:, :2], unknown_along_m) for _, path_m in record.paths]
     return np.asarray(np.min(off, axis=0))

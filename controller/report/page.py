@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from urllib.parse import quote
 
 from snakewalk.config.errors import InputError
@@ -18,9 +18,10 @@ from snakewalk.controller.console.result_files import LOG
 from snakewalk.controller.console.shared_text import shared, without_folders
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.verdict import RunVerdict, verdict
-from snakewalk.controller.report.trip import trip_of
+from snakewalk.controller.report.trip import Trip, trip_of
 from snakewalk.controller.runlog.record import Event, RunRecord
 
+T = TypeVar("T", RunSummary, Event, Trip, RunVerdict)
 _EVENTS_SHOWN = 300
 INLINE_BYTES = 8_000_000
 _TYPES = {".mp4": "video/mp4", ".webm": "video/webm", ".gif": "image/gif"}
@@ -34,8 +35,6 @@ class Section:
     caption: str
     image: str
     """Data URI."""
-    is_folded: bool = False
-    """Whether a click shows the figure: the curves contain the same data."""
 
 
 class Drawings(NamedTuple):
@@ -92,22 +91,12 @@ def page(
         "world": header.world.model_dump(mode="json"),
     }
     if not folders:
-        numbers_by_name = {field.name: getattr(numbers, field.name) for field in fields(numbers)}
-        texts: dict[str, Any] = {
-            key: without_folders(text)
-            for key, text in numbers_by_name.items()
-            if isinstance(text, str)
-        }
-        numbers = replace(numbers, **texts)
+        numbers = _without_folders(numbers)
         config = shared(config)
         creation_text = without_folders(creation_text)
-        events = [replace(event, text=without_folders(event.text)) for event in events]
-        trip = None if trip is None else replace(trip, reason=without_folders(trip.reason))
-        cause = None if run_verdict.cause is None else without_folders(run_verdict.cause)
-        command = (
-            None if run_verdict.next_command is None else without_folders(run_verdict.next_command)
-        )
-        run_verdict = replace(run_verdict, cause=cause, next_command=command)
+        events = [_without_folders(event) for event in events]
+        trip = None if trip is None else _without_folders(trip)
+        run_verdict = _without_folders(run_verdict)
     every = numbers.to_dict() if folders else shared(numbers.to_dict())
     return str(
         _template().render(
@@ -131,6 +120,13 @@ def page(
             made=creation_text,
         )
     )
+
+
+def _without_folders(facts: T) -> T:
+    """Return a dataclass whose texts have no folders of the user's files."""
+    values = {field.name: getattr(facts, field.name) for field in fields(facts)}
+    texts: Any = {name: text for name, text in values.items() if isinstance(text, str)}
+    return replace(facts, **shared(texts))
 
 
 @cache
@@ -184,7 +180,7 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
         (
             "Waypoints",
             f"{_fmt(n.waypoints_reached, 0)} of {n.waypoints}",
-            f"in {_fmt(n.duration_s, 1)} s",
+            duration_text,
         ),
         (
             "Path error",
@@ -219,9 +215,7 @@ def _tiles(n: RunSummary) -> list[tuple[str, str, str]]:
     law = n.assumptions["friction_law"]
     tiles.append(("Law of friction", str(law["value"]), f"{law['kind']}; {law['source']}"))
     friction_found = n.friction_found
-    if friction_found is None:
-        tiles.append(("Friction found", "not estimated", "the world's file applies"))
-    else:
+    if friction_found is not None:
         (along, along_to), (across, across_to) = friction_found.along_95, friction_found.across_95
         tiles.append(
             (

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.result_files import LOG
+from snakewalk.controller.console.result_files import LOG, REPORT
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.travel import Travel
 from snakewalk.controller.metrics.verdict import RunVerdict, verdict
@@ -18,7 +18,7 @@ from snakewalk.controller.run.observers import Observers
 from snakewalk.controller.run.pose_provider import PoseProvider
 from snakewalk.controller.run.prepared_run import PreparedRun
 from snakewalk.controller.runlog.record import RunRecord
-from snakewalk.controller.runlog.writer import part_path
+from snakewalk.controller.runlog.writer import ONE_PART, PartLimits, part_path
 from snakewalk.controller.runtime.drive import OnEvent, OnProgress, Outcome
 from snakewalk.drivers.errors import DriverError, notes_of
 from snakewalk.drivers.safety.safe_link import TORQUE_IS_OFF, SafeLink
@@ -104,6 +104,8 @@ class RunRequest:
     """Whether the run has a button, which ``snakewalk stop`` presses."""
     shadow: bool = False
     """Whether a simulated chain follows the same goals; log and ``on_event`` report differences."""
+    log_limits: PartLimits = ONE_PART
+    """Limits from which the log continues in a new part."""
     observers: Observers | None = None
     """Observers of the run: page, ROS node, plug-ins."""
     confirm: Callable[[str], bool] | None = None
@@ -144,8 +146,10 @@ class RunResult:
     @property
     def verdict(self) -> RunVerdict:
         """How the run ended, as every result states it."""
-        log = LOG if self.saved_log is None else str(self.saved_log)
-        return verdict(self.record, self.summary, log)
+        if self.saved_log is None:
+            return verdict(self.record, self.summary, LOG)
+        report = str(self.folder.absolute() / REPORT)
+        return replace(verdict(self.record, self.summary, str(self.saved_log)), report=report)
 
     @property
     def log(self) -> Path:

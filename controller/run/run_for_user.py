@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
+from math import inf
 
 import typer
 
@@ -13,6 +14,7 @@ from snakewalk.controller.run.observers import Observers, open_observers
 from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
 from snakewalk.controller.run.request import RunRequest, RunResult
 from snakewalk.controller.run.run_robot import run_robot
+from snakewalk.controller.runlog.writer import PartLimits
 
 
 def observers_of(
@@ -69,6 +71,7 @@ def run_for_user(
                 folder,
                 options.port,
                 overwrite=options.force,
+                log_limits=PartLimits(options.part_mb or inf, options.part_minutes or inf),
                 shadow=shadow,
                 observers=watching,
                 confirm=_confirm if can_ask else None,

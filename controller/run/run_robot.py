@@ -208,7 +208,8 @@ def open_run(
             button = stack.enter_context(StopButton(prepared.run.name, checked.ports, folder))
         place.enter_context(cleared_folder(folder, request.overwrite))
         ending.log = path
-        log = stack.enter_context(RunLog(path, observers.on_row if observers else None))
+        on_row = observers.on_row if observers else None
+        log = stack.enter_context(RunLog(path, on_row, request.log_limits))
         if button is not None:
             _tell_how_to_stop(checked)
             observers.on_button(button.path)

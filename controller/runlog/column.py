@@ -5,12 +5,13 @@ and curves read.
 """
 
 import json
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from mmap import ACCESS_READ, MADV_DONTNEED, mmap
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryFile, gettempdir
 from typing import (
     Any,
     ClassVar,
@@ -168,6 +169,11 @@ class Topic:
         ).encode()
 
 
+def storage_folder(path: Path) -> Path:
+    """Return the folder for the columns of a long file: its own, because /tmp may be in memory."""
+    return path.parent if os.access(path.parent, os.W_OK) else Path(gettempdir())
+
+
 class StoredColumn:
     """A column of a long log in an unnamed file; only the rows that are used are in memory."""
 
@@ -192,6 +198,8 @@ class StoredColumn:
 
     def mapped(self) -> Any:
         """Return all rows; they occupy memory until the returned array is released."""
+        if not self._file.tell():
+            return np.empty((0, *self._shape), self._type)
         pages = mmap(self._file.fileno(), 0, access=ACCESS_READ)
         return np.frombuffer(pages, self._type).reshape(-1, *self._shape)
 

@@ -2,13 +2,14 @@
 
 import json
 import os
+import re
 import struct
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 from pathlib import Path
-from tempfile import gettempdir
 from typing import Any, BinaryIO
 
 from mcap.exceptions import McapError
@@ -19,11 +20,11 @@ from zstandard import ZstdError, decompress, frame_content_size
 
 from snakewalk.config.archive import MOST_LOG_BYTES, check_expansion
 from snakewalk.config.errors import InputError
-from snakewalk.controller.runlog.column import ROWS
+from snakewalk.controller.runlog.column import ROWS, storage_folder
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.tables import RowPacker, record_of
-from snakewalk.controller.runlog.topics import FORMAT, ConfigTable
-from snakewalk.controller.runlog.writer import part_path
+from snakewalk.controller.runlog.topics import FORMAT, ConfigTable, CycleTable
+from snakewalk.controller.runlog.writer import REPEATED, part_path
 
 _MAGIC = bytes([137, 77, 67, 65, 80, 48, 13, 10])
 _HEAD = struct.Struct("<BQ")  # opcode and length before every record
@@ -38,6 +39,7 @@ _COMPRESSIONS = ("zstd", "")
 _MOST_NAMED_TOPICS = 8
 """Topics that a message names at most (ours)."""
 _BROKEN = (McapError, ZstdError, ValueError, KeyError, RecursionError, struct.error)
+_REPEATED = [table.topic.name for table in REPEATED]
 Rows = dict[str, list[dict[str, Any]]]
 
 
@@ -54,7 +56,7 @@ def read_log(
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Args:
-        path: the log.
+        path: the log, or a part of it; a log's further parts in its folder are read after it.
         is_snakewalk_log: whether this process wrote it, so that no limit of expansion applies.
         on_progress: called with (bytes read, of) while it is read.
 
@@ -85,8 +87,19 @@ def _record(
     on_progress: Callable[[float, float], None] | None,
 ) -> RunRecord:
     """Return the record of an open log; only a chunk of it is in memory at once."""
-    packer = RowPacker(_storage(path))
-    rows, last_s, complete, lost, fault = _rows(path, file, packer, is_snakewalk_log, on_progress)
+    packer = RowPacker(storage_folder(path))
+    rows: Rows = defaultdict(list)
+    read = partial(_add_rows, packer, rows, is_snakewalk_log, on_progress)
+    last_s, complete, lost, fault = read(path, file)
+    parts = _next_parts(path)
+    for part in parts.values():
+        if fault:
+            break
+        with part.open("rb") as opened:
+            last_s, is_whole, lost_here, fault = read(part, opened)
+        complete = complete and is_whole
+        lost += lost_here
+    missing = [number for number in range(2, max(parts, default=1)) if number not in parts]
     configs = rows[ConfigTable.topic.name]
     if not configs:
         if _whole_records(file)[1] and _crcs_agree(file) and not lost:
@@ -99,6 +112,8 @@ def _record(
     note = "" if complete else f"the log is cut or damaged; its last row is of {last_s:.2f} s"
     if lost:
         note += f"; {lost} damaged parts are left out"
+    if missing:
+        note += f"; its parts {', '.join(map(str, missing))} are missing"
     if fault:
         note = f"only its first {last_s:.0f} s were read: {fault}; free space in {packer.folder}"
     try:
@@ -107,9 +122,11 @@ def _record(
         raise LogError(f"{path}: is not a log of this version: {error}") from None
 
 
-def _storage(path: Path) -> Path:
-    """Return the folder for the columns of a long log: its own, because /tmp may be in memory."""
-    return path.parent if os.access(path.parent, os.W_OK) else Path(gettempdir())
+def _next_parts(log: Path) -> dict[int, Path]:
+    """Return the further parts of a log by their numbers; a killed run left the last one open."""
+    name = re.compile(rf"{re.escape(log.stem)}\.part(\d+){re.escape(log.suffix)}(\.part)?")
+    named = ((name.fullmatch(file.name), file) for file in log.parent.iterdir())
+    return dict(sorted((int(match[1]), file) for match, file in named if match))
 
 
 def _foreign(file: BinaryIO) -> str:
@@ -131,19 +148,23 @@ def _foreign(file: BinaryIO) -> str:
     )
 
 
-def _rows(
-    path: Path,
-    file: BinaryIO,
+def _add_rows(
     packer: RowPacker,
+    rows: Rows,
     is_snakewalk_log: bool,
     on_progress: Callable[[float, float], None] | None,
-) -> tuple[Rows, float, bool, int, str]:
-    """Rows by topic, time of the last one, whether the file is whole, damaged parts, disk fault."""
+    path: Path,
+    file: BinaryIO,
+) -> tuple[float, bool, int, str]:
+    """Add the rows of a part of a log to those of the parts before, by topic.
+
+    Returns: time of the last row, whether the file is whole, damaged chunks, fault of the disk.
+    """
+    has_begun = not rows
     complete, unpacked, packed = _whole_records(file)
     if not is_snakewalk_log:
         check_expansion(path, packed, unpacked, most_bytes=MOST_LOG_BYTES)
     complete = complete and _crcs_agree(file)
-    rows: Rows = defaultdict(list)
     lost = list[str]()
     topics = _topics(path, file)
     last_ns = 0
@@ -157,9 +178,11 @@ def _rows(
                 if not isinstance(row, dict):
                     raise ValueError("a row is a JSON object")
                 topic = topics[record.channel_id]
-                rows[topic].append(row)
-                packer.pack(topic, rows)
-                last_ns = max(last_ns, record.log_time)
+                has_begun |= topic == CycleTable.topic.name
+                if has_begun or not _is_repeated(path, topic, row, rows):
+                    rows[topic].append(row)
+                    packer.pack(topic, rows)
+                    last_ns = max(last_ns, record.log_time)
             if on_progress is not None and number % ROWS == 0:
                 on_progress(file.tell(), packed)
     except _BROKEN:
@@ -167,7 +190,21 @@ def _rows(
     except OSError as error:  # a run that has ended well does not fail because of its log
         complete = False
         fault = error.strerror or str(error)
-    return rows, last_ns * 1e-9, complete and not lost, len(lost), fault
+    return last_ns * 1e-9, complete and not lost, len(lost), fault
+
+
+def _is_repeated(path: Path, topic: str, row: dict[str, Any], rows: Rows) -> bool:
+    """Whether a row at the begin of a part repeats one of an earlier part.
+
+    Raises:
+        LogError: it is another configuration.
+
+    """
+    if topic in _REPEATED and row in rows[topic]:
+        return True
+    if topic == ConfigTable.topic.name:
+        raise LogError(f"{path}: is of another run; move it to another folder")
+    return False
 
 
 def _from_start(file: BinaryIO, *, validate_crcs: bool = False) -> Iterator[McapRecord]:

@@ -6,10 +6,10 @@ on the servos' clock, the arrival of its datagram (null: never), and the place o
 
 import json
 import math
-from array import array
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
@@ -18,6 +18,7 @@ import numpy as np
 from snakewalk.config.archive import parse_json
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.runlog.column import ROWS, StoredColumn, storage_folder
 from snakewalk.controller.runlog.record import MotorEnergy
 
 FORMAT = 1
@@ -95,7 +96,31 @@ def read_truth(path: Path) -> Truth:
 
     """
     header: dict[str, Any] = {}
-    numbers = array("d")
+    lines = _lines(path, header)
+    table = StoredColumn(storage_folder(path), np.empty((0, _NUMBERS)))
+    while some := list(islice(lines, ROWS)):
+        table.append(np.array(some))
+    if not header:
+        raise InputError(
+            f"{path}: contains no truth of a served robot; give the file of bus serve --truth"
+        )
+    rows = table.mapped()
+    if not len(rows):
+        raise InputError(f"{path}: the served robot was never measured")
+    return Truth(
+        header,
+        rows[:, 0].astype(np.int64),
+        rows[:, 1],
+        rows[:, 2],
+        rows[:, 3:6],
+        rows[:, 6:15].reshape(-1, 3, 3),
+        rows[:, 15:18],
+        rows[:, 18:],
+    )
+
+
+def _lines(path: Path, header: dict[str, Any]) -> Iterator[list[float]]:
+    """Fill the header from the first line, and yield the numbers of each other line."""
     damaged = 0
     try:
         with path.open(encoding="utf-8-sig") as file:
@@ -108,32 +133,15 @@ def read_truth(path: Path) -> Truth:
                     damaged = count
                     continue
                 if count > 1:
-                    numbers.extend(_numbers(row))
+                    yield _numbers(row)
                 elif isinstance(row, dict) and row.get("snakewalk_truth") == FORMAT:
-                    header = row
+                    header.update(row)
                 else:
                     break
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{path}: is damaged ({type(error).__name__}: {error})") from None
-    if not header:
-        raise InputError(
-            f"{path}: contains no truth of a served robot; give the file of bus serve --truth"
-        )
-    if not numbers:
-        raise InputError(f"{path}: the served robot was never measured")
-    table = np.frombuffer(numbers).reshape(-1, _NUMBERS)
-    return Truth(
-        header,
-        table[:, 0].astype(np.int64),
-        table[:, 1],
-        table[:, 2],
-        table[:, 3:6],
-        table[:, 6:15].reshape(-1, 3, 3),
-        table[:, 15:18],
-        table[:, 18:],
-    )
 
 
 def _numbers(row: Mapping[str, Any]) -> list[float]:

@@ -1,10 +1,13 @@
 """Writes the log row by row: a kill costs half a second at most, a disk fault stops the run."""
 
 import logging
+import math
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -23,7 +26,9 @@ from snakewalk.controller.runlog.topics import (
     CycleTable,
     EventTable,
     ImuTable,
+    PathTable,
     SlowTable,
+    WaypointTable,
 )
 from snakewalk.drivers.types import JointState
 
@@ -36,19 +41,50 @@ because the processor's caches forget the printing code between two cycles."""
 _CHUNK_BYTES = 1 << 20
 
 
+REPEATED = (ConfigTable, EventTable, PathTable, WaypointTable)
+"""Tables whose newest row begins each part of a log; of events it is the start."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartLimits:
+    """Limits from which the next cycle begins a new part of a log."""
+
+    size_mb: float = math.inf
+    minutes: float = math.inf
+
+
+ONE_PART = PartLimits()
+
+
 class RunLog:
     """Log of one run, as a context manager: ``<path>.part``, renamed to ``path`` at the end.
 
+    A log beyond ``limits`` continues in ``parts``, each of which can be read alone.
     Times must not be negative. Any method raises OSError if the disk does not accept the bytes.
     ``on_row`` gets the topic and the JSON of every row at once; without it the rows of fast topics
     are printed in batches, within ``_FLUSH_S``.
     """
 
-    def __init__(self, path: Path, on_row: Callable[[str, bytes], None] | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        on_row: Callable[[str, bytes], None] | None = None,
+        limits: PartLimits = ONE_PART,
+    ) -> None:
         self.path = path
+        """File of the part that is written."""
+        self._paths = count_paths(path)
         self._on_row = on_row
+        self._limits = limits
+        self._repeated: dict[type[Table], tuple[float, bytes]] = {}
+        self._has_config = self._has_cycles = False
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._part = part_path(path)
+        self._open(0.0)
+
+    def _open(self, time_s: float) -> None:
+        self.path = next(self._paths)
+        self._part = part_path(self.path)
+        self._part_s = self._flushed_s = time_s
         self._file = self._part.open("w+b")
         try:
             self._begin()
@@ -68,12 +104,10 @@ class RunLog:
         for table in TABLES:
             if not table.topic.is_optional:
                 self._register(table)
-        self._flushed_s = 0.0
         self._batch: list[tuple[type[Table], float, Mapping[str, Any] | bytes]] = []
         """Rows that are not written yet, of slow topics as they are printed."""
         self._last_rows: dict[type[Table], bytes] = {}
         """Newest row of each topic that holds only changes, without its time."""
-        self._has_config = self._has_cycles = False
 
     def _register(self, table: type[Table]) -> None:
         topic = table.topic
@@ -93,12 +127,7 @@ class RunLog:
         not accept stays ``.part``, and the error names it.
         """
         try:
-            try:
-                self._write_batch()
-                self._writer.finish()
-                self._restore()
-            finally:
-                self._file.close()
+            self._finish()
         except OSError as fault:
             write_error = error if isinstance(error, OSError) else fault
             write_error.filename = write_error.filename or str(self._part)
@@ -112,6 +141,21 @@ class RunLog:
             self._part.unlink()
         else:
             self._part.replace(self.path)
+
+    def _finish(self) -> None:
+        try:
+            self._write_batch()
+            self._writer.finish()
+            self._restore()
+        finally:
+            self._file.close()
+
+    def _begin_part(self, time_s: float) -> None:
+        """End the part of the log, and begin the next one with the rows that it needs."""
+        self._finish()
+        self._part.replace(self.path)
+        self._open(time_s)
+        self._batch = [(table, *row) for table, row in self._repeated.items()]
 
     def config(self, header: Header) -> None:
         """Log the configuration, once and first; the ground is thinned for reports."""
@@ -147,6 +191,11 @@ class RunLog:
         ``values`` are the other fields of ``CycleTable``.
         """
         self._has_cycles = True
+        if (
+            time_s - self._part_s >= 60.0 * self._limits.minutes
+            or self._file.tell() >= 1e6 * self._limits.size_mb
+        ):
+            self._begin_part(time_s)
         self.add(
             CycleTable,
             time_s,
@@ -188,6 +237,8 @@ class RunLog:
         else:
             data = self._printers[table].row(row).encode()
             self._batch.append((table, time_s, data))
+            if table in REPEATED and row.get("kind", "start") == "start":
+                self._repeated[table] = time_s, data
             if self._on_row is not None:
                 self._on_row(table.topic.name, data)
         if time_s - self._flushed_s >= _FLUSH_S:
@@ -248,6 +299,13 @@ def _stored_fields(row: Mapping[str, Any]) -> Mapping[str, Any]:
         name: value.copy() if isinstance(value, np.ndarray) and value.flags.writeable else value
         for name, value in row.items()
     }
+
+
+def count_paths(log: Path) -> Iterator[Path]:
+    """Yield the path of a log, and of its next parts, without an end."""
+    yield log
+    for number in count(2):
+        yield log.with_name(f"{log.stem}.part{number}{log.suffix}")
 
 
 def part_path(path: Path) -> Path:

@@ -219,7 +219,8 @@ class _LivePage:
         else:
             verdict = RunVerdict(**row)
             self._dashboard.show_verdict(verdict)
-            self._stop.judged(f"{verdict.text} ({verdict.evidence})")
+            report = "" if verdict.report is None else f"; report: {verdict.report}"
+            self._stop.judged(f"{verdict.text} ({verdict.evidence}){report}")
 
     def _open_run(self, header: Header) -> None:
         """Draw the body of a run that begins, and its panels."""

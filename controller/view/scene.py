@@ -21,7 +21,7 @@ from snakewalk.controller.runlog.record import POSE_CHECK, Header, RunRecord
 from snakewalk.drivers.types import BodyPose
 from snakewalk.sim.physics.solids import Solid, solids
 
-_HEAD = (205, 72, 12)
+_HEAD = colours.rgb(colours.HEAD)
 _LINKS = ((26, 70, 128), (60, 118, 180)), ((30, 104, 52), (84, 168, 96))
 """Two colours in turn, of the first run in a page and of the second."""
 _HOT = (214, 32, 38)

@@ -24,6 +24,7 @@
         padding: 2px 8px; border-radius: 6px; background: #fff; color: #22303c; box-shadow: 0 1px 4px #0003;
         font: 13px system-ui, sans-serif; pointer-events: none; }
       output:empty { display: none; }
+      #verdict { pointer-events: auto; overflow-wrap: anywhere; }
       #age { background: #b34700; color: #fff; font-weight: 700; }
       @media (prefers-color-scheme: dark) {
         output { background: #22303c; color: #f1f3f5; }

@@ -16,7 +16,11 @@ _TIMES: Final = ("time_s", "deadline_s", "arrival_s")
 
 
 def repeat_log(source: Path, target: Path, times: int, chunk_bytes: int = 1 << 20) -> Path:
-    """Write ``source`` several times into ``target``: times and totals go on, events come once."""
+    """Write ``source`` several times into ``target``: times and totals go on, events come once.
+
+    The cycles have equal distances also between two repetitions. The body jumps there, so a
+    replay on the simulator differs from the second repetition on.
+    """
     with source.open("rb") as file:
         reader = make_reader(file)
         messages = [
@@ -24,11 +28,11 @@ def repeat_log(source: Path, target: Path, times: int, chunk_bytes: int = 1 << 2
             for schema, channel, message in reader.iter_messages()
             if schema is not None
         ]
-    end_s = max(row.get("time_s", 0.0) for _, _, row, _ in messages)
     stops = [m for m in messages if m[1].topic == "/event" and m[2]["kind"] == "stop"]
     starts = [m for m in messages if m[1].topic in _ONCE and m not in stops]
     rows = [m for m in messages if m[1].topic not in _ONCE]
-    period_s = end_s + 0.02
+    deadlines_s = [row["deadline_s"] for _, channel, row, _ in rows if channel.topic == "/cycle"]
+    period_s = deadlines_s[-1] - deadlines_s[0] + deadlines_s[1] - deadlines_s[0]
     totals = {
         name: max([row[name] for _, _, row, _ in rows if row.get(name) is not None], default=0.0)
         for name in _TOTALS

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.config.colours import AMBER, BLUE, INK, RED
+from snakewalk.config.colours import AMBER, BLUE, HEAD, INK, RED
 from snakewalk.controller.animals.mesh.body_model import BodyModel
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
 from snakewalk.controller.animals.mesh.skin import Skin
@@ -71,7 +71,7 @@ def _place(axes: Axes, image: Image, points: Floats, radius: Floats) -> None:
     across = np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.hypot(*along.T)[:, None]
     for side in (-1.0, 1.0):
         axes.plot(*(points + side * radius[:, None] * across).T, color=RED, linewidth=0.9)
-    axes.plot(*points[0], "o", color=BLUE, markersize=4)
+    axes.plot(*points[0], "o", color=HEAD, markersize=4)
     axes.set_axis_off()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snakewalk.config.colours import AMBER, INK, RED, SERIES, SKY
+from snakewalk.config.colours import AMBER, HEAD, INK, SERIES, SKY
 from snakewalk.controller.animals.fish.match_film import FilmMatch
 from snakewalk.controller.animals.fish.postures import Postures
 from snakewalk.controller.animals.fish.silhouettes import grey
@@ -69,7 +69,7 @@ def _frames(panels: list[Axes], matched: FilmMatch, footage: Path) -> None:
         axes.imshow(grey(image), cmap="gray", vmin=0, vmax=255)
         axes.fill(outline[:, 0], -outline[:, 1], fill=False, edgecolor=AMBER, linewidth=1.1)
         axes.plot(spine[:, 0], -spine[:, 1], color=SKY, linewidth=1.0)
-        axes.plot(parameters[0], -parameters[1], "o", color=RED, markersize=3.5)
+        axes.plot(parameters[0], -parameters[1], "o", color=HEAD, markersize=3.5)
         axes.set_xlim(middle[0] - reach, middle[0] + reach)
         axes.set_ylim(-middle[1] + 0.5 * reach, -middle[1] - 0.5 * reach)
         axes.set_title(f"frame {k}")

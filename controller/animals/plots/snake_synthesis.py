@@ -17,6 +17,7 @@ from snakewalk.config.colours import (
     CENTRE,
     GREEN,
     GREY,
+    HEAD,
     INK,
     PATH,
     PURPLE,
@@ -91,7 +92,7 @@ def _map(axes: Axes, walk: SynthesisedWalk, ground: HeightField | None, title: s
     )
     bodies.set_array(some / walk.rate_hz)
     axes.add_collection(bodies)
-    axes.plot(*points[some, 0].T, "o", color=INK, markersize=3.5, zorder=4)
+    axes.plot(*points[some, 0].T, "o", color=HEAD, markersize=3.5, zorder=4)
     between = targets.points_m[~targets.required]
     axes.plot(*between.T, ".", color=GREY, markersize=5, label="targets between")
     number = np.cumsum(targets.required)

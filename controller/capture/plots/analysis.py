@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, INK, PALE
+from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY, HEAD, INK, PALE
 from snakewalk.controller.capture.plots.recording import midlines
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.body_map import body_map
@@ -87,7 +87,7 @@ def _tracks(axes: Axes, analysis: Analysis) -> None:
     some = np.unique(np.linspace(0, len(body) - 1, _BODIES).astype(int))
     axes.add_collection(LineCollection(list(body[some]), linewidths=1.0, colors=PALE, zorder=1))
     middle = body.shape[1] // 2
-    for point, colour, name in ((-1, AMBER, "tail"), (middle, GREEN, "middle"), (0, BLUE, "head")):
+    for point, colour, name in ((-1, AMBER, "tail"), (middle, GREEN, "middle"), (0, HEAD, "head")):
         x, y = body[:, point].T
         axes.plot(x, y, color=colour, linewidth=1.1, label=name)
     axes.set_aspect("equal", adjustable="datalim")

@@ -1,14 +1,17 @@
 """Pictures of a capture: a contact sheet, a film with the skeleton on it, single steps."""
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import DeepImage, Floats, Image
+from snakewalk.config.colours import HEAD, rgb
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.console.result_files import atomic_write
@@ -18,12 +21,14 @@ from snakewalk.controller.images.video import in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _BODY = (60, 200, 255)
-_HEAD = (80, 255, 80)
+_HEAD = rgb(HEAD)[::-1]
 _TEXT = (255, 255, 255)
 _BAD_COLOUR = (80, 80, 255)
 _BACKGROUND_GREY = 32
 _TILE_PX = 200
 _LINE_PX = 14
+_TEXT_PX = 3 * _LINE_PX + 4
+"""Height of the text below a tile."""
 _LETTERS = 32  # of the text on a tile
 _STEP_PX = 300
 _FILM_PX = 480
@@ -53,9 +58,18 @@ def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.
     size = (round(image.shape[1] * factor), round(image.shape[0] * factor))
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
     thick = 2 if max(size) > 2 * _TILE_PX else 1
-    cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
-    cv2.circle(canvas, tuple(int(v) for v in line[0]), 4 * 16, _HEAD, -1, cv2.LINE_AA, 4)
+    _draw_line(canvas, line, thick, 4)
     return np.asarray(line, dtype=np.int32)
+
+
+def _draw_line(canvas: Any, line: NDArray[np.int32], thick: int, head_px: int) -> None:
+    """Draw a line in sixteenths of a pixel, and its head."""
+    cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
+    cv2.circle(canvas, tuple(int(v) for v in line[0]), head_px * 16, _HEAD, -1, cv2.LINE_AA, 4)
+
+
+def _put(canvas: Image, text: str, place: tuple[int, int], tint: tuple[int, int, int]) -> None:
+    cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, tint, 1, cv2.LINE_AA)
 
 
 def _write_line(canvas: Image, text: str, good: bool, line: int = 0) -> None:
@@ -64,9 +78,7 @@ def _write_line(canvas: Image, text: str, good: bool, line: int = 0) -> None:
     canvas[low - _LINE_PX - 4 : low] = np.minimum(
         canvas[low - _LINE_PX - 4 : low], _BACKGROUND_GREY
     )
-    place = (4, low - 5)
-    tint = _TEXT if good else _BAD_COLOUR
-    cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.36, tint, 1, cv2.LINE_AA)
+    _put(canvas, text, (4, low - 5), _TEXT if good else _BAD_COLOUR)
 
 
 def contact_sheet(
@@ -78,30 +90,37 @@ def contact_sheet(
 ) -> None:
     """Frames spread over the recording, every third place kept for frames that were not used.
 
-    Each of several animals has half as many rows, with its number on every tile.
+    A bar on each tile is the scale, in pixels of the film. Each of several animals has half as
+    many rows, with its number on every tile.
     """
     if len(animals) > 1:
         rows = max(1, rows // 2)
     chosen = [set(_chosen(captured, columns * rows)) for captured in animals]
     tiles: list[list[Image]] = [[] for _ in animals]
+    high_px = text_px = 0
     for number, image in enumerate(frames):
         for k, captured in enumerate(animals):
             if number not in chosen[k]:
                 continue
             status = captured.status[number]
-            tile = _tile(image, captured.points_px[number], status)
+            tile, tile_px = _tile(image, captured.points_px[number], status)
+            high_px = max(high_px, tile_px)
             reason = "" if status is FrameStatus.GOOD else f": {status}"
             name = f"animal {k + 1}, " if len(animals) > 1 else ""
-            for line, text in enumerate(wrap(f"{name}{number}{reason}", _LETTERS)[::-1]):
+            lines = wrap(f"{name}{number}{reason}", _LETTERS)[::-1]
+            text_px = max(text_px, _LINE_PX * len(lines) + 4)
+            for line, text in enumerate(lines):
                 _write_line(tile, text, status is FrameStatus.GOOD, line)
             tiles[k].append(tile)
-    empty = np.full((_TILE_PX, _TILE_PX, 3), _BACKGROUND_GREY, dtype=np.uint8)
     wide = min(columns, max(len(row) for row in tiles))
-    placed = [tile for row in tiles for tile in [*row, *[empty] * (-len(row) % wide)]]
+    placed = [
+        tile
+        for row in tiles
+        for tile in [*row, *[np.full_like(row[0], _BACKGROUND_GREY)] * (-len(row) % wide)]
+    ]
+    placed = [np.delete(tile, slice(high_px, -text_px), axis=0) for tile in placed]
     sheet = np.vstack([np.hstack(placed[k : k + wide]) for k in range(0, len(placed), wide)])
-    with atomic_write(path) as part:
-        if not _written(part, sheet):
-            raise InputError(f"{path}: a contact sheet is a .png or .jpg")
+    _write(path, sheet)
 
 
 def trail_picture(
@@ -132,34 +151,45 @@ def trail_picture(
     for number in np.unique(np.linspace(0, captured.used.sum() - 1, 12).astype(int)):
         points = captured.points_px[np.flatnonzero(captured.used)[number]]
         line = np.rint(points * 16.0).astype(np.int32)
-        cv2.polylines(canvas, [line], False, _BODY, 1, cv2.LINE_AA, 4)
-        cv2.circle(canvas, tuple(int(v) for v in line[0]), 3 * 16, _HEAD, -1, cv2.LINE_AA, 4)
-    with atomic_write(path) as part:
-        if not _written(part, np.asarray(canvas, dtype=np.uint8)):
-            raise InputError(f"{path}: a picture is a .png or .jpg")
+        _draw_line(canvas, line, 1, 3)
+    _write(path, np.asarray(canvas, dtype=np.uint8))
 
 
-def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> Image:
-    """The animal and a little around it; all of a frame in which it was not found."""
+def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> tuple[Image, int]:
+    """The animal and a little around it; all of a frame in which it was not found.
+
+    Returns the tile with a bar as scale, and the height of the image on it.
+    """
     if status.has_points:
-        rows, columns, points_px = _window_of_animal(points_px)
+        rows, columns, points_px = _window_of_animal(points_px, is_square=True)
         image = image[rows, columns]
-    return drawn(image, points_px, status, _TILE_PX, _TILE_PX)
+    tile = drawn(image, points_px, status, _TILE_PX, _TILE_PX + _TEXT_PX - 18)
+    factor = min(_TILE_PX / image.shape[1], (len(tile) - 18) / image.shape[0])
+    most = 0.4 * _TILE_PX / factor
+    length = max((k for k in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if k <= most), default=1)
+    high = round(image.shape[0] * factor)
+    end = (4 + round(length * factor), high - 5)
+    cv2.line(tile, (4, high - 5), end, _TEXT, 2)
+    _put(tile, f"{length} px", (4, high - 10), _TEXT)
+    return tile, high
 
 
-def _window_of_animal(points_px: Floats) -> tuple[slice, slice, Floats]:
+def _window_of_animal(points_px: Floats, *, is_square: bool = False) -> tuple[slice, slice, Floats]:
     """Rows and columns of the animal and a little around it; its points (n, 2) within them."""
     reach = 0.12 * float(np.hypot(*np.diff(points_px, axis=0).T).sum()) + 6.0
-    left, top = np.maximum(points_px.min(axis=0) - reach, 0.0).astype(int)
-    right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int)
+    low, high = points_px.min(axis=0) - reach, points_px.max(axis=0) + reach
+    if is_square:
+        low, high = (0.5 * (low + high + side * (high - low).max()) for side in (-1.0, 1.0))
+    left, top = np.maximum(low, 0.0).astype(int)
+    right, bottom = np.ceil(high).astype(int)
     return slice(top, bottom), slice(left, right), points_px - [left, top]
 
 
-def _written(path: Path, image: Image) -> bool:
-    try:
-        return bool(cv2.imwrite(str(path), image))
-    except cv2.error:  # an ending that it does not know
-        return False
+def _write(path: Path, image: Image) -> None:
+    with atomic_write(path) as part, suppress(cv2.error):  # an ending that it does not know
+        if cv2.imwrite(str(part), image):
+            return
+    raise InputError(f"{path}: a picture is a .png or .jpg")
 
 
 def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px: Floats) -> None:
@@ -202,9 +232,7 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
         _write_line(tile, name, good=True)
     gap = np.full((tile_px[1], 8, 3), _BACKGROUND_GREY, dtype=np.uint8)
     sheet = np.hstack([part for tile in named.values() for part in (tile, gap)][:-1])
-    with atomic_write(path) as part:
-        if not _written(part, sheet):
-            raise InputError(f"{path}: a picture is a .png or .jpg")
+    _write(path, sheet)
 
 
 def _chosen(captured: Capture, places: int) -> list[int]:
@@ -270,7 +298,6 @@ def _film_frame(
             used += 1
             line = draw_body(canvas, image, animal.points_px[number])
             place = (int(line[0, 0]) // 16 + 6, int(line[0, 1]) // 16 - 6)
-            text = str(name)
-            cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, _TEXT, 1, cv2.LINE_AA)
+            _put(canvas, str(name), place, _TEXT)
     _write_line(canvas, f"{number}: {used} of {len(animals)} animals", used == len(animals))
     return canvas

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snakewalk.config.colours import AMBER, BLUE, GREEN, GREY
-from snakewalk.controller.figures.style import canvas, legend_above, trace
+from snakewalk.controller.figures.style import canvas, label_time, legend_above, trace
 from snakewalk.controller.runlog.record import RunRecord
 
 
@@ -29,7 +29,6 @@ def attitude_figure(record: RunRecord) -> Figure | None:
         rate_dps = np.rad2deg(imu.rate_rad_s[:, k])
         trace(rates, imu.time_s, rate_dps, colour, f"about {label}")
     rates.set_ylabel("rate (degrees/s)")
-    rates.set_xlabel("time (s)")
-    rates.set_xlim(0.0, max(record.end_s, 1e-3))
+    label_time(rates, record.end_s)
     legend_above(rates)
     return figure

@@ -8,7 +8,6 @@ from snakewalk.controller.figures.path import path_figure
 from snakewalk.controller.figures.style import data_uri, style
 from snakewalk.controller.report.curves import curves_html
 from snakewalk.controller.report.figures.attitude import attitude_figure
-from snakewalk.controller.report.figures.effort import effort_figure
 from snakewalk.controller.report.figures.joints import joints_figure
 from snakewalk.controller.report.figures.safety import safety_figure
 from snakewalk.controller.report.figures.slope import slope_figure
@@ -16,8 +15,6 @@ from snakewalk.controller.report.figures.walk import walk_figure
 from snakewalk.controller.report.page import Section
 from snakewalk.controller.runlog.record import RunRecord
 
-_IN_CURVES = frozenset({"Effort"})
-"""Quantities that the curves of the page show as well, to be zoomed."""
 _SECTIONS: tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...] = (
     (
         "The way",
@@ -50,12 +47,6 @@ _SECTIONS: tuple[tuple[str, str, Callable[[RunRecord], Figure | None]], ...] = (
         slope_figure,
     ),
     (
-        "Effort",
-        "In a long run a curve is a mean, its pale band reaches from least to largest. Torque, "
-        "where its constant is known, is current times constant, gear losses included.",
-        effort_figure,
-    ),
-    (
         "Safety",
         "Every command goes through the limits below the controller: a clamp changes it, a veto "
         "stops the run.",
@@ -70,11 +61,11 @@ def drawn(record: RunRecord) -> tuple[list[Section], str]:
 
 
 def sections(record: RunRecord) -> list[Section]:
-    """Draw the figures for which the log has data; those in the curves as well are folded."""
+    """Draw the figures for which the log has data."""
     with style():
         drawn = [(title, caption, draw(record)) for title, caption, draw in _SECTIONS]
         return [
-            Section(title, caption, data_uri(figure), is_folded=title in _IN_CURVES)
+            Section(title, caption, data_uri(figure))
             for title, caption, figure in drawn
             if figure is not None
         ]

@@ -4,7 +4,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from snakewalk.config.colours import AMBER, BLUE, GREY
-from snakewalk.controller.figures.style import canvas, legend_above, mark_waypoints, trace
+from snakewalk.controller.figures.style import (
+    canvas,
+    label_time,
+    legend_above,
+    mark_waypoints,
+    trace,
+)
 from snakewalk.controller.metrics.ground_slope import ground_slope
 from snakewalk.controller.metrics.path_error import waypoint_times_s
 from snakewalk.controller.runlog.column import by_rows
@@ -41,8 +47,7 @@ def slope_figure(record: RunRecord) -> Figure | None:
             label="walk on wide waves",
         )
     axes.set_ylabel("slope (degrees)")
-    axes.set_xlabel("time (s)")
-    axes.set_xlim(0.0, max(record.end_s, 1e-3))
+    label_time(axes, record.end_s)
     legend_above(axes)
     times_s = waypoint_times_s(pose, header.plan)
     mark_waypoints(panels, times_s, measured=header.pose_evidence.is_measured)

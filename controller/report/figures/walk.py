@@ -39,20 +39,6 @@ def walk_figure(record: RunRecord) -> Figure | None:
             states.scatter(
                 number[chosen], walk.state[chosen], s=size, color=colour, label=label, zorder=2
             )
-        is_wide = walk.carrier_rad > 0.0
-        label = f"wide waves, {is_wide.mean():.0%}"
-        if is_wide.any():
-            states.fill_between(
-                np.add.outer(number, (-0.5, 0.5)).ravel(),
-                0.0,
-                1.0,
-                where=np.repeat(is_wide, 2),
-                color=GREY,
-                alpha=0.25,
-                linewidth=0.0,
-                transform=states.get_xaxis_transform(),
-                label=label,
-            )
         states.set_ylabel("state")
         states.set_title("States of the walk")
         legend_above(states)

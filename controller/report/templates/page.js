@@ -19,11 +19,13 @@ document.querySelectorAll("button[data-time]").forEach(b => b.addEventListener("
 }));
 if (film) {
   let shown = -1;
-  const follow = () => {
-    if (film.currentTime !== shown) show(toRun(shown = film.currentTime));
-    requestAnimationFrame(follow);
+  const next = film.requestVideoFrameCallback ? f => film.requestVideoFrameCallback(f) : requestAnimationFrame;
+  const follow = (_, frame) => {  // the frame that is seen, not the next one
+    const at = film.paused || !frame ? film.currentTime : frame.mediaTime;
+    if (at !== shown) show(toRun(shown = at));
+    next(follow);
   };
-  film.addEventListener("loadeddata", follow, { once: true });
+  follow();
 }
 // Pictures: "time FROM TO" names a panel over time, "track T1 T2 ..." the points of the way.
 const numbers = text => (text.match(/-?\d+(\.\d+)?(e-?\d+)?/g) || []).map(Number);
@@ -122,8 +124,8 @@ document.querySelectorAll("img[src^='data:image/svg+xml;base64,']").forEach(img 
     isDrawing = false;
   };
   cursors.push(mark);
+  show(film ? toRun(film.currentTime) : spec.mark_s);
   plot.on("plotly_click", event => seek(event.points[0].x));
-  if (!film) show(spec.mark_s);
   document.getElementById("joint").addEventListener("change", change => {
     const rows = spec.joints[+change.target.value];
     Plotly.restyle(plot, { y: rows }, rows.map((_, k) => spec.first + k));

@@ -13,6 +13,8 @@ from snakewalk.controller.console.options import (
     VIEW_AT,
     Force,
     Json,
+    PartMb,
+    PartMinutes,
     Robot,
     RunFolder,
     RunPort,
@@ -37,33 +39,6 @@ from snakewalk.controller.run.run_for_user import run_for_user
 _WEEK_S = 604_800.0
 
 
-Domain = Annotated[
-    int | None,
-    typer.Option(
-        min=0,
-        max=232,
-        help="ROS domain; default: ROS_DOMAIN_ID of the environment",
-        show_default=False,
-    ),
-]
-Network = Annotated[
-    bool,
-    typer.Option(
-        "--network",
-        help="let other machines see the node; default: as ROS_AUTOMATIC_DISCOVERY_RANGE "
-        "says, else this machine only",
-    ),
-]
-Timeout = Annotated[
-    float,
-    typer.Option(help="stop moving joints after this many seconds without joint goals; inf: never"),
-]
-FirstGait = Annotated[
-    str | None,
-    typer.Option(help="first gait; default: hold", autocompletion=completion.GAITS),
-]
-
-
 @command(
     "ros",
     examples=(
@@ -76,18 +51,43 @@ def ros(
     robot: Robot = None,
     world: World = None,
     port: RunPort = None,
-    gait: FirstGait = None,
+    gait: Annotated[
+        str | None,
+        typer.Option(help="first gait; default: hold", autocompletion=completion.GAITS),
+    ] = None,
     param: Param = None,
-    domain: Domain = None,
+    domain: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=232,
+            help="ROS domain; default: ROS_DOMAIN_ID of the environment",
+            show_default=False,
+        ),
+    ] = None,
     namespace: Annotated[str, typer.Option(help="namespace of all topics and services")] = "",
-    network: Network = False,
-    timeout: Timeout = 1.0,
+    network: Annotated[
+        bool,
+        typer.Option(
+            "--network",
+            help="let other machines see the node; default: as ROS_AUTOMATIC_DISCOVERY_RANGE "
+            "says, else this machine only",
+        ),
+    ] = False,
+    timeout: Annotated[
+        float,
+        typer.Option(
+            help="stop moving joints after this many seconds without joint goals; inf: never"
+        ),
+    ] = 1.0,
     seconds: Annotated[
         float,
         typer.Option(
             min=0.1, help="switch torque off after this many seconds", show_default="a week"
         ),
     ] = _WEEK_S,
+    part_mb: PartMb = None,
+    part_minutes: PartMinutes = None,
     set_: Set = None,
     view: View = False,
     view_at: ViewAt = VIEW_AT,
@@ -106,7 +106,15 @@ def ros(
     options = RosOptions(domain, namespace, network, commands=True, timeout_s=timeout)
     begun = None if gait is None else gait_by_name(gait, parameters(param))[0]
     run_options = RunOptions(
-        port=port, view=view, view_at=view_at, film=False, out=out, force=force, as_json=as_json
+        port=port,
+        view=view,
+        view_at=view_at,
+        film=False,
+        part_mb=part_mb,
+        part_minutes=part_minutes,
+        out=out,
+        force=force,
+        as_json=as_json,
     )
     opened = open_observer(PAGE, view_at) if view else nullcontext()
     with open_ros(options) as link, opened as page:

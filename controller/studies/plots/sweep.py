@@ -28,7 +28,11 @@ def draw_sweep(rows: list[dict[str, str]], path: Path) -> None:
         axes = figure.subplots(down, across, squeeze=False, sharey=True)
         for panel in axes.flat[len(gaits) :]:
             panel.set_axis_off()
+        of_unit: dict[str, Axes] = {}
         for panel, gait in zip(axes.flat, gaits, strict=False):
+            same_unit = of_unit.setdefault(UNITS[GAITS[gait].aim], panel)
+            if same_unit is not panel:
+                panel.sharex(same_unit)
             _panel(panel, gait, [row for row in rows if row["gait"] == gait], colours)
         handles = [
             Line2D([], [], color=colours[robot], label=robot, marker="o", linestyle="")
@@ -55,7 +59,7 @@ def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str,
             row
             for row in rows
             if row["robot"] == robot
-            and row["cycles"]
+            and np.isfinite(pace(row))
             and 0.0 < number(row, "cost_of_transport") < np.inf
         ]
         drawn += len(some)
@@ -66,7 +70,7 @@ def _panel(axes: Axes, gait: str, rows: list[dict[str, str]], colours: dict[str,
             if r["number"] == "0":
                 axes.scatter([x], [y], s=70, facecolors="none", edgecolors=colour)
     left_out = len(rows) - drawn
-    axes.set_title(gait + f": {left_out} of {len(rows)} without a cost" * bool(left_out))
+    axes.set_title(f"{gait}\n" + f"{left_out} of {len(rows)} without pace or cost" * bool(left_out))
     axes.set_ylabel("cost of transport")
     axes.set_xlabel(f"pace ({UNITS[GAITS[gait].aim]})")
     axes.xaxis.set_major_locator(MaxNLocator(4))

@@ -76,7 +76,7 @@ def test_the_page_stands_alone(hills: Path) -> None:
     html = hills.read_text(encoding="utf-8")
     *sources, link = parsed(html).sources
     assert link == "summary.json", "no log stands beside this page"
-    assert len(sources) == 6
+    assert len(sources) == 5
     for source in sources:
         assert source.startswith("data:image/svg+xml;base64,")
         svg = ElementTree.fromstring(base64.b64decode(source.split(",", 1)[1]))
@@ -334,7 +334,7 @@ def test_the_tiles_are_those_that_the_run_has_numbers_for(record: RunRecord) -> 
     usual = page(record, numbers, Drawings([]))
     assert "Path error" in usual
     assert "On wide waves" not in usual
-    assert "not estimated" in usual
+    assert "Friction found" not in usual
     found = SummarizedFriction(0.1, 0.3, 0.15, 0.25, (0.12, 0.18), (0.2, 0.3))
     more = page(record, replace(numbers, carrier_share=0.25, friction_found=found), Drawings([]))
     assert "On wide waves" in more

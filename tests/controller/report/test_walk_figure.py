@@ -83,19 +83,6 @@ def test_the_count_of_states_has_a_scale_of_its_own_in_its_colour(record: RunRec
     assert len(ticks) <= 6
 
 
-def test_wide_waves_shade_their_decisions_and_state_their_share(record: RunRecord) -> None:
-    states, _, _ = drawn(record, walk(carrier_rad=[0.4, 0, 0.4, 0.4, 0, 0, 0]))
-    assert "wide waves, 43%" in legend(states)
-    (shade,) = (each for each in states.collections if each.get_label() == "wide waves, 43%")
-    bands = [path.get_extents().extents.tolist() for path in shade.get_paths()]
-    assert bands == [[0.5, 0.0, 1.5, 1.0], [2.5, 0.0, 4.5, 1.0]]
-    panel, band = (
-        each.transform([[0.0, 0.0], [0.0, 1.0]])[:, 1]
-        for each in (states.transAxes, shade.get_transform())
-    )
-    np.testing.assert_array_equal(band, panel)
-
-
 def test_the_aim_marks_decisions_without_a_fitting_shape(record: RunRecord) -> None:
     _, aim, _ = drawn(record, walk())
     assert places(aim, "no shape within the tolerance") == [[1, 0.0], [2, 0.1]]

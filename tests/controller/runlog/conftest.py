@@ -18,11 +18,11 @@ from snakewalk.controller.runlog.topics import (
     QposTable,
     WalkTable,
 )
-from snakewalk.controller.runlog.writer import RunLog
+from snakewalk.controller.runlog.writer import ONE_PART, PartLimits, RunLog
 from snakewalk.drivers.types import JointState
 
 JOINTS = 16
-Write = Callable[[Path, int], Path]
+Write = Callable[..., Path]
 
 
 def joint_state(k: int) -> JointState:
@@ -41,7 +41,7 @@ def joint_state(k: int) -> JointState:
     )
 
 
-def write_log(path: Path, cycles: int) -> Path:
+def write_log(path: Path, cycles: int, limits: PartLimits = ONE_PART) -> Path:
     """Log ``cycles`` cycles at 50 Hz."""
     run, robot, world = load_run("flat-square"), load_robot("yaw16"), load_world("flat")
     plan = PlanSummary(
@@ -51,7 +51,7 @@ def write_log(path: Path, cycles: int) -> Path:
         states={"recorded": 40, "random": 160},
     )
     ground = HeightField(np.outer(np.arange(300), np.ones(200)) * 1e-3, 0.02, -2.0, -3.0)
-    with RunLog(path) as log:
+    with RunLog(path, limits=limits) as log:
         log.config(
             Header(
                 run,

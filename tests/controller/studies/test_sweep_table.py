@@ -54,7 +54,7 @@ def test_points_without_a_cost_are_counted(tmp_path: Path) -> None:
             rows.add(point, replace(row(0.2), cost_of_transport=cost))
     with rc_context({"svg.fonttype": "none"}):
         draw_sweep(read_table(path), picture)
-    assert "lateral-undulation: 2 of 4 without a cost" in picture.read_text(encoding="utf-8")
+    assert "2 of 4 without pace or cost" in picture.read_text(encoding="utf-8")
 
 
 def test_columns_are_unique() -> None:
