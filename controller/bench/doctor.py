@@ -29,7 +29,7 @@ from snakewalk.drivers.bus.budget import robot_budget
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.bus.feetech_scan import find_feetech
-from snakewalk.drivers.bus.probe import Overheard, Probe, overhear, probe
+from snakewalk.drivers.bus.probe import Overheard, Probe, overhear
 from snakewalk.drivers.bus.segmented_bus import SegmentedBus
 from snakewalk.drivers.chain.imu_reader import ImuReader
 from snakewalk.drivers.chain.joint_codec import JointUnits
@@ -90,9 +90,6 @@ def imu_finding(bus: DynamixelBus, imu: ImuConfig) -> Finding:
 
 OnStep = Callable[[str], None]
 """Function that gets the name of each step."""
-_DIFFERING_REGISTERS = ("Realtime Tick", "Present Temperature")
-"""Registers that always differ between two servos."""
-_FEETECH_MEASURED = ("Present Position", "Present Temperature")
 _MOST_PINGED = 6
 """Largest number of missing servos that are pinged at each baud rate; for more a broadcast is
 quicker (ours)."""
@@ -152,8 +149,7 @@ def examine(
     on_progress("duplicate IDs")
     pings = [bus.probe(i) for i in expected]
     present_ids = sorted({*pinged, *(p.servo_id for p in pings if p.answered or p.damaged)})
-    measured = _FEETECH_MEASURED if bus.table.facts.is_feetech else _DIFFERING_REGISTERS
-    reads = [bus.probe(i, measured) for i in present_ids]
+    reads = [bus.probe(i, bus.differing) for i in present_ids]
     noise = line_checks.noise(pings, reads, overheard)
     alone = [] if noise is not None else servos.unshared(present_ids, (*pings, *reads))
     clocks = servos.read_clocks(bus, alone, servos.PATIENCE_S)
@@ -190,15 +186,11 @@ def _find(
 ) -> tuple[DynamixelBus, Collection[int]]:
     bus = servo_bus(port, models, latency_s=latency_s)
     pinged = bus.find(expected)
-    patience_s = line_checks.PATIENCE_S
+    patient = servo_bus(port, models, latency_s=line_checks.PATIENCE_S)
     for servo_id in [*pinged, *expected][:_TIMED_SERVOS]:
-        if bus.table.facts.is_feetech:
-            timed = bus.probe(servo_id)
-        else:
-            timed = probe(port, servo_id, _TIMED_SERVOS, patience_s)
+        timed = patient.probe(servo_id)
         late_s = timed.late_s
         if late_s and min(late_s) > latency_s and not timed.damaged:
-            patient = servo_bus(port, models, latency_s=patience_s)
             return patient, patient.find(expected)
         if late_s:
             break

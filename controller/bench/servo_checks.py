@@ -35,7 +35,7 @@ shorter."""
 _POWER_REMEDY = (
     "a loose plug, a bad cable, or a supply that sags: the servo loses its torque in a run"
 )
-_DUPLICATE_REMEDY = (
+DUPLICATE_REMEDY = (
     "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
 )
 
@@ -156,7 +156,7 @@ def duplicates(pings: Sequence[Probe], reads: Sequence[Probe], *, noisy: bool = 
             check,
             "fail",
             f"{shown_subject(shared, 'answer')} {how}: two servos have this ID",
-            _DUPLICATE_REMEDY,
+            DUPLICATE_REMEDY,
         )
     damaged = sorted({p.servo_id for p in probes if p.damaged})
     if damaged:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.bench.servo_checks import DUPLICATE_REMEDY
 from snakewalk.controller.console.finding import Finding, shown_ids, shown_subject
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
 from snakewalk.drivers.bus.feetech_bus import servo_bus
@@ -12,6 +13,7 @@ from snakewalk.drivers.bus.probe import broadcast_ping
 from snakewalk.drivers.errors import BusError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import model_numbers
+from snakewalk.drivers.protocol.feetech import STATUS_BYTES, FeetechInstruction, FeetechParser
 from snakewalk.drivers.protocol.imu_table import imu_model
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
@@ -20,6 +22,7 @@ from snakewalk.drivers.protocol.packet import (
     InstructionPacket,
     encode_instruction,
 )
+from snakewalk.drivers.protocol.protocol1 import frame
 from snakewalk.drivers.protocol.registers import FACTORY_BAUD, alarm_names
 
 FACTORY_ID = 1
@@ -27,8 +30,6 @@ _PROTOCOL_1_BAUDS = (1_000_000, FACTORY_BAUD)
 """Factory rates of AX and of older MX servos."""
 _PROTOCOL_1_IDS = 20
 """Missing IDs that are asked in Protocol 1.0 (ours)."""
-_PROTOCOL_1_PING = 0x01
-_PROTOCOL_1_REPLY_BYTES = 6
 _ECHO_S = 0.02
 """Longest delay of an echo, and of a reply in Protocol 1.0 (ours)."""
 
@@ -141,17 +142,14 @@ def foreign_replies(
 
 
 def _replies_in_protocol_1(port: BytePort, servo_id: int, latency_s: float) -> bool:
-    body = bytes((servo_id, 2, _PROTOCOL_1_PING))
-    packet = b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
+    packet = frame(servo_id, FeetechInstruction.PING)
     port.clearPort()
     port.write(packet)
     byte_s = BITS_PER_BYTE / port.getBaudRate()
-    wire_s = (len(packet) + _PROTOCOL_1_REPLY_BYTES) * byte_s
-    data = port.read_until(_PROTOCOL_1_REPLY_BYTES, port.clock.now_s() + wire_s + latency_s + 2e-3)
-    is_status = len(data) == _PROTOCOL_1_REPLY_BYTES and data[:4] == bytes(
-        (0xFF, 0xFF, servo_id, 2)
-    )
-    return is_status and data != packet and data[5] == ~sum(data[2:5]) & 0xFF
+    wire_s = (len(packet) + STATUS_BYTES) * byte_s
+    data = port.read_until(STATUS_BYTES, port.clock.now_s() + wire_s + latency_s + 2e-3)
+    replies = FeetechParser().feed(data)  # a status packet of Protocol 1.0 is the same
+    return data != packet and any(reply.servo_id == servo_id for reply in replies)
 
 
 def unlisted(
@@ -211,7 +209,7 @@ def unlisted(
         unlisted_text = (
             f"{shown_subject(shared, 'answer')} twice or damaged: two servos have this ID"
         )
-        findings.append(Finding("duplicate IDs", "fail", unlisted_text, _CONNECT_ALONE))
+        findings.append(Finding("duplicate IDs", "fail", unlisted_text, DUPLICATE_REMEDY))
     if alarms:
         unlisted_text = f"{', '.join(alarms)} (not in the robot)"
         remedy = "remove the cause, then switch the servo power off, on"
@@ -223,11 +221,6 @@ def unlisted(
         )
         findings.append(Finding("torque", "warn", unlisted_text, remedy))
     return findings
-
-
-_CONNECT_ALONE = (
-    "connect one of them alone and give it another: snakewalk bus set --id ID --new-id NEW"
-)
 
 
 def _state(bus: DynamixelBus, servo_id: int, reply: PingReply) -> tuple[str | None, bool]:

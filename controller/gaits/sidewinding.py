@@ -7,7 +7,7 @@ from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
-from snakewalk.controller.gaits.wave import joint_amplitude_rad, travelling
+from snakewalk.controller.gaits.wave import two_waves_rad
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -42,12 +42,6 @@ class Sidewinding(Gait):
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params
-        yaw = robot.yaw_joints
-        pitch = robot.pitch_joints
-        joints = np.zeros((len(phase_rad), robot.joint_count))
-        plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
-        lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)
-        joints[:, yaw] = plan * travelling(robot, yaw, phase_rad, p.waves, 0.0)
-        joints[:, yaw] += p.turn_rad / len(yaw)
-        joints[:, pitch] = lift * travelling(robot, pitch, phase_rad, p.waves, p.lead_rad)
+        joints = two_waves_rad(robot, phase_rad, (p.winding_rad, p.lift_rad), p.waves, p.lead_rad)
+        joints[:, robot.yaw_joints] += p.turn_rad / len(robot.yaw_joints)
         return joints

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.gaits.gait import Gait, GaitParameters, Needs
-from snakewalk.controller.gaits.wave import joint_amplitude_rad, places, travelling
+from snakewalk.controller.gaits.wave import places, two_waves_rad
 
 if TYPE_CHECKING:
     from snakewalk.config.robot import RobotConfig
@@ -36,12 +36,6 @@ class TurnInPlace(Gait):
 
     def _shape_rad(self, robot: "RobotConfig", phase_rad: Floats) -> Floats:
         p = self.params
-        yaw = robot.yaw_joints
-        pitch = robot.pitch_joints
-        joints = np.zeros((len(phase_rad), robot.joint_count))
-        plan = joint_amplitude_rad(robot, yaw, p.winding_rad, p.waves)
-        lift = joint_amplitude_rad(robot, pitch, p.lift_rad, p.waves)
-        share = np.sign(1.0 - 2.0 * places(robot, pitch))
-        joints[:, yaw] = plan * travelling(robot, yaw, phase_rad, p.waves, 0.0)
-        joints[:, pitch] = lift * share * travelling(robot, pitch, phase_rad, p.waves, np.pi / 2)
+        joints = two_waves_rad(robot, phase_rad, (p.winding_rad, p.lift_rad), p.waves, np.pi / 2)
+        joints[:, robot.pitch_joints] *= np.sign(1.0 - 2.0 * places(robot, robot.pitch_joints))
         return joints

@@ -61,3 +61,19 @@ def group_places(robot: "RobotConfig", joints: tuple[int, ...]) -> Floats:
     """(n + 1,) middles of the rigid groups between ``joints``, in the scale of ``places``."""
     edges = np.concatenate([[0.0], places(robot, joints), [1.0]])
     return np.asarray((edges[:-1] + edges[1:]) / 2.0)
+
+
+def two_waves_rad(
+    robot: "RobotConfig",
+    phase_rad: Floats,
+    sizes_rad: tuple[float, float],
+    waves: float,
+    lead_rad: float,
+) -> Floats:
+    """(T, J) a wave in plan and one in height that leads it by ``lead_rad``."""
+    joints = np.zeros((len(phase_rad), robot.joint_count))
+    axes = robot.yaw_joints, robot.pitch_joints
+    for axis, size_rad, ahead_rad in zip(axes, sizes_rad, (0.0, lead_rad), strict=True):
+        amplitude_rad = joint_amplitude_rad(robot, axis, size_rad, waves)
+        joints[:, axis] = amplitude_rad * travelling(robot, axis, phase_rad, waves, ahead_rad)
+    return joints

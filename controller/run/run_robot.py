@@ -68,7 +68,6 @@ from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
 from snakewalk.controller.walk.course import OnCourse
 from snakewalk.controller.walk.live_course import LiveCourse, MotionOnCourse
 from snakewalk.controller.walk.twin import UsesFriction
-from snakewalk.drivers.chain.recheck import Recheck
 from snakewalk.drivers.clock import Clock
 from snakewalk.drivers.errors import DriverError, notes_of
 from snakewalk.drivers.priority import raised_priority
@@ -419,9 +418,7 @@ def _stop_requested(
     )
 
 
-def _recovery(
-    request: RunRequest, backend: Backend, warn: Callable[[str, str], None]
-) -> Recovery[Recheck]:
+def _recovery(request: RunRequest, backend: Backend, warn: Callable[[str, str], None]) -> Recovery:
     safety = request.prepared.run.safety
     return Recovery(
         backend.chain,

@@ -1,6 +1,6 @@
 """Simulators of a sweep, as plug-ins; each yields finished measurements."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol
@@ -26,10 +26,8 @@ class SweepOptions:
     dask: str | None
 
 
-class _Sweep(Protocol):
-    """``warp_sweep.measure_together``."""
-
-    def __call__(self, points: Sequence[Point], device: str | None) -> Iterator[Result]: ...
+_Sweep = Callable[[Sequence[Point], str | None], Iterator[Result]]
+"""Type of ``warp_sweep.measure_together``."""
 
 
 class SweepBackend(Protocol):

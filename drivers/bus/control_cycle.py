@@ -64,15 +64,6 @@ class CycleCounters:
     program or its computer paused."""
 
 
-@dataclass(frozen=True, slots=True)
-class CycleRegisters:
-    """Registers of a control cycle: the goal, 4 bytes, and the block that is read."""
-
-    goal_address: int = 116
-    read_address: int = 126
-    read_bytes: int = 10
-
-
 class ControlCycle:
     """Writes the goals of servos, and reads one block of registers from each."""
 
@@ -81,7 +72,7 @@ class ControlCycle:
         port: BytePort,
         ids: Sequence[int],
         *,
-        registers: CycleRegisters = CycleRegisters(),
+        registers: tuple[int, int, int] = (116, 126, 10),
         fast: bool = True,
         latency_s: float = 0.004,
         pending: PendingReplies | None = None,
@@ -93,7 +84,7 @@ class ControlCycle:
         Args:
             port: the line; its servos have a return delay of 0.
             ids: servos, in the order of all arrays.
-            registers: addresses of goal and block.
+            registers: address of the goal, 4 bytes; address and length of the block.
             fast: begin with fast sync read.
             latency_s: largest delay of adapter and driver.
             pending: pending replies of this port, shared by all senders; None: this cycle is alone.
@@ -104,14 +95,13 @@ class ControlCycle:
 
         """
         self._port = port
-        self._goals = self._goal_write(ids, registers.goal_address)
+        goal_address, self.read_address, self.read_bytes = registers
+        """First address and length of the block."""
+        self._goals = self._goal_write(ids, goal_address)
         self._ids = tuple(ids)
         self._default_order = tuple(range(len(ids)))
         self._order = self._default_order
         self._requests: dict[tuple[bool, int, tuple[int, ...]], GroupReadRequest] = {}
-        self.read_address = registers.read_address
-        self.read_bytes = registers.read_bytes
-        """First address and length of the block."""
         self._latency_s = latency_s
         self._failed_in_a_row = 0
         self._clean_in_a_row = 0

@@ -11,10 +11,11 @@ from typing import TypeVar
 
 import dynamixel_sdk as sdk
 
-from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
+from snakewalk.drivers.bus.budget import STATUS_BYTES
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.line_reservation import LineReservation
 from snakewalk.drivers.bus.pending_replies import PendingReplies
-from snakewalk.drivers.bus.probe import Probe, broadcast_ping, probe
+from snakewalk.drivers.bus.probe import SETTLE_S, Probe, broadcast_ping, probe_with
 from snakewalk.drivers.bus.register_io import check_accepted, read_register, write_register
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort, reopen
@@ -24,6 +25,7 @@ from snakewalk.drivers.protocol.control_table import (
     Register,
     load_control_table,
 )
+from snakewalk.drivers.protocol.feetech import FeetechParser
 from snakewalk.drivers.protocol.packet import (
     ALERT,
     BITS_PER_BYTE,
@@ -32,6 +34,7 @@ from snakewalk.drivers.protocol.packet import (
     InstructionPacket,
     encode_instruction,
 )
+from snakewalk.drivers.protocol.parser import PacketParser
 
 T = TypeVar("T")
 PROBES = 5
@@ -56,6 +59,14 @@ class PingReply:
 
 class DynamixelBus:
     """Servos on one byte port."""
+
+    differing = "Realtime Tick", "Present Temperature"
+    """Block of registers in which two servos with one ID differ, so that their replies collide.
+    Their replies to a ping may be equal."""
+    _parser: type[PacketParser | FeetechParser] = PacketParser
+    _status_bytes = STATUS_BYTES
+    _ping_bytes = _PING_BYTES
+    _settle_s = SETTLE_S
 
     def __init__(
         self,
@@ -95,6 +106,10 @@ class DynamixelBus:
     def parts(self) -> "tuple[DynamixelBus, ...]":
         """The bus itself; a ``SegmentedBus`` has one per port."""
         return (self,)
+
+    def part_of(self, servo_id: int) -> "DynamixelBus":
+        """The bus itself."""
+        return self
 
     def port_of(self, servo_id: int) -> BytePort:
         """Port of a servo or another device."""
@@ -157,9 +172,21 @@ class DynamixelBus:
             PortError: the port is gone.
 
         """
-        table = self.table_of(servo_id)
-        ends = None if block is None else (table[block[0]], table[block[1]])
-        return probe(self.port, servo_id, PROBES, self.latency_s, ends)
+        span, length = None, self._ping_bytes
+        if block is not None:
+            first, last = (self.table_of(servo_id)[name] for name in block)
+            length = last.address + last.size - first.address
+            span = first.address, length
+        packet = self._probe_packet(servo_id, span)
+        wait_s = self._settle_s + self.latency_s
+        reply_bytes = self._status_bytes + length
+        return probe_with(self.port, servo_id, PROBES, packet, reply_bytes, wait_s, self._parser)
+
+    def _probe_packet(self, servo_id: int, span: tuple[int, int] | None) -> bytes:
+        """Read of ``span`` (address, length), or ping."""
+        kind = Instruction.PING if span is None else Instruction.READ
+        params = b"".join(number.to_bytes(2, "little") for number in span or ())
+        return encode_instruction(InstructionPacket(servo_id, kind, params))
 
     def read(self, servo_id: int, name: str) -> int:
         """Value of a register.
@@ -315,7 +342,7 @@ class DynamixelBus:
         return ControlCycle(
             self.port,
             servo_ids,
-            registers=CycleRegisters(
+            registers=(
                 self._shared_register(servo_ids, "Goal Position").address,
                 start,
                 end_address - start,
@@ -331,7 +358,7 @@ class DynamixelBus:
         return ControlCycle(
             self.port,
             (device_id,),
-            registers=CycleRegisters(read_address=address, read_bytes=length),
+            registers=(0, address, length),
             fast=False,
             latency_s=self.latency_s,
             pending=self._pending,
@@ -362,18 +389,14 @@ class DynamixelBus:
         """Run a transaction, and again after silence or damage; a refusal is final."""
         for remaining in range((tries or self._tries) - 1, -1, -1):
             try:
-                return self._call_with_recovery(transaction)
+                return transaction()
             except NoAnswerError:
                 self.port.drain_until_quiet(self.latency_s)  # the reply may be late
                 if not remaining:
                     raise
+            finally:
+                self.port.is_using = False
         raise AssertionError("tries is at least 1")
-
-    def _call_with_recovery(self, call: Callable[[], T]) -> T:
-        try:
-            return call()
-        finally:
-            self.port.is_using = False
 
     def _check_result(self, result: int, servo_id: int, what: str) -> None:
         if result != sdk.COMM_SUCCESS:

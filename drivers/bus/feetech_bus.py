@@ -10,7 +10,7 @@ import numpy as np
 
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.bus.control_cycle import ControlCycle
-from snakewalk.drivers.bus.dynamixel_bus import PROBES, DynamixelBus, PingReply
+from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
 from snakewalk.drivers.bus.feetech_cycle import (
     Convert,
     FeetechCycle,
@@ -19,7 +19,6 @@ from snakewalk.drivers.bus.feetech_cycle import (
     state_convert,
     supply_convert,
 )
-from snakewalk.drivers.bus.probe import Probe, probe_with
 from snakewalk.drivers.errors import BusError, ControlTableError, NoAnswerError
 from snakewalk.drivers.port.byte_port import BytePort
 from snakewalk.drivers.protocol.control_table import Model, Register
@@ -42,6 +41,12 @@ _REPLY_S = 0.005
 
 class FeetechBus(DynamixelBus):
     """Feetech servos of one byte order on one byte port."""
+
+    differing = "Present Position", "Present Temperature"
+    _parser = FeetechParser
+    _status_bytes = STATUS_BYTES
+    _ping_bytes = 0
+    _settle_s = _REPLY_S
 
     def __init__(
         self,
@@ -103,25 +108,10 @@ class FeetechBus(DynamixelBus):
             lambda: self._exchange(servo_id, FeetechInstruction.READ, span, register.size)
         ).params
 
-    def probe(self, servo_id: int, block: tuple[str, str] | None = None) -> Probe:
-        """Ping 5 times until quiet, or read from the first to the last register of a block.
-
-        Raises:
-            PortError: the port is gone.
-
-        """
-        code = FeetechInstruction.PING
-        params = b""
-        length = 0
-        if block is not None:
-            first, last = (self.table_of(servo_id)[name] for name in block)
-            code = FeetechInstruction.READ
-            length = last.address + last.size - first.address
-            params = bytes((first.address, length))
-        packet = frame(servo_id, code, params)
-        wait_s = _REPLY_S + self.latency_s
-        reply_bytes = STATUS_BYTES + length
-        return probe_with(self.port, servo_id, PROBES, packet, reply_bytes, wait_s, FeetechParser)
+    def _probe_packet(self, servo_id: int, span: tuple[int, int] | None) -> bytes:
+        if span is None:
+            return frame(servo_id, FeetechInstruction.PING)
+        return frame(servo_id, FeetechInstruction.READ, bytes(span))
 
     def write(self, servo_id: int, name: str, value: int, tries: int | None = None) -> None:
         """Write a register; an EEPROM register lasts until power-off while Lock is 1.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bytes
 from snakewalk.config.servo_model import RegisterRow, ServoModel
-from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.fast_path import FastPath
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
@@ -36,6 +36,7 @@ class FeetechReadRequest(GroupReadRequest):
     """Sync read of ``length`` bytes at ``address`` from ``ids``, or a read of one servo."""
 
     header = HEADER
+    parser = FeetechParser
 
     def __init__(self, ids: Sequence[int], address: int, length: int, *, is_single: bool) -> None:
         span = bytes((address, length))
@@ -59,12 +60,6 @@ class FeetechReadRequest(GroupReadRequest):
         if unexpected or not reply.valid.all():
             return reply
         return reply._replace(whole=True, flawless=not reply.error.any())
-
-    def missing_bytes(self, raw: bytes) -> int:
-        """Number of bytes that would complete the replies, or 0."""
-        reader = FeetechParser()
-        missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
-        return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 
 
 class FeetechWrite(GroupWrite):
@@ -119,7 +114,7 @@ class FeetechCycle(ControlCycle):
         super().__init__(
             port,
             ids,
-            registers=CycleRegisters(read_address=span[0], read_bytes=span[1]),
+            registers=(0, *span),
             fast=False,
             latency_s=latency_s,
             pending=pending,
@@ -183,15 +178,16 @@ class FeetechSingleReads(FeetechCycle):
 
     def finish_read(self) -> GroupReadReply:
         """Read each servo."""
-        replies = [single.read() for single in self._singles]
+        replies = zip(*(single.read() for single in self._singles), strict=True)
+        data, valid, error, answered, clean, whole, flawless = replies
         return GroupReadReply(
-            np.concatenate([reply.data for reply in replies]),
-            np.concatenate([reply.valid for reply in replies]),
-            np.concatenate([reply.error for reply in replies]),
-            np.concatenate([reply.answered for reply in replies]),
-            clean=all(reply.clean for reply in replies),
-            whole=all(reply.whole for reply in replies),
-            flawless=all(reply.flawless for reply in replies),
+            np.concatenate(data),
+            np.concatenate(valid),
+            np.concatenate(error),
+            np.concatenate(answered),
+            all(clean),
+            all(whole),
+            all(flawless),
         )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Bytes
 from snakewalk.drivers.protocol.crc import crc16
+from snakewalk.drivers.protocol.feetech import FeetechParser
 from snakewalk.drivers.protocol.frames import FLAWLESS, HEAD, IRREGULAR, read_fast, read_plain
 from snakewalk.drivers.protocol.packet import (
     BROADCAST_ID,
@@ -62,6 +63,7 @@ class GroupReadRequest:
 
     header = HEADER
     """First bytes of each packet of the reply."""
+    parser: type[PacketParser | FeetechParser] = PacketParser
 
     def __init__(self, ids: Sequence[int], address: int, length: int, *, fast: bool) -> None:
         params = address.to_bytes(2, "little") + length.to_bytes(2, "little") + bytes(ids)
@@ -120,7 +122,7 @@ class GroupReadRequest:
         if self.fast:
             start = raw.rfind(self._fast_head)
             return HEAD if start < 0 else max(0, start + self.reply_bytes - len(raw))
-        reader = PacketParser()
+        reader = self.parser()
         missing = len(self.ids) - len(self._in_turn(reader.feed(raw))[0])
         return max(1, missing * self.frame_bytes - reader.pending) if missing else 0
 

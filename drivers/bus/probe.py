@@ -1,12 +1,10 @@
 """Requests that receive until the line is quiet: they reveal equal IDs and other masters."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from snakewalk.drivers.bus.budget import STATUS_BYTES
 from snakewalk.drivers.port.byte_port import BytePort
-from snakewalk.drivers.protocol.control_table import Register
+from snakewalk.drivers.protocol.feetech import FeetechParser
 from snakewalk.drivers.protocol.packet import (
     BITS_PER_BYTE,
     BROADCAST_ID,
@@ -19,7 +17,7 @@ from snakewalk.drivers.protocol.packet import (
 from snakewalk.drivers.protocol.parser import PacketParser
 
 _PING_BYTES = 3
-_SETTLE_S = 2e-3
+SETTLE_S = 2e-3
 """Silence after a request, longer than the longest return delay (0.508 ms)."""
 _REPLY_REMAINDER_S = 0.05
 """Longest delay of the rest of a reply (ours): a busy computer hands over a part of it first."""
@@ -50,48 +48,6 @@ class Probe:
     """Delay of each complete reply beyond the time on the wire and the return delay."""
 
 
-def probe(
-    port: BytePort,
-    servo_id: int,
-    requests: int,
-    latency_s: float,
-    block: tuple[Register, Register] | None = None,
-) -> Probe:
-    """Ping ``servo_id`` several times, or read from it, each time until the line is quiet.
-
-    ``block`` is the first and the last register to read; None: ping.
-
-    Raises:
-        PortError: the port is gone.
-
-    """
-    kind = Instruction.PING
-    span = b""
-    data_bytes = _PING_BYTES
-    if block is not None:
-        kind = Instruction.READ
-        address = block[0].address
-        data_bytes = block[1].address + block[1].size - address
-        span = address.to_bytes(2, "little") + data_bytes.to_bytes(2, "little")
-    packet = encode_instruction(InstructionPacket(servo_id, kind, span))
-    reply_bytes = STATUS_BYTES + data_bytes
-    wait_s = _SETTLE_S + latency_s
-    return probe_with(port, servo_id, requests, packet, reply_bytes, wait_s, PacketParser)
-
-
-class ReplyParser(Protocol):
-    """Parser of received bytes."""
-
-    dropped_bytes: int
-
-    @property
-    def pending(self) -> int:
-        """Bytes of an incomplete packet."""
-
-    def feed(self, data: bytes, /) -> Sequence[object]:
-        """Packets that these bytes complete."""
-
-
 def probe_with(
     port: BytePort,
     servo_id: int,
@@ -99,7 +55,7 @@ def probe_with(
     packet: bytes,
     reply_bytes: int,
     wait_s: float,
-    new_parser: Callable[[], ReplyParser],
+    new_parser: type[PacketParser | FeetechParser],
 ) -> Probe:
     """Send a request of any protocol several times, each time until the line is quiet.
 

@@ -43,6 +43,10 @@ class SegmentedBus:
         """The bus on each port."""
         return self._parts
 
+    def part_of(self, servo_id: int) -> DynamixelBus:
+        """Bus of the port of a servo or another device."""
+        return self._bus_of[servo_id]
+
     def port_of(self, servo_id: int) -> BytePort:
         """Port of a servo or another device."""
         return self._bus_of[servo_id].port
@@ -110,7 +114,7 @@ class SegmentedBus:
             PortError: a port is gone; the others have the value.
 
         """
-        self._call_each_port(
+        self.call_each_port(
             lambda bus, places: bus.sync_write([servo_ids[k] for k in places], name, value),
             self._places(servo_ids),
         )
@@ -161,9 +165,9 @@ class SegmentedBus:
                 "ports: the servo models have their block of a control cycle at different "
                 "addresses; use models with the same control table"
             )
-        return SegmentedCycle(cycles, places, self._call_each_port)
+        return SegmentedCycle(cycles, places, self)
 
-    def _call_each_port(
+    def call_each_port(
         self,
         do: Callable[[DynamixelBus, list[int]], None],
         places: Mapping[DynamixelBus, list[int]],
@@ -201,21 +205,19 @@ class SegmentedCycle:
         self,
         cycles: Mapping[DynamixelBus, ControlCycle],
         places: Mapping[DynamixelBus, list[int]],
-        call_each: Callable[
-            [Callable[[DynamixelBus, list[int]], None], Mapping[DynamixelBus, list[int]]], None
-        ],
+        bus: SegmentedBus,
     ) -> None:
         """Prepare.
 
         Args:
             cycles: of each port.
             places: indices of each port's servos in the common arrays.
-            call_each: ``SegmentedBus._call_each_port``.
+            bus: bus of the ports.
 
         """
         self._cycles = cycles
         self._places = places
-        self._call_each_port = call_each
+        self._call_each_port = bus.call_each_port
         self._count = sum(map(len, places.values()))
 
     @property
@@ -288,13 +290,5 @@ class SegmentedCycle:
                 reply.answered,
                 reply.error,
             )
-        bus_replies = replies.values()
-        return GroupReadReply(
-            data,
-            valid,
-            error,
-            answered,
-            clean=all(r.clean for r in bus_replies),
-            whole=all(r.whole for r in bus_replies),
-            flawless=all(r.flawless for r in bus_replies),
-        )
+        *_, clean, whole, flawless = zip(*replies.values(), strict=True)
+        return GroupReadReply(data, valid, error, answered, all(clean), all(whole), all(flawless))

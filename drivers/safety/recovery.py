@@ -6,70 +6,25 @@ that an overload has shut down is rebooted first, if the run permits it.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Generic, Literal, Protocol, TypeVar
+from collections.abc import Callable
+from typing import Literal
 
 from snakewalk.config.arrays import Floats
-from snakewalk.drivers.clock import Clock
-from snakewalk.drivers.errors import ChainError, ChainFault, DriverError, FaultCause, PortError
+from snakewalk.drivers.chain.recheck import Recheck
+from snakewalk.drivers.chain.servo_chain import ServoChain
+from snakewalk.drivers.errors import ChainError, DriverError, FaultCause, PortError
 from snakewalk.drivers.types import JointState
 
 Policy = Literal["stop", "confirm", "resume"]
 _RETRY_S = 0.1
 
 
-class ChainComparison(Protocol):
-    """The chain after an interruption; as a string, one line for the operator."""
-
-    @property
-    def faults(self) -> Sequence[ChainFault]:
-        """Faults that forbid a continuation."""
-        ...
-
-    @property
-    def doubt(self) -> str | None:
-        """Reason why only a person can confirm the same chain, or None."""
-        ...
-
-
-C = TypeVar("C", bound=ChainComparison)
-
-
-class RecoverableLink(Protocol[C]):
-    """Methods of a chain for a recovery."""
-
-    @property
-    def clock(self) -> Clock:
-        """The port's clock."""
-        ...
-
-    def reopen(self) -> None:
-        """Open the port again; raises ``PortError`` while it is missing."""
-        ...
-
-    def hold(self) -> None:
-        """Set the goals to the present positions, as far as known."""
-        ...
-
-    def reboot(self, joint: int) -> None:
-        """Restart a joint's servo."""
-        ...
-
-    def recheck(self, believed_rad: Floats) -> C:
-        """Compare the chain with its earlier state and its joints with credible positions."""
-        ...
-
-    def resume(self, state_check: C) -> JointState:
-        """Continue from the present positions."""
-        ...
-
-
-class Recovery(Generic[C]):
+class Recovery:
     """Recovers an interrupted chain a few times; pass it to ``SafeLink(recovery=...)``."""
 
     def __init__(
         self,
-        chain: RecoverableLink[C],
+        chain: ServoChain,
         *,
         policy: Policy = "stop",
         patience_s: float = 10.0,
@@ -180,7 +135,7 @@ class Recovery(Generic[C]):
 
     def _wait_for_chain(
         self, believed_rad: Floats, stopped: Callable[[], str | None], joint: int | None
-    ) -> C | None:
+    ) -> Recheck | None:
         """A chain that may continue; None after ``patience_s``.
 
         The servo of ``joint`` is rebooted; a later alarm ends the wait.

@@ -189,7 +189,7 @@ class Ax12Servos(SimulatedServos):
         aim = np.where(inside, shaft, self._trajectory.position - np.sign(error) * margin / per_rad)
         drive.goal_rad[:] = np.where(wheel, push / WHEEL_GAIN, aim)
         full = np.minimum(self["Torque Limit"], self["Max Torque"]) / 1023.0
-        drive.pwm_limit[:] = np.where(self._no_output, 0.0, full)
+        drive.pwm_limit[:] = np.where(self.no_output, 0.0, full)
         drive.current_limit_a[:] = np.inf
         self.blocked_shaft.hold()
 

@@ -2,7 +2,7 @@
 
 import math
 import random
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Protocol, assert_never
 
@@ -13,78 +13,12 @@ from snakewalk.config.arrays import Indices
 from snakewalk.config.errors import ConfigError
 from snakewalk.sim.line.clock import SimClock
 from snakewalk.sim.line.noise import FaultScript, Noise
-from snakewalk.sim.servo.event_queue import EventQueue
+from snakewalk.sim.servo.simulated_servos import FaultyServos
 
 _Actions = tuple[Callable[[], None], Callable[[], None] | None]
 """Actions at the beginning and at the end of a fault; None: the fault does not end."""
 _ID_KEYS = ("id", "takes", "behind")
 """Keys of a fault that name one servo."""
-
-
-class FaultyProtection(Protocol):
-    """Supply, heat and alarms of some servos."""
-
-    def alarms(self, row: int) -> Mapping[str, int]:
-        """Errors that a servo can detect, by kind of fault, and their bits."""
-        ...
-
-    def supply(self, volts: float | None, rows: Indices | None = None) -> None:
-        """Set the supply of all servos, or of ``rows``; None: the usual voltage."""
-        ...
-
-    def heat(self, rows: Indices, celsius: float) -> None:
-        """Set housing temperatures."""
-        ...
-
-    def detect(self, rows: Indices, error: int) -> None:
-        """Raise an error of some servos."""
-        ...
-
-
-class FaultyServos(Protocol):
-    """The servos of a line; rows follow the chain."""
-
-    @property
-    def events(self) -> EventQueue:
-        """Scheduled events."""
-        ...
-
-    @property
-    def protection(self) -> FaultyProtection:
-        """Their supply, heat and alarms."""
-        ...
-
-    def block_shafts(self, rows: Indices) -> None:
-        """Block shafts where they are."""
-        ...
-
-    def free_shafts(self, rows: Indices) -> None:
-        """Free blocked shafts."""
-        ...
-
-    def cut_output(self, rows: Indices, on: bool) -> None:
-        """Disconnect output stages from their motors, or reconnect them."""
-        ...
-
-    def set_reading(self, rows: Indices, name: str, value: int | None) -> None:
-        """Let servos report a constant value in a register; None: the present one."""
-        ...
-
-    def clear_reading(self, rows: Indices, name: str) -> None:
-        """Let servos report measured values in a register again."""
-        ...
-
-    def cut_power(self, rows: Indices) -> None:
-        """Switch the supply off."""
-        ...
-
-    def restore_power(self, rows: Indices) -> None:
-        """Restore the supply; the servos restart."""
-        ...
-
-    def reboot(self, row: int) -> None:
-        """Restart one servo."""
-        ...
 
 
 class FaultTarget(Protocol):

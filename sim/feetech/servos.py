@@ -327,7 +327,7 @@ class FeetechServos(SimulatedServos):
         motor = self._drive_sign()
         drive.p_gain_per_rad[:] *= np.where(closed, sensor * motor, 1.0)
         drive.goal_rad[:] = mounting.sign * (np.where(closed, sensor, motor) * aim - shift)
-        drive.pwm_limit[:] = np.where(self._no_output, 0.0, limit)
+        drive.pwm_limit[:] = np.where(self.no_output, 0.0, limit)
         drive.current_limit_a[:] = limit_a
         self.blocked_shaft.hold()
         self._was_on = on

@@ -14,7 +14,7 @@ from snakewalk.sim.rendering.crowd_mesh import CrowdMeshes
 from snakewalk.sim.rendering.ground_tiles import GroundTiles
 from snakewalk.sim.rendering.looks import Scene, dressed_model
 from snakewalk.sim.rendering.movie_file import MovieFile
-from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.offscreen import Offscreen, plain_scene
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 FOVY_DEG = 45.0
@@ -81,9 +81,7 @@ class CrowdView:
         self._data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, self._data)
         mujoco.mj_camlight(model, self._data)
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + model.nskin)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene = plain_scene(model, model.ngeom + model.nskin)
         self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._option.skingroup[:] = 0  # the meshes add those in use
         self._screen = Offscreen(model, *size_px)

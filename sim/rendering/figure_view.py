@@ -9,7 +9,7 @@ from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import Scene, SkinLook, dressed_model
-from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.offscreen import Offscreen, plain_scene
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, surface_points_m
 
 
@@ -48,9 +48,7 @@ class FigureView:
         mujoco.mj_camlight(self._model, self._data)
         self._faces = look.faces
         room = self._model.ngeom + self._model.nbody + 11
-        self._scene = mujoco.MjvScene(self._model, maxgeom=room)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene = plain_scene(self._model, room)
         self._camera, self._option = mujoco.MjvCamera(), mujoco.MjvOption()
         self._screen = Offscreen(self._model, *size_px)
 

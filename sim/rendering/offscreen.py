@@ -81,6 +81,14 @@ class Offscreen:
         self.close()
 
 
+def plain_scene(model: mujoco.MjModel, geoms: int) -> mujoco.MjvScene:
+    """Scene of at most ``geoms`` shapes, without reflections and shadows."""
+    scene = mujoco.MjvScene(model, maxgeom=geoms)
+    scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
+    scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+    return scene
+
+
 def _free_contexts(gl: Any, mjr: mujoco.MjrContext) -> None:
     gl.make_current()
     mjr.free()

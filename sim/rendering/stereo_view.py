@@ -14,7 +14,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.drivers.attitude import about_up
 from snakewalk.sim.rendering.looks import TEXELS, Scene, dressed_model
-from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.offscreen import Offscreen, plain_scene
 from snakewalk.sim.rendering.top_view import NOISE
 
 _NEAR_M, _FAR_M = 0.05, 60.0
@@ -71,9 +71,7 @@ class StereoView:
         self._baseline_m = baseline_m
         self._random = np.random.default_rng(seed)
         self._paint()
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + 1)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene = plain_scene(model, model.ngeom + 1)
         self._screen = Offscreen(model, *size_px)
 
     @property

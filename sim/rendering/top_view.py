@@ -12,7 +12,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
 from snakewalk.sim.rendering.looks import FloorPrint, Scene, dressed_model
-from snakewalk.sim.rendering.offscreen import Offscreen
+from snakewalk.sim.rendering.offscreen import Offscreen, plain_scene
 from snakewalk.sim.rendering.shade import add_shade
 
 NOISE = 3.0
@@ -49,9 +49,7 @@ class TopView:
         field_m = camera.field_width_m * size[1] / size[0]
         model.vis.global_.fovy = math.degrees(2.0 * math.atan(0.5 * field_m / camera.height_m))
         model.vis.map.zfar = 4.0 * camera.height_m / model.stat.extent + 10.0
-        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + robot.joint_count + 11)
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene = plain_scene(model, model.ngeom + robot.joint_count + 11)
         self._view = mujoco.MjvCamera()
         self._view.lookat[:] = (*centre_m, 0.0)
         self._view.distance, self._view.elevation = camera.height_m, -90.0

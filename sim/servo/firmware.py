@@ -37,6 +37,7 @@ from snakewalk.sim.servo.present_values import PresentValues
 from snakewalk.sim.servo.protection import SLICE_S, Protection, SupplyAndAmbient
 from snakewalk.sim.servo.register_rules import PROFILE
 from snakewalk.sim.servo.servo_loops import accept_goals
+from snakewalk.sim.servo.simulated_servos import FaultyServos
 
 ROUNDING_S = 1e-9
 """Largest difference between two times that count as the same."""
@@ -80,11 +81,13 @@ STARTUP_RAM_RESTORE = 0x02
 """Startup Configuration(60)."""
 
 
-class Firmware:
+class Firmware(FaultyServos):
     """Servos of ``bank`` on the shafts of ``plant``, in the order of the bank's rows.
 
     ``motors`` (S,) are by default those of the models.
     """
+
+    protection: Protection
 
     def __init__(
         self,
@@ -120,13 +123,9 @@ class Firmware:
         self._last_mode = bank["Operating Mode"].copy()
         self._held = np.zeros(joints, bool)
         self.powered = np.ones(joints, bool)
-        """(S,) whether a servo has a supply; without one it receives nothing, and its shaft is
-        limp."""
         self.no_output = np.zeros(joints, bool)
-        """(S,) whether the output stage is dead: registers show a servo that works."""
         self._readings = ConstantReadings(bank.__getitem__)
         self.events = EventQueue()
-        """Events that happen to the servos at a time of their own, such as faults."""
         self.control_loops = ControlLoops(bank, self.drive, motor)
         self._goal = self.drive.goal_rad.copy()
         self._control_s = self._time_s + CONTROL_S
@@ -310,37 +309,6 @@ class Firmware:
         self.refresh()
         goal[:] = self.bank["Present Position"]
         torque[:] = on
-        self.apply_registers()
-
-    def block_shafts(self, rows: NDArray[np.intp]) -> None:
-        """Block shafts where they are."""
-        for row in rows:
-            self.blocked_shaft.block(int(row), float(self.plant.position_rad[row]))
-        self.apply_registers()
-
-    def free_shafts(self, rows: NDArray[np.intp]) -> None:
-        """Free blocked shafts."""
-        for row in rows:
-            self.blocked_shaft.free(int(row))
-        self.apply_registers()
-
-    def cut_output(self, rows: NDArray[np.intp], on: bool) -> None:
-        """Disconnect output stages from their motors, or reconnect them."""
-        self.no_output[rows] = on
-        self.apply_registers()
-
-    def set_reading(self, rows: NDArray[np.intp], name: str, value: int | None) -> None:
-        """Let servos report a constant value in a register; None: the present one."""
-        self.refresh()
-        self._readings.set(rows, name, value)
-
-    def clear_reading(self, rows: NDArray[np.intp], name: str) -> None:
-        """Let servos report measured values in a register again."""
-        self._readings.clear(rows, name)
-
-    def cut_power(self, rows: NDArray[np.intp]) -> None:
-        """Switch the supply off: shafts go limp, only the EEPROM remains."""
-        self.powered[rows] = False
         self.apply_registers()
 
     def restore_power(self, rows: NDArray[np.intp]) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.pending_replies import PendingReplies
 from snakewalk.drivers.protocol.packet import (
@@ -153,9 +153,7 @@ def test_two_blocks_of_one_port_do_not_take_each_others_answers() -> None:
     port = ScriptedPort(script)
     pending = PendingReplies(port.clock)
     first, second = (
-        ControlCycle(
-            port, [1], registers=CycleRegisters(116, address, 1), fast=False, pending=pending
-        )
+        ControlCycle(port, [1], registers=(116, address, 1), fast=False, pending=pending)
         for address in (64, 98)
     )
     assert not first.read().answered.any()

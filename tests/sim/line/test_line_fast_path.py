@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleRegisters
+from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.errors import PortError
 from snakewalk.drivers.protocol.packet import Instruction, InstructionPacket, encode_instruction
 from snakewalk.sim.line.sim_line import LineFastPath, SimLine
@@ -39,7 +39,7 @@ def make(kind: type[SimLine], delay: int = 0, usb_latency_s: float = 0.0) -> Sim
 
 def run(line: SimLine, between: Between, *, fast: bool = True, address: int = 126) -> list[object]:
     """All that a host can see of 25 cycles of 20 ms, and what the servos hold after each."""
-    cycle = ControlCycle(line, IDS, fast=fast, registers=CycleRegisters(read_address=address))
+    cycle = ControlCycle(line, IDS, fast=fast, registers=(116, address, 10))
     assert isinstance(cycle._fast_path, LineFastPath) == (type(line) is SimLine)
     seen: list[object] = []
     for k in range(25):
@@ -158,8 +158,7 @@ def test_any_goals_and_any_block(goals: list[int], address: int, fast: bool) -> 
     seen = []
     for kind in (SimLine, Called):
         line = make(kind)
-        registers = CycleRegisters(read_address=address, read_bytes=6)
-        cycle = ControlCycle(line, IDS, fast=fast, registers=registers)
+        cycle = ControlCycle(line, IDS, fast=fast, registers=(116, address, 6))
         cycle.write_goals(np.array(goals, np.int32))
         line.clock.sleep_until_s(0.02)
         reply = cycle.read()
