@@ -10,6 +10,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.template import plain_toml
 from snakewalk.controller.bench.scan import ScanResult, scan
 from snakewalk.drivers.bus.feetech_bus import servo_bus
+from snakewalk.drivers.bus.feetech_scan import VARIANT_LIMIT, shipped_variants
 from snakewalk.drivers.chain.start_up import ServoReport, read_report
 from snakewalk.drivers.errors import BusError, ControlTableError
 from snakewalk.drivers.port.byte_port import BytePort
@@ -110,11 +111,14 @@ def robot_skeleton(
         if (ids := [servo_id for servo_id in there if servo_id in chosen])
     ]
     described = {"name": name, "servo": servo, "joints": joints}
+    variants = sorted({name for entry in chain for name in shipped_variants(entry.found.model)})
+    models_text = f"- the models: {VARIANT_LIMIT} tells {' from '.join(variants)};\n"
     robot = checked(RobotConfig, described | ({"ports": ports} if len(ports) > 1 else {}), name)
     return plain_toml(
         robot,
         f"{len(chain)} servos as snakewalk bus inventory found them. Not known, and assumed:\n"
         "- the order: by ID from the head; snakewalk bus calibrate finds it, and signs and zeros;\n"
+        f"{models_text * bool(variants)}"
         f'- axes: "{axes}" from the head, repeated: y turns about the vertical, p lifts;\n'
         "- links: link_length_m, link_mass_kg, body_radius_m, or [[links]]; as by default.",
     )

@@ -16,6 +16,9 @@ from snakewalk.drivers.protocol.protocol1 import BROADCAST_ID, frame
 _HEAD = Register("Firmware Version to Model Number", 0, 5, signed=False)
 _REFERENCE_MODEL = "STS3215"
 """Model whose first registers all Feetech models share."""
+VARIANT_LIMIT = "Max Voltage Limit"
+"""Register whose factory value differs between models with one number: 8 V of an STS3215, 14 V of
+an STS3215-C018."""
 _TURN_S = 0.3e-3
 """Time after which the next servo replies to a broadcast ping (ours)."""
 _SETTLE_S = 0.03
@@ -96,11 +99,24 @@ def identify(bus: FeetechBus, servo_id: int, baud: int) -> FeetechServo | None:
     """Model of a servo; None for a DYNAMIXEL servo of Protocol 1.0, whose ID is register 3."""
     try:
         head = bus.read_bytes(servo_id, _HEAD)
+        order = _ORDERS.get(head[2])
+        if order is None or (head[3] == servo_id and head[0] | head[1] << 8 in model_numbers(1)):
+            return None
+        number = int.from_bytes(head[3:], order)
+        name = model_numbers("feetech").get(number, f"Feetech, number {number}")
+        shared = shipped_variants(name)
+        if shared:
+            limit = bus.read(servo_id, VARIANT_LIMIT)
+            rows = {model: servo_model(model).registers[VARIANT_LIMIT] for model in shared}
+            name = min(rows, key=lambda model: abs(rows[model].initial - limit))
     except BusError:
         return None
-    order = _ORDERS.get(head[2])
-    if order is None or (head[3] == servo_id and head[0] | head[1] << 8 in model_numbers(1)):
-        return None
-    number = int.from_bytes(head[3:], order)
-    name = model_numbers("feetech").get(number, f"Feetech, number {number}")
     return FeetechServo(servo_id, name, head[0], baud)
+
+
+def shipped_variants(name: str) -> list[str]:
+    """Shipped Feetech models that share the number of this one; none if it is alone."""
+    feetech = [facts for facts in map(servo_model, shipped_models()) if facts.is_feetech]
+    numbers = {facts.model: facts.model_number for facts in feetech}
+    shared = [model for model, number in numbers.items() if number == numbers.get(name)]
+    return shared if len(shared) > 1 else []

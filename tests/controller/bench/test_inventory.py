@@ -12,6 +12,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.cli.command_line import app
 from snakewalk.sim.line.sim_line import SimLine
+from snakewalk.sim.serve.bench_line import bench_line
+from snakewalk.sim.serve.chain_spec import parse_chain
 from snakewalk.sim.servo.bank import ServoBank
 from snakewalk.sim.servo.bench import BenchPlant
 
@@ -21,7 +23,10 @@ MODELS = {21: "XM430-W350", 7: "XM430-W350", 3: "XM430-W210"}
 @pytest.fixture
 def line(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> SimLine:
     models = getattr(request, "param", MODELS)
-    made = SimLine(ServoBank(list(models), list(models.values())), BenchPlant(len(models)))
+    if isinstance(models, str):
+        made = bench_line(parse_chain(models))
+    else:
+        made = SimLine(ServoBank(list(models), list(models.values())), BenchPlant(len(models)))
     made.latency_s = 0.0  # type: ignore[attr-defined]
 
     @contextmanager
@@ -78,3 +83,19 @@ def test_a_voltage_has_the_digits_that_the_servo_measures(line: SimLine, tmp_pat
     file = tmp_path / "mine.toml"
     assert call("-o", file).exit_code == 0
     assert "supply_v = 11.1\n" in file.read_text()
+
+
+@pytest.mark.usefixtures("line")
+@pytest.mark.parametrize(
+    ("line", "model"),
+    [(f"1-2:{model}", model) for model in ("STS3215", "STS3215-C018")],
+    indirect=["line"],
+)
+def test_a_servo_of_12_v_is_told_from_one_of_7_v_with_its_number(
+    model: str, tmp_path: Path
+) -> None:
+    """It was listed as STS3215, and the setup stopped at its supply of 12 V."""
+    out = tmp_path / "mine.toml"
+    assert call("-o", out).exit_code == 0
+    assert load_robot(str(out)).servo_models == (model, model)
+    assert "Max Voltage Limit tells STS3215 from STS3215-C018" in out.read_text()
