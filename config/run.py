@@ -233,7 +233,10 @@ class SafetyConfig(Strict):
         description="time for which the supply voltage may be too low, except at the start",
     )
     stale_limit_s: float = Field(
-        0.1, gt=0.0, description="largest age of a measured position, velocity or current"
+        0.1,
+        gt=0.0,
+        description="largest age of a measured position, velocity or current; if not given, slow "
+        "replies raise it up to 0.25",
     )
     slow_stale_limit_s: float = Field(
         3.0,

@@ -1,5 +1,6 @@
 """The joint link: the interface between the controller and the joints."""
 
+from collections.abc import Sequence
 from typing import Any, Protocol, Self, runtime_checkable
 
 from snakewalk.config.arrays import Bools, Floats
@@ -8,10 +9,14 @@ from snakewalk.drivers.types import JointCommand, JointState
 
 @runtime_checkable
 class ExplainingLink(Protocol):
-    """A link that can find the reason why a joint does not follow."""
+    """A link that can find the reason why a joint does not follow, or was not read."""
 
     def explain(self, joint: int) -> str | None:
         """Return the fault of the goal in the joint's servo, or None."""
+        ...
+
+    def explain_silence(self, joints: Sequence[int]) -> str | None:
+        """Return the reason why joints were not read, or None; torque is off."""
         ...
 
 

@@ -4,7 +4,7 @@ Servos do not reply to a sync write, so Goal Position(116; 30 on Protocol 1.0) i
 difference counts again only after another goal was sent.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -42,8 +42,8 @@ class _Difference:
     """Whether all different reads returned the same value."""
     is_foreign: bool
     """Whether a different read returned a goal that was never sent."""
-    lag: int
-    """Number of goals that are newer than the returned one; 0 if it varies."""
+    lags: Counter[int]
+    """Numbers of goals that are newer than the returned one, and how often each was possible."""
 
 
 class GoalCheck:
@@ -132,16 +132,18 @@ class GoalCheck:
 
     def _note(self, joint: int, value: int) -> None:
         earlier = self._differences.get(joint)
-        lag = next((k for k, goals in enumerate(reversed(self._sent)) if goals[joint] == value), -1)
-        is_foreign = lag < 0 or self._writes - lag < self._confirmed_write[joint] - MOST_LATE
+        sent = enumerate(reversed(self._sent))
+        lags = Counter(lag for lag, goals in sent if goals[joint] == value)
+        last_write = self._writes - min(lags, default=self._writes)
+        is_foreign = not lags or last_write < self._confirmed_write[joint] - MOST_LATE
         if earlier is None:
-            self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lag)
+            self._differences[joint] = _Difference(1, self._writes, value, True, is_foreign, lags)
         elif earlier.write < self._writes:
             earlier.count = earlier.count + 1
             earlier.write = self._writes
             earlier.is_constant &= value == earlier.value
             earlier.is_foreign |= is_foreign
-            earlier.lag = lag if lag == earlier.lag else 0
+            earlier.lags += lags
             earlier.value = value
         if is_foreign and (self._seen_at < self._writes or not self._watched):
             self._seen = self._seen + 1 if self._watched else 1
@@ -162,16 +164,17 @@ class GoalCheck:
     def _text(self, joints: list[int]) -> str:
         """Difference of the first of ``joints``, and its cause."""
         first = self._differences[joints[0]]
+        [(lag, times)] = first.lags.most_common(1) or [(0, 0)]
         if first.is_foreign:
             cause = "another program writes goals (a second master)"
         elif first.is_constant and 1 < len(self._differences) == len(self._labels):
-            cause = "no servo has the newest goals: the line or the adapter loses what is written"
-        elif first.is_constant and (first.count > 1 or first.lag > MOST_LATE):
+            cause = "all servos reply, none has the newest goals: the adapter loses what is written"
+        elif first.is_constant and (first.count > 1 or lag > MOST_LATE):
             cause = "it ignores sync writes"
         elif first.count == 1:
             cause = "it accepts goals late, or ignores sync writes"
-        elif first.lag:
-            cause = f"it accepts goals {first.lag} cycle{'s' * (first.lag > 1)} late"
+        elif times >= first.count - 1:  # the fault may begin between two goals
+            cause = f"it accepts goals {lag} cycle{'s' * (lag > 1)} late"
         else:
             cause = "writes to it get lost"
         return f"Goal Position is {first.value}, not {self._sent[-1][joints[0]]}: {cause}"

@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.chain.fingerprint import register_change
-from snakewalk.drivers.chain.start_up import IDENTITY
 from snakewalk.drivers.protocol.registers import WATCHDOG, WATCHDOG_TRIPPED
 
 TORQUE = "Torque Enable"
 """The first register in RAM: a restart sets it, and those behind it, to their initial values."""
 MODE = "Operating Mode"
+_COPIES = "Goal PWM", "Goal Current"
+"""Registers to which a restart copies a limit from the EEPROM."""
 _SHOWN = 3
 """Number of changed registers that a message lists (ours)."""
 
@@ -48,16 +49,18 @@ def _cause(
     if MODE in changed:  # which resets gains
         return "another program has changed its mode"
     rows = facts.registers
-    reset = [name for name in changed if name != TORQUE and values[name] == rows[name].initial]
-    # a run sets these to other values than a restart, if they are in RAM
-    other_joints = [
+    # a run has set these in RAM to other values than a restart
+    lost_by_restart = {
         name
-        for name in (IDENTITY, WATCHDOG)
-        if name in expected and rows[name].address > rows[TORQUE].address
-    ]
-    if set(other_joints) <= set(reset) if other_joints else reset and TORQUE in changed:
+        for name, value in expected.items()
+        if name not in _COPIES
+        and rows[name].address > rows[TORQUE].address
+        and value != rows[name].initial
+    }
+    is_proven = len(lost_by_restart) > 1 or TORQUE in changed
+    if lost_by_restart and is_proven and lost_by_restart <= {*changed}:
         return "it has rebooted: check its supply and plugs"
-    if len(changed) > 1 or TORQUE not in changed:
+    if changed != [TORQUE]:
         return "another program writes to it"
     other = "another program has switched it off"
-    return other if other_joints else f"it has rebooted, or {other}"
+    return other if lost_by_restart else f"it has rebooted, or {other}"

@@ -1,7 +1,7 @@
 """The chain of servos as a joint link: radians to raw goals, raw blocks to a ``JointState``."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from snakewalk.drivers.chain.lost_replies import LostReplies
 from snakewalk.drivers.chain.motion_sensors import MotionSensors
 from snakewalk.drivers.chain.recheck import MOVED_RAD, Recheck, recheck
 from snakewalk.drivers.chain.register_rows import RegisterRows
+from snakewalk.drivers.chain.silence_cause import silence_cause
 from snakewalk.drivers.chain.soft_hold import limit_currents
 from snakewalk.drivers.chain.start_up import (
     Inspection,
@@ -386,7 +387,7 @@ class ServoChain:
         if self._fast_reads and not self._cycle.fast:
             self._report_plain_reads()
         read = reply.valid_count
-        losses = self._losses.update(read, len(reply.valid), self.counters.late_bytes)
+        losses = self._losses.update(read, len(reply.valid), self.counters)
         if losses is not None:
             self.on_event(losses)
         measured_at_s = self._decode_state(reply)
@@ -493,6 +494,13 @@ class ServoChain:
         try:
             cause = None if self._liveness is None else self._liveness.explain(joint)
             return cause or self._goal_check.explain(joint)
+        except DriverError:
+            return None
+
+    def explain_silence(self, joints: Sequence[int]) -> str | None:
+        """Ask the servos of joints without a reply again; return the cause, or None."""
+        try:
+            return silence_cause(self._bus, self.robot, joints)
         except DriverError:
             return None
 

@@ -27,6 +27,11 @@ IDLE_TIME_S = 0.3
 """Total time for which a joint may draw no current although it should (ours)."""
 IDLE_SHARE = 0.1
 """Share of the expected current below which a motor draws none (ours)."""
+SENSED_A = 0.02
+"""Current that shows a working sensor and motor (ours): three units of an STS3215."""
+GROWN = 1.5
+"""Growth of the error since then that shows a dead output stage (ours). If only the sensor dies,
+the error stays the same."""
 IDLE_OUTPUT = 0.25
 """Share of full output from which on a slow motor without current is at fault (ours). There a
 healthy motor on 3/4 of its nominal voltage still draws a third of its current at rest."""
@@ -64,8 +69,8 @@ class FollowingError:
         joints = len(limits.limit_rad)
         output = np.zeros((3, joints)) if limits.output is None else limits.output
         self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
-        self._memory = np.zeros((3, joints))
-        self._since_s, self._idle_s, self._last_rad = self._memory
+        self._memory = np.zeros((4, joints))
+        self._since_s, self._idle_s, self._last_rad, self._driven_rad = self._memory
         self._steady = np.zeros((5, joints))
         self._goals: deque[tuple[float, Floats]] = deque(maxlen=16)
         self.joint = -1
@@ -79,6 +84,7 @@ class FollowingError:
         self._since_s[:] = np.nan
         self._idle_s[:] = 0.0
         self._last_rad[:] = np.nan
+        self._driven_rad[:] = np.nan
         self._steady[:] = np.nan
         self._goals.clear()
         self._time_s = math.inf
@@ -147,9 +153,11 @@ class FollowingError:
                 break
         return np.clip(state.position_rad, np.min(recent, axis=0), np.max(recent, axis=0))
 
-    def _limp_cause(self, state: JointState, joint: int) -> str:
+    def _limp_cause(self, state: JointState, joint: int, error_rad: float) -> str:
         dead = "current"
         speed_rad_s = state.velocity_rad_s[joint]
+        if abs(speed_rad_s) < SLOW_RAD_S and error_rad > GROWN * self._driven_rad[joint]:
+            return "its motor does not push: dead output stage"
         if abs(speed_rad_s) >= SLOW_RAD_S:
             dead = f"position sensor, as it reports {speed_rad_s:.1f} rad/s; or a dead current"
         return (
@@ -164,14 +172,14 @@ class FollowingError:
         return (
             f"{self._limits.joint_names[joint]}: {error_rad:.2f} rad from its goal with "
             f"{state.current_a[joint]:.2f} A, expected about {expected_a:.2f} A: "
-            f"{self._limp_cause(state, joint)}"
+            f"{self._limp_cause(state, joint, error_rad)}"
         )
 
     def _steady_fault(self, state: JointState, goal_rad: Floats, joint: int) -> str:
         since_s, _, _, low_a, high_a = self._steady[:, joint]
         error_rad = abs(float(goal_rad[joint] - state.position_rad[joint]))
         current_a = state.current_a[joint]
-        cause = self._limp_cause(state, joint)
+        cause = self._limp_cause(state, joint, error_rad)
         if abs(current_a) > IDLE_SHARE * max(abs(low_a), abs(high_a)):
             cause = "dead current sensor, and its motor does not push"
         return (
@@ -212,8 +220,8 @@ def _judge(  # noqa: C901  a compiled loop
         last_s: time of the previous state; first infinite.
         rules: (5, J) limit of the error, rad; current towards the goal that excuses it, A; and
             ``SafetyLimits.output``.
-        memory: (3, J) time since which a joint does not follow, or NaN; time without current, s;
-            previous position, or NaN.
+        memory: (4, J) time since which a joint does not follow, or NaN; time without current, s;
+            previous position, or NaN; error at the last current.
 
     Returns:
         The first joint whose motor has drawn no current for ``IDLE_TIME_S``, else the joint that
@@ -247,6 +255,8 @@ def _judge(  # noqa: C901  a compiled loop
                     if is_slow or moved_rad < SLOW_RAD_S * since_s:
                         memory[1, k] += step_s
             memory[2, k] = position_rad[k]
+            if abs(current_a[k]) >= SENSED_A:
+                memory[3, k] = size
             if idle < 0 and memory[1, k] >= IDLE_TIME_S:
                 idle = k
         if not np.isnan(memory[0, k]) and (longest < 0 or memory[0, k] < memory[0, longest]):

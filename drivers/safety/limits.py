@@ -12,6 +12,9 @@ from snakewalk.drivers.safety.chain_load import motor_columns
 from snakewalk.drivers.types import LIMIT_SLACK_RAD
 
 STEP_SLACK_RAD = 0.2
+STALE_MAX_S = 0.25
+"""Largest limit of the age that a start chooses itself (ours): 40 ms of latency each way need 0.24,
+and 20 degrees are the way of a joint in this time at 1.4 rad/s."""
 STEP_RATE = 2.0
 """Slack of a measured step, and its speed as a share of the goals' rate (ours): 0.36 rad in 20 ms;
 a link that falls off an edge was measured at 0.12."""
@@ -44,6 +47,7 @@ class SafetyLimits:
     voltage_time_s: float
     """Longest time for which the supply may be too low."""
     stale_limit_s: float
+    """Largest age of a position, velocity or current."""
     slow_stale_limit_s: float
     """Largest age of temperature and voltage."""
     following_limit_rad: Floats
@@ -56,6 +60,8 @@ class SafetyLimits:
     output: Floats | None = None
     """(3, J) output of each joint's motor: share of full output for each radian of error; current
     at full output and at rest, A; limit of the current, A. None: no joint is judged by it."""
+    stale_limit_max_s: float = 0.0
+    """Limit to which slow replies raise ``stale_limit_s``; 0 if the run's file sets it."""
     step_slack_rad: float = STEP_SLACK_RAD
     motor: Floats | None = None
     """(5, J) as ``chain_load.motor_columns``; None: load and windings are not estimated."""
@@ -87,6 +93,7 @@ class SafetyLimits:
             following_effort_a=EFFORT_SHARE * np.array(robot.current_limits_a),
             following_time_s=safety.following_time_s,
             output=_output(robot),
+            stale_limit_max_s=0.0 if "stale_limit_s" in safety.model_fields_set else STALE_MAX_S,
             motor=motor_columns(robot),
             fuse_a=_fuse_a(robot),
             winding_limit_c=safety.winding_limit_c,

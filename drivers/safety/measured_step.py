@@ -6,6 +6,8 @@ counts as not read: it keeps its old values, which age. If it stays away, the st
 and the run stops.
 """
 
+import math
+
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
@@ -69,10 +71,13 @@ class MeasuredSteps:
             is_held = ~state.valid & (position_rad != believed.position_rad)
             return (_held_state(state, believed, is_held) if is_held.any() else state), None
         joint = self.joint = int(np.argmax(np.where(doubted, step_rad, 0.0)))
+        cause = "two servos with one ID, exchanged IDs, a changed zero, or a dead position sensor"
+        turns = np.round(step_rad[joint] / math.tau)
+        if turns and abs(step_rad[joint] - turns * math.tau) <= slack_rad:
+            cause = "it is off by whole turns: a lost turn count"
         doubt = (
             f"{limits.joint_names[joint]}: measured {position_rad[joint]:.2f} rad after "
-            f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: two servos with one "
-            "ID, exchanged IDs, a changed zero, a lost turn count, or a position sensor that fails"
+            f"{believed.position_rad[joint]:.2f} rad: no servo turns so fast: {cause}"
         )
         return _held_state(state, believed, doubted | ~state.valid), doubt
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from types import FrameType
-from typing import Any
 
 import numpy as np
 
@@ -69,7 +68,7 @@ class SafeLink:
         link: JointLink,
         limits: SafetyLimits,
         clock: Clock,
-        recovery: Recovery[Any] | None = None,
+        recovery: Recovery | None = None,
         stop_requested: Callable[[], str | None] = lambda: None,
         on_event: Callable[[str], None] = lambda line: None,
         hold: TripHold | None = None,
@@ -176,19 +175,25 @@ class SafeLink:
         self._touched = True
         self.is_off = False
         state = self._link.enable()
-        self._state, self._memory = state, SafetyMemory.at_rest(state)
-        self._following.reset()
-        self._steps.reset()
-        self._check(state, self._memory, self._limits_at_start)
+        self._begin(state)
         self._refuse_if_tripped()
-        age_s = float(np.max(state.age_s))
-        if age_s > SLOW_SHARE * self._limits.stale_limit_s:
-            self._on_event(
-                f"replies need up to {age_s:.3f} s, some cycles two of them: the run may end, as "
-                f"safety.stale_limit_s is {self._limits.stale_limit_s:g}; set it to "
-                f"{3.0 * age_s:.2f}"
-            )
+        self._fit_stale_limit(float(np.max(state.age_s)))
         return state
+
+    def _fit_stale_limit(self, age_s: float) -> None:
+        """Report slow replies; a limit that nobody has set follows them."""
+        limit_s = self._limits.stale_limit_s
+        if age_s <= SLOW_SHARE * limit_s:
+            return
+        needed_s = round(3.0 * age_s, 2)
+        effect = f"is {limit_s:g}; set it to {needed_s:g}, or the run may end"
+        if limit_s <= needed_s <= self._limits.stale_limit_max_s:
+            self._limits = replace(self._limits, stale_limit_s=needed_s)
+            effect = f"is {needed_s:g} in this run"
+        self._on_event(
+            f"replies need up to {age_s:.3f} s, some cycles two of them: safety.stale_limit_s "
+            f"{effect}"
+        )
 
     def disable(self) -> None:
         """Torque off; safe to call at any time, repeatedly.
@@ -235,9 +240,9 @@ class SafeLink:
             stale = stale_fault(state, self._limits, self._clock.now_s())
             if stale is not None and doubt is None:
                 return self._recover(stale, None)
-            if stale is not None:  # not recoverable: servos and joints may be exchanged
+            if stale is not None and doubt is not None:  # servos may be exchanged: not recoverable
                 self._state = state
-                self._trip(self._explain(self._steps.joint) or f"{stale}: {doubt}")
+                self._trip(self._explain(self._steps.joint) or doubt)
                 return state
         self._state = state
         joint = self._overloaded_joint(state, self._memory)
@@ -361,11 +366,15 @@ class SafeLink:
             self._trip(reason)
             raise SafetyTrippedError(str(self.tripped)) from fault
         self.recoveries += 1
+        self._begin(state)
+        return state
+
+    def _begin(self, state: JointState) -> None:
+        """Check the first state after a start or a recovery."""
         self._state, self._memory = state, SafetyMemory.at_rest(state)
         self._following.reset()
         self._steps.reset()
         self._check(state, self._memory, self._limits_at_start)
-        return state
 
     def _following_fault(self, state: JointState, memory: SafetyMemory) -> str | None:
         fault = self._following.update(state, memory.goal_rad)
@@ -402,6 +411,19 @@ class SafeLink:
         if is_first and may_hold and self._begin_hold():
             return
         self._switch_off()
+        cause = self._silence_cause() if is_first else None
+        if cause is not None and self.tripped is not None:
+            self.tripped = f"{reason}: {cause}{self.tripped[len(reason) :]}"
+
+    def _silence_cause(self) -> str | None:
+        """Cause that the link finds for joints whose replies are missing for too long, or None."""
+        state, link = self._state, self._link
+        is_other_cause = self._doubt is not None or self._stop() is not None
+        if state is None or is_other_cause or not isinstance(link, ExplainingLink):
+            return None
+        age_s = state.age_s + self._clock.now_s() - state.time_s
+        is_silent = ~state.valid & (age_s > self._limits.stale_limit_s)
+        return link.explain_silence(np.flatnonzero(is_silent).tolist()) if is_silent.any() else None
 
     def _switch_off(self) -> None:
         try:

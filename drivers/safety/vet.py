@@ -20,6 +20,8 @@ from snakewalk.drivers.protocol.registers import Alarm, alarm_names
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.types import JointCommand, JointState
 
+STANDING_RAD_S = 0.1
+"""Speed below which a joint is at rest (ours): four units of an XM430's velocity."""
 _FLOATS = readonly_array()
 _BYTES = readonly_array("uint8")
 
@@ -173,13 +175,7 @@ def _stale_cause(state: JointState, joint: int, since_s: float, limits: SafetyLi
         return f"this program did not run for {since_s:.3f} s; close other programs"
     if state.valid[joint]:
         return "its reply was slow: the latency of adapter or network, or a busy computer"
-    silent = np.flatnonzero(~state.valid)
-    if len(silent) == len(state.valid) > 1:
-        return "no servo replies: their supply, the cable or the adapter"
-    if 1 < len(silent) == len(state.valid) - silent[0]:
-        before = limits.joint_names[silent[0] - 1]
-        return f"all behind {before} are silent: a cable or plug there, or two servos with one ID"
-    return "no valid reply: its plug or supply, or two servos with its ID"
+    return "no valid reply" if state.valid.any() else "no servo replies"
 
 
 def state_fault(
@@ -196,7 +192,7 @@ def state_fault(
     stale = stale_fault(state, limits, now_s)
     if stale is not None:
         return stale
-    over_s = state.time_s - over_since_s
+    is_over = state.time_s - over_since_s >= limits.current_time_s
     under_s = state.time_s - state.slow_age_s - under_since_s
     alarm = (state.hardware_error != 0) | ((state.error & ALERT) != 0)
     numbers = np.stack([state.position_rad, state.velocity_rad_s, state.current_a])
@@ -210,10 +206,11 @@ def state_fault(
             "measured {:.3f} rad: forced beyond its limit",
         ),
         (
-            over_s >= limits.current_time_s,
+            is_over & (np.abs(state.velocity_rad_s) < STANDING_RAD_S),
             state.current_a,
-            "{:.2f} A for too long: it is blocked or overloaded",
+            "{:.2f} A for too long at rest: it is blocked",
         ),
+        (is_over, state.current_a, "{:.2f} A for too long in motion: it is overloaded"),
         (
             ~np.isnan(state.temperature_c) & ~(state.slow_age_s <= limits.slow_stale_limit_s),
             state.slow_age_s,

@@ -19,7 +19,7 @@ from tests.helpers.adapters import NETWORK_S, AdapterLine, Swing, swing
 
 CASES = [
     pytest.param(kind, make, seed, id=f"{kind.name}-{make}-{seed}")
-    for seed in range(SEEDS)
+    for seed in SEEDS
     for kind in KINDS
     for make in kind.makes
 ]
@@ -81,16 +81,16 @@ def test_a_pause_shorter_than_the_watchdog_is_read_again(make: str) -> None:
 
 def test_a_line_that_is_too_slow_for_the_limit_is_reported_at_the_start() -> None:
     line = AdapterLine(in_grid_s=0.036, out_grid_s=0.036)
-    reports = swing(X, line=line, seconds=0.1, latency_s=NETWORK_S).at_start
-    assert reports[0].startswith("replies need up to 0.")
-    assert "safety.stale_limit_s is 0.1; set it to 0." in reports[0]
+    ran = swing(X, line=line, seconds=0.1, latency_s=NETWORK_S, stale_limit_s=0.1)
+    assert ran.at_start[0].startswith("replies need up to 0.")
+    assert "safety.stale_limit_s is 0.1; set it to 0." in ran.at_start[0]
 
 
 @pytest.mark.parametrize(("way_s", "limit_s"), [(0.015, 0.1), (0.025, 0.15), (0.04, 0.24)])
 def test_a_network_works_with_the_limit_that_the_start_names(way_s: float, limit_s: float) -> None:
     """With 25 ms each way, each run at the default limit ended within a second."""
 
-    def there_and_back(limit_s: float) -> Swing:
+    def there_and_back(limit_s: float | None) -> Swing:
         line = AdapterLine(in_s=way_s, out_s=way_s)
         return swing(X, line=line, seconds=2.5, latency_s=NETWORK_S, stale_limit_s=limit_s)
 
@@ -100,3 +100,8 @@ def test_a_network_works_with_the_limit_that_the_start_names(way_s: float, limit
         assert "its reply was slow: the latency of adapter or network" in at_default.said
     ran = there_and_back(limit_s)
     assert not ran.said + "".join(ran.at_start)
+    unset = there_and_back(None)
+    assert not unset.said
+    assert [f"stale_limit_s is {limit_s:g} in this run" in line for line in unset.at_start] == (
+        [True] if limit_s > 0.1 else []
+    )

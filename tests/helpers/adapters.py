@@ -130,12 +130,13 @@ def swing(
     at_s: float = 1.0,
     load_n_m: float = 0.0,
     latency_s: float = 0.004,
-    stale_limit_s: float = 0.1,
+    stale_limit_s: float | None = None,
 ) -> Swing:
     """Swing, from rest; ``faults`` of a fault file, or a ``change`` of the line, begin ``at_s``."""
     line = line or bench_line(parse_chain(f"1-{JOINTS}:{make}"))
     robot = RobotConfig(name="swing", joint_axes="yp" * (JOINTS // 2), servo=SERVOS[make])
-    clock, ran, safety = line.clock, Swing(), SafetyConfig(stale_limit_s=stale_limit_s)
+    safety = SafetyConfig() if stale_limit_s is None else SafetyConfig(stale_limit_s=stale_limit_s)
+    clock, ran = line.clock, Swing()
     chain = ServoChain(servo_bus(line, robot.models_by_id, latency_s=latency_s), robot)
     limits = SafetyLimits.from_config(robot, safety)
     link = SafeLink(chain, limits, clock, on_event=ran.reports.append)

@@ -329,3 +329,16 @@ def test_the_output_of_a_robots_motors_is_that_of_their_models() -> None:
     found = SafetyLimits.from_config(weak, SafetyConfig()).output
     assert found is not None
     assert (found[0] > 0.0).tolist() == [True, False]
+
+
+def test_a_dead_stage_is_told_from_a_sensor_that_dies_under_a_load() -> None:
+    """Without its motor a joint falls behind; with a dead sensor it stays where it was."""
+    for before_rad, is_named in ((0.03, True), (0.1, False)):
+        following = FollowingError(JUDGED)
+        said = None
+        for k in range(40):
+            error_rad, amps = (before_rad, 0.3) if k < 5 else (0.1, 0.0)
+            seen = state(time_s=0.02 * k, current_a=one(amps, 0))
+            said = said or following.update(seen, one(error_rad, 0))
+        assert "does not push: dead output stage" in str(said)
+        assert ("else a dead current sensor" not in str(said)) == is_named

@@ -160,7 +160,9 @@ def test_lasting_over_current_is_no_checked_state_that_is_kept() -> None:
     assert begun.veto is None
     assert begun.memory.over_current_since_s[1] == NOW - 1.0
     later = vetted(0.0, state(current_a=one(3.0, 1)), begun.memory)
-    assert later.veto == "joint yaw_02 (ID 8): 3.00 A for too long: it is blocked or overloaded"
+    assert later.veto == "joint yaw_02 (ID 8): 3.00 A for too long at rest: it is blocked"
+    turning = state(current_a=one(3.0, 1), velocity_rad_s=one(0.5, 1))
+    assert str(vetted(0.0, turning, begun.memory).veto).endswith("in motion: it is overloaded")
 
 
 @pytest.mark.parametrize("name", ["error", "hardware_error"])
