@@ -44,6 +44,8 @@ def can_run(model: str) -> bool:
 FIRST = ("STS3215", "XL330-M288", "XM430-W350", "SCS0009")
 """Models of the quick tests: with and without a watchdog."""
 MODELS = [*FIRST, *(name for name in shipped_models() if name not in FIRST and can_run(name))]
+FAMILIES = list({model[:2]: model for model in reversed(MODELS)}.values())
+"""The first model of each series."""
 PERIOD_S = 0.02
 FAR_RAD = 0.6
 """Distance of the goal, so that a servo still moves when its client ends."""
@@ -82,7 +84,8 @@ def moving(port: BytePort, robot: RobotConfig, patience_s: float) -> Iterator[li
     )
     events: list[str] = []
     latency_s = min(0.2 * patience_s, 0.2)
-    chain = ServoChain(servo_bus(port, robot.models_by_id, latency_s=latency_s), robot)
+    bus = servo_bus(port, robot.models_by_id, latency_s=latency_s)
+    chain = ServoChain(bus, robot, watchdog_s=max(0.2, 0.16 * patience_s))
     link = SafeLink(
         chain, SafetyLimits.from_config(robot, safety), port.clock, on_event=events.append
     )
@@ -179,7 +182,7 @@ def test_servos_whose_client_is_killed(model: str) -> None:
 
 @pytest.mark.nightly("pseudo-terminal in real time")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-@pytest.mark.parametrize("model", ["XM430-W350", "XL330-M288", "STS3215"])
+@pytest.mark.parametrize("model", FAMILIES)
 def test_servos_on_a_device_whose_client_ends(model: str, number: int) -> None:
     bus = ServoBus(f"1-2:{model}")
     try:
