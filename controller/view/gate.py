@@ -39,6 +39,8 @@ _PAGES = ("/", "/index.html")
 _WORKER = "/stop.js"
 _WORKER_SCRIPT = Path(__file__).with_name("end_worker.js").read_text(encoding="utf-8")
 """Program of the browser that shows the end of a run without its server."""
+_LOOK = Path(__file__).with_name("page_look.js").read_text(encoding="utf-8")
+"""Script with the look of every page."""
 Serve = Callable[..., Any]
 
 
@@ -121,12 +123,13 @@ class Gate:
                 path = urlsplit(request.path).path
                 if path == _WORKER:
                     return _response(http.HTTPStatus.OK, _WORKER_SCRIPT, "text/javascript")
-                has_script = bool(inserts) and path in _PAGES
-                if has_script:  # the page is changed, so it must come as it is
+                is_page = path in _PAGES
+                if is_page:  # the page is changed, so it must come as it is
                     _ask_for_plain(request)
                 passed: Response | None = process_request(connection, request)
-                if has_script and passed is not None:
-                    _add_scripts(passed, [insert.script for insert in inserts.values()])
+                if is_page and passed is not None:
+                    scripts = (insert.script for insert in inserts.values())
+                    _add_scripts(passed, [_LOOK, *scripts])
                 return passed
 
             async def handle(connection: Any) -> None:

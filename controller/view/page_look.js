@@ -1,0 +1,18 @@
+// Look of every page, also that of a log: dark on a dark system, usable on a phone, grey if old.
+(() => {
+  const look_of_page = document.createElement("style");
+  look_of_page.textContent = `
+    html.snakewalk-old body > :not(#snakewalk-stop) { filter: grayscale(1) opacity(.6) }
+    .mantine-Notifications-root { margin-top: 120px }  /* viser's notices: below the E-STOP */
+    @media (prefers-color-scheme: dark) {  /* viser draws its panels in one scheme for all browsers */
+      html { background: #000 }
+      body > :not(#snakewalk-stop) { filter: invert(1) hue-rotate(180deg) }
+      html.snakewalk-old body > :not(#snakewalk-stop) { filter: invert(1) grayscale(1) opacity(.6) }
+      body canvas, body img { filter: invert(1) hue-rotate(180deg) }
+    }
+    @media (max-width: 600px) {  /* viser's panel of a phone: at its full width, below the body */
+      .mantine-Paper-root[style*="position: fixed"] { width: 100% !important; max-height: 45% !important }
+      .mantine-Paper-root[style*="position: fixed"] .mantine-ScrollArea-content > * { width: 100% !important }
+    }`;
+  document.documentElement.append(look_of_page);
+})();
