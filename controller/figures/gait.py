@@ -112,11 +112,14 @@ def draw_gait(gait: Gait, robot: RobotConfig, path: Path) -> None:
             Line2D([], [], color=AMBER, linewidth=4, label="belly up"),
             Line2D([], [], color=HEAD, marker="o", linestyle="", label="head"),
         ]
-        if bodies.rolled_m:
-            rolls = f"rolls {abs(bodies.rolled_m):.2f} m a cycle without slip"
-            marks.append(Line2D([], [], color="black", marker=">", label=rolls))
-        figure.legend(handles=marks, loc="outside lower center", ncols=len(marks))
-        figure.suptitle(f"{gait.name} on {robot.name}", x=0.01, ha="left", fontweight="bold")
+        rolls = f", rolls {abs(bodies.rolled_m):.2f} m a cycle without slip"
+        figure.legend(handles=marks, loc="outside lower center", ncols=3)
+        figure.suptitle(
+            f"{gait.name} on {robot.name}" + rolls * bool(bodies.rolled_m),
+            x=0.01,
+            ha="left",
+            fontweight="bold",
+        )
         save_picture(figure, path, dpi=110)
 
 

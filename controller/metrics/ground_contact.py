@@ -24,6 +24,7 @@ from snakewalk.controller.kinematics.links import (
     chain_points_m,
     link_weights,
 )
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.drivers.types import BodyPose
 
@@ -113,7 +114,7 @@ def lifted_by_current(record: RunRecord) -> float:
     cycle = record.cycle
     robot = header.robot
     k_t = header.torque_constant_n_m_a
-    is_known = np.isfinite(pose.head_m).all(axis=1) & np.isfinite(pose.rotation).all(axis=(1, 2))
+    is_known = by_rows(_are_finite, pose.head_m) & by_rows(_are_finite, pose.rotation)
     rows = np.flatnonzero(is_known)[::EVERY]
     if not robot.pitch_joints or not np.isfinite(k_t) or not len(rows):
         return float("nan")
@@ -121,7 +122,7 @@ def lifted_by_current(record: RunRecord) -> float:
     inside = index < len(cycle.time_s)
     rows = rows[inside]
     index = index[inside]
-    read = np.isfinite(cycle.current_a[index]).all(axis=1)
+    read = by_rows(_are_finite, cycle.current_a)[index]
     shares = []
     for row, k in zip(rows[read], index[read], strict=True):
         head = BodyPose(float(pose.time_s[row]), pose.head_m[row], pose.rotation[row])
@@ -129,6 +130,10 @@ def lifted_by_current(record: RunRecord) -> float:
         bears_n = support_n(robot, body, k_t * cycle.current_a[k])
         shares.append(float(lifted(robot, bears_n).mean()))
     return float(np.mean(shares)) if shares else float("nan")
+
+
+def _are_finite(rows: Floats) -> Bools:
+    return np.asarray(np.isfinite(rows).all(axis=tuple(range(1, rows.ndim))))
 
 
 def roll_rad(rotation: Floats) -> Floats:

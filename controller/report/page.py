@@ -124,9 +124,8 @@ def page(
 
 def _without_folders(facts: T) -> T:
     """Return a dataclass whose texts have no folders of the user's files."""
-    values = {field.name: getattr(facts, field.name) for field in fields(facts)}
-    texts: Any = {name: text for name, text in values.items() if isinstance(text, str)}
-    return replace(facts, **shared(texts))
+    values: Any = {field.name: shared(getattr(facts, field.name)) for field in fields(facts)}
+    return replace(facts, **values)
 
 
 @cache

@@ -228,6 +228,8 @@ class Table:
 
 ROWS = 4096
 """Rows of a long log that are in memory at once (ours)."""
+_SPAN_BYTES = 1 << 24
+"""Largest part of a file that is in memory at once (ours), also of every n-th row."""
 
 
 def release(columns: Iterable[Any]) -> None:
@@ -245,11 +247,13 @@ def by_rows(function: Callable[..., Any], *columns: Any) -> Any:
 
     ``function`` accepts some rows of each column, and returns an entry for each row.
     """
-    if len(columns[0]) <= ROWS:
+    widest = max(abs(column.strides[0]) for column in columns)
+    rows = max(min(ROWS, _SPAN_BYTES // max(widest, 1)), 1)
+    if len(columns[0]) <= rows:
         return function(*columns)
     results = []
-    for start in range(0, len(columns[0]), ROWS):
-        results.append(function(*(column[start : start + ROWS] for column in columns)))
+    for start in range(0, len(columns[0]), rows):
+        results.append(function(*(column[start : start + rows] for column in columns)))
         release(columns)
     return np.concatenate(results)
 

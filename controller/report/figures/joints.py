@@ -9,6 +9,8 @@ from snakewalk.controller.figures.style import ANGLES, canvas, colour_bar, name_
 from snakewalk.controller.runlog.record import RunRecord
 
 _COLUMNS = 1400
+_PARTS = 32
+"""Parts of a long log that are in memory one after the other (ours)."""
 
 
 def joints_figure(record: RunRecord) -> Figure | None:
@@ -19,9 +21,11 @@ def joints_figure(record: RunRecord) -> Figure | None:
     joints = cycle.asked_rad.shape[1]
     grid = np.linspace(cycle.time_s[0], cycle.time_s[-1], min(_COLUMNS, len(cycle.time_s)))
     rows = np.searchsorted(cycle.time_s, grid).clip(0, len(cycle.time_s) - 1)
-    asked = cycle.asked_rad[rows]
-    measured = cycle.measured_rad[rows]
-    gap = np.where(cycle.valid[rows], measured - asked, np.nan)
+    asked, measured, valid = (
+        np.concatenate([getattr(cycle, name)[some] for some in np.array_split(rows, _PARTS)])
+        for name in ("asked_rad", "measured_rad", "valid")
+    )
+    gap = np.where(valid, measured - asked, np.nan)
     span = _largest_value(np.concatenate([asked, measured]))
     height = float(np.clip(0.075 * joints, 1.2, 2.6)) * 3 + 0.9
     figure, panels = canvas(3, height)
