@@ -11,7 +11,6 @@ import io
 import json
 import lzma
 import math
-import re
 import struct
 import zipfile
 import zlib
@@ -47,10 +46,6 @@ _PACKED: dict[bytes, Callable[..., Any]] = {
     b"\xfd7zXZ\x00": lzma.open,
 }
 """First bytes of compressed files, and what unpacks them."""
-_DEEPEST_NESTING, _MOST_MATRICES, _MOST_SIDE = 100, 1000, 100
-_NESTING = re.compile(r"[\[\]{}]|<\w|</|/>")
-_ENDS = ("]", "}", "</", "/>")
-_SIDES = re.compile(r"\b(?:rows|cols|sizes)\b[\"'>:\[\s]{1,20}([\d,\s]+)")
 DAMAGE = (
     ValueError,
     EOFError,
@@ -166,38 +161,6 @@ def read_json_object(path: Path, what: str = "a JSON object") -> dict[str, Any]:
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected {what}")
     return data
-
-
-def check_matrices(file: Path) -> None:
-    """Check a file of OpenCV's FileStorage before OpenCV reads it.
-
-    OpenCV allocates the stated memory of a matrix, and deep nesting ends the process.
-
-    Raises:
-        InputError: it is too large, has too many or too large matrices, or is nested too deeply.
-        OSError: it cannot be read.
-
-    """
-    text = read_bytes(file, MOST_STORAGE_BYTES).decode("utf-8", errors="replace")
-    depth = deepest = 0
-    for mark in _NESTING.findall(text):
-        depth += -1 if mark in _ENDS else 1
-        deepest = max(deepest, depth)
-    if deepest > _DEEPEST_NESTING:
-        raise InputError(
-            f"{file}: is not a calibration file: its values are nested {deepest} "
-            "deep; choose another file"
-        )
-    matrices = [
-        [int(side[:9]) for side in said.replace(",", " ").split()] for said in _SIDES.findall(text)
-    ]
-    if len(matrices) > _MOST_MATRICES or any(
-        len(sides) > 2 or max(sides, default=0) > _MOST_SIDE for sides in matrices
-    ):
-        raise InputError(
-            f"{file}: is not a calibration file: its matrices have more than {_MOST_SIDE} rows "
-            "or columns; choose another file"
-        )
 
 
 def check_expansion(

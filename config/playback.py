@@ -4,10 +4,10 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from snakewalk.config.base import Strict
+from snakewalk.config.table_columns import TableAnswers
 
 
-class JointRequest(Strict):
+class JointRequest(TableAnswers):
     """Facts that a file of joint angles may not state, and parts of it to use."""
 
     joints: dict[str, str] = Field(
@@ -22,6 +22,9 @@ class JointRequest(Strict):
     )
     topic: str | None = Field(
         None, description="topic of a bag that has several topics of joint angles"
+    )
+    mapping: str | None = Field(
+        None, description="code of the mapping of joints that you have checked for a port"
     )
     episode: int | None = Field(
         None, ge=0, description="number of the episode of a LeRobot dataset, from 0"

@@ -102,10 +102,21 @@ def with_stored(data: Path, answers: M) -> tuple[M, tuple[str, ...]]:
     file = _beside(data)
     if not file.is_file():
         return answers, ()
-    stored, text = read_toml(file)
+    before, text = read_toml(file)
     given = answers.model_dump(exclude_defaults=True)
-    lines = (f"{file.name}: {key} = {value}" for key, value in stored.items() if key not in given)
-    return checked(type(answers), stored | given, str(file), text), tuple(lines)
+    lines = (f"{file.name}: {key} = {value}" for key, value in before.items() if key not in given)
+    return checked(type(answers), before | given, str(file), text), tuple(lines)
+
+
+def stored(data: Path) -> dict[str, Any]:
+    """Answers stored for a file, unchecked.
+
+    Raises:
+        ConfigError: they are no TOML.
+
+    """
+    file = _beside(data)
+    return read_toml(file)[0] if file.is_file() else {}
 
 
 def answered(data: Path, answers: A, read: Callable[[A], R]) -> R:

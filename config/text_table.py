@@ -45,7 +45,7 @@ def read_rows(file: Path, what: str, separator: str | None = None) -> list[list[
 
     """
     lines = read_lines(file, what)
-    first = lines[0] if lines else ""
+    first = next((line for line in lines if any(mark in line for mark in _SEPARATORS)), "")
     try:
         rows = list(csv.reader(lines, delimiter=separator or max(_SEPARATORS, key=first.count)))
     except csv.Error as error:

@@ -6,9 +6,8 @@ Named tuples, because a frozen dataclass needs five times as long and several ar
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Bytes, Floats
 
 LIMIT_SLACK_RAD = 0.2
 """Largest measured angle of a joint beyond its limit, at the start and in a run (ours)."""
@@ -52,9 +51,9 @@ class JointState(NamedTuple):
     """(J,) from the slow round; NaN until first read."""
     voltage_v: Floats
     """(J,) from the slow round; NaN until first read."""
-    hardware_error: NDArray[np.uint8]
+    hardware_error: Bytes
     """(J,) register 70, from the slow round or at once when a status packet carries the alert."""
-    error: NDArray[np.uint8]
+    error: Bytes
     """(J,) error byte of the last status packet."""
     age_s: Floats
     """(J,) since position, velocity and current were last measured, at most: counted from the end

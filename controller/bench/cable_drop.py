@@ -10,9 +10,8 @@ from itertools import combinations, pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.robot import PowerConfig, RobotConfig
 from snakewalk.controller.console.finding import Finding
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V
@@ -118,9 +117,7 @@ def estimate_cables(voltage_v: Floats, drawn_a: Floats, leads: Cabling) -> Cable
     )
 
 
-def _flow(
-    step_v: Floats, error_v: Floats, drawn_a: Floats, fed: NDArray[np.bool_]
-) -> tuple[Floats, Floats]:
+def _flow(step_v: Floats, error_v: Floats, drawn_a: Floats, fed: Bools) -> tuple[Floats, Floats]:
     """Current in each cable, positive away from the first servo, and its standard error, (S - 1,).
 
     Outside the leads it is the current of the servos beyond. Between two leads of equal cables, the

@@ -10,9 +10,8 @@ from typing import Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Bytes, Floats, Image
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.floor_light import banded_floor, lit_floor, unexplained
 from snakewalk.controller.cameras.pose_tracking import (
@@ -49,7 +48,7 @@ class BodyContrast:
     """(h, w[, 3]) picture as the camera sent it."""
     floors: tuple[Image, ...]
     """(h, w[, 3]) backgrounds: a pixel that one of them explains is floor."""
-    near: NDArray[np.uint8]
+    near: Bytes
     """(h, w) 255 where the body can be."""
     origin_px: Floats
     """(2,) x, y of the first pixel in the frame."""
@@ -192,6 +191,6 @@ def _smooth(image: Image) -> Image:
     return np.asarray(cv2.GaussianBlur(image, (3, 3), 0.0), dtype=np.uint8)
 
 
-def _draw(mask: NDArray[np.uint8], line_px: Floats, wide_px: float) -> None:
+def _draw(mask: Bytes, line_px: Floats, wide_px: float) -> None:
     spots = np.rint(line_px).astype(np.int32).reshape(-1, 1, 2)
     cv2.polylines(mask, [spots], False, 255, max(1, round(wide_px)))

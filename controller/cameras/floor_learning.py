@@ -9,9 +9,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Image, Singles
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.body_contrast import links_at
 from snakewalk.controller.cameras.floor_light import in_light_of
@@ -31,7 +30,7 @@ class FloorLearning:
         """Learn with the time constant ``learn_s``; 0: never."""
         self._robot = robot
         self._learn_s = learn_s
-        self._floor: NDArray[np.float32] | None = None
+        self._floor: Singles | None = None
         self._shown: Image | None = None
         self._last_s: float | None = None
 

@@ -7,9 +7,8 @@ the body.
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Image, Singles
 
 _UNIT_LIGHT = 100.0  # of 255: a ratio of 1; the largest ratio is 2.5
 _DARKEST = np.uint8(8)  # grey levels: a ratio to a darker level is meaningless
@@ -45,7 +44,7 @@ def banded_floor(image: Image, floor: Image) -> Image:
     return np.asarray(np.clip(np.rint(floor * rows), 0.0, 255.0), dtype=np.uint8)
 
 
-def in_light_of(image: Image, floor: Image) -> NDArray[np.float32]:
+def in_light_of(image: Image, floor: Image) -> Singles:
     """(H, W[, 3]) a frame converted to the light of its floor's picture.
 
     Light is the common change of a square of a third of the picture's width, on a reduced picture.
@@ -73,7 +72,7 @@ def _light(image: Image, floor: Image, side_px: int) -> Image:
     return light if floor.ndim == 2 else np.dstack([light] * 3)
 
 
-def unexplained(image: Image, lit: Image, shade: float) -> NDArray[np.float32]:
+def unexplained(image: Image, lit: Image, shade: float) -> Singles:
     """(H, W) grey levels of a frame's difference from its lit floor, in the strongest channel.
 
     Shadow and light scale all channels equally. A pixel that is darker by up to ``shade`` or

@@ -11,9 +11,8 @@ from typing import Self
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Singles
 from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
@@ -473,7 +472,7 @@ def _next_to_shadow(
     return replace(tracked, fault="a hard shadow near the body has its colour; soften the light")
 
 
-def _texture(image: Image) -> NDArray[np.float32]:
+def _texture(image: Image) -> Singles:
     """(H / 2, W / 2) edges of a picture, without slow changes of light."""
     grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     half = grey.shape[1] // _SCALE_DOWN, grey.shape[0] // _SCALE_DOWN
@@ -482,9 +481,7 @@ def _texture(image: Image) -> NDArray[np.float32]:
     return np.asarray(np.clip(fine - coarse, -8.0, 8.0), dtype=np.float32)
 
 
-def _parts_explained(
-    now: NDArray[np.float32], floor: NDArray[np.float32], moved: NDArray[np.float32]
-) -> int:
+def _parts_explained(now: Singles, floor: Singles, moved: Singles) -> int:
     far = _FURTHEST_PX // _SCALE_DOWN
     before, after = (
         cv2.resize(((now - texture) ** 2)[far:-far, far:-far], _PARTS, interpolation=cv2.INTER_AREA)
@@ -501,7 +498,7 @@ def _peak(values: Floats) -> float:
     return 0.0 if bend >= 0.0 else 0.5 * float(values[0] - values[2]) / bend
 
 
-def _least_triangle(corners: NDArray[np.float32]) -> float:
+def _least_triangle(corners: Singles) -> float:
     areas = []
     for out in range(4):
         a, b, c = np.delete(corners, out, axis=0).astype(float)

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Singles
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.markers.floor_markers import Bump
 from snakewalk.controller.images.compression import Compression
@@ -97,7 +96,7 @@ class TrackedPose:
 class StandingOut:
     """Difference from the floor in a window of a frame."""
 
-    share: NDArray[np.float32]
+    share: Singles
     """(h, w) share of the body in each pixel; 0: floor, 1: body."""
     origin_px: Floats
     """(2,) x, y of its first pixel in the frame."""
@@ -179,13 +178,13 @@ class _Comparison:
 
     across: Floats
     """(S,) offset of the middle of each section to the left, m."""
-    sections: NDArray[np.bool_]
+    sections: Bools
     """(S,) sections that show a body."""
-    used: NDArray[np.bool_]
+    used: Bools
     """(S,) of these, sections without another object next to the body, if there are enough."""
     along: Floats
     """(2,) by how much the body ends beyond each tip, m."""
-    ends: NDArray[np.bool_]
+    ends: Bools
     """(2,) tips that are seen."""
     rows: Floats
     """(K, 3) motion of sections and tips for a shift and a turn, in their usual errors."""
@@ -198,7 +197,7 @@ def _compare_frame(
     standing_out: StandingOut,
     chain: _Chain,
     place: tuple[Floats, float, float],
-    hidden: NDArray[np.bool_],
+    hidden: Bools,
 ) -> _Comparison:
     """Compare at a shift (2,), a turn and a half width of the sections in radii."""
     (shift, turn, wide), radius_m = place, robot.body_radius_m
@@ -266,7 +265,7 @@ def _fit_tips(
     chain: _Chain,
     time_s: float,
     start: tuple[Floats, float],
-    hidden: NDArray[np.bool_],
+    hidden: Bools,
 ) -> TrackedPose:
     shift, turn = start
     wide = _WIDE_SECTIONS
@@ -403,7 +402,7 @@ def _tip_spots(tips: Floats, out: Floats, radius_m: float) -> tuple[Floats, Floa
     return spots, off
 
 
-def _tips(value: Floats, off: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _tips(value: Floats, off: Floats) -> tuple[Floats, Bools]:
     """Distances (2,) of the body's ends beyond the chain's tips, and whether they are visible."""
     value = value.max(axis=2)
     end = off[0] + value.sum(axis=1) * (off[1] - off[0])

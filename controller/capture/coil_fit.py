@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bytes, Floats, Ints, Singles
+from snakewalk.controller.capture.small_body.crop import bends_of
+from snakewalk.controller.capture.small_body.ribbon import bend_basis
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.images.silhouette import Silhouette
 from snakewalk.drivers.compiling import compiled
@@ -44,7 +44,7 @@ _LEAST_GAP_PX = 1.25  # working px on both sides of the boundary: the edge
 class Outline:
     """A silhouette, reduced so that every frame of a film can keep one."""
 
-    packed: NDArray[np.uint8]
+    packed: Bytes
     """A PNG of the mask."""
     origin_px: tuple[float, float]
     scale: float
@@ -62,7 +62,7 @@ class Outline:
         return cls(np.asarray(packed, dtype=np.uint8), silhouette.origin_px, scale)
 
 
-def _resized_picture(level: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+def _resized_picture(level: Singles, scale: float) -> Singles:
     """The resized picture; pixel centres at ``(x + 0.5) scale - 0.5``."""
     if scale < 1.0:
         level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
@@ -142,27 +142,19 @@ class CoilBody:
     def values_of(self, skeleton: Skeleton, shape: Shape) -> Floats:
         """(PARAMETERS,) of a body whose skeleton is known."""
         line = shape.from_px(skeleton.points_px)
-        step = -np.diff(line, axis=0)
-        angle = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-        place = (np.arange(len(angle)) + 0.5) / len(angle)
-        bends = np.linalg.lstsq(coil_basis(place), angle, rcond=None)[0]
+        bends = bends_of(line, COIL_BENDS)
         off = line.mean(axis=0) - shape.middle
         size = np.log(skeleton.length_px * self.scale / self.length)
         return np.concatenate([off, [size], bends])
 
 
-def coil_basis(place: Floats) -> Floats:
-    """(P, COIL_BENDS) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head."""
-    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, COIL_BENDS - 2), [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
-
-
-_BASIS = coil_basis((np.arange(_DISCS - 1) + 0.5) / (_DISCS - 1))
+_BASIS = bend_basis((np.arange(_DISCS - 1) + 0.5) / (_DISCS - 1), COIL_BENDS)
 
 
 def curve(values: Floats, length: float, middle: Floats, pieces: int = _DISCS - 1) -> Floats:
     """(pieces + 1, 2) the line of a frame's values; ``middle`` (2,) of its silhouette."""
-    basis = _BASIS if pieces == len(_BASIS) else coil_basis((np.arange(pieces) + 0.5) / pieces)
+    places = (np.arange(pieces) + 0.5) / pieces
+    basis = _BASIS if pieces == len(_BASIS) else bend_basis(places, COIL_BENDS)
     angle = basis @ values[3:]
     step = np.column_stack([np.cos(angle), np.sin(angle)]) * (
         length * float(np.exp(values[2])) / pieces
@@ -197,7 +189,7 @@ class Normal:
 
 @compiled("void(float64[:, ::1], float64[::1], float64, float64[:, ::1], int64[:, ::1])")
 def _draw_discs(
-    line: Floats, half_width: Floats, reach: float, depth: Floats, nearest: NDArray[np.int64]
+    line: Floats, half_width: Floats, reach: float, depth: Floats, nearest: Ints
 ) -> None:
     """Write the greatest depth in any disc (h, w), and its disc, up to ``reach`` outside."""
     rows, columns = depth.shape
@@ -216,9 +208,7 @@ def _draw_discs(
                     nearest[row, column] = k
 
 
-def body_depth(
-    line: Floats, half_width: Floats, shape: Shape, reach: float
-) -> tuple[Floats, NDArray[np.int64]]:
+def body_depth(line: Floats, half_width: Floats, shape: Shape, reach: float) -> tuple[Floats, Ints]:
     """(h, w) distances from the boundary of the union of discs, and each pixel's disc.
 
     Beyond ``reach`` they are minus ``reach``.

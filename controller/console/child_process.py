@@ -24,6 +24,17 @@ from snakewalk.controller.console.safe_path import module_folders
 
 _CONTEXT = get_context("spawn")
 """A forked child would inherit the threads of MuJoCo and numba in an unknown state."""
+_LIMITS = """
+import sys
+*words, memory_bytes, cpu_s = sys.argv[1:]
+try:
+    import resource
+except ImportError:  # Windows
+    pass
+else:
+    for which, most in (("AS", memory_bytes), ("CPU", cpu_s), ("FSIZE", memory_bytes)):
+        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
+"""
 _LOCK = threading.RLock()
 """Lock of the environment, which belongs to the whole process."""
 
@@ -77,6 +88,20 @@ def run_code(
 
     """
     return run_program([sys.executable, "-c", code, *arguments], folder, timeout_s)
+
+
+def run_limited(
+    code: str,
+    *arguments: str,
+    most: tuple[int, int],
+    folder: Path | None = None,
+    timeout_s: float | None = None,
+) -> "subprocess.CompletedProcess[str]":
+    """Run code like ``run_code`` within limits; its ``words`` are the arguments.
+
+    ``most`` are bytes of memory and of a file, and seconds of CPU time.
+    """
+    return run_code(_LIMITS + code, *arguments, *map(str, most), folder=folder, timeout_s=timeout_s)
 
 
 def run_program(

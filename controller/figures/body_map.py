@@ -3,9 +3,8 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.colours import GREY, PALE
 from snakewalk.controller.figures.style import ANGLES, SPEEDS, colour_bar
 from snakewalk.controller.track.track import Track
@@ -19,7 +18,7 @@ def body_map(
     track: Track,
     values: Floats,
     label: str,
-    kept: NDArray[np.int64] | None = None,
+    kept: Ints | None = None,
     limits: tuple[float, float] | None = None,
 ) -> None:
     """Draw values (S, N), one row a frame; unknown values stay grey.

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Floats
 from snakewalk.config.colours import INK, PALE, SERIES
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.figures.style import WIDTH_IN, save_picture, style
@@ -36,8 +36,8 @@ def _draw(out: Path) -> None:
     robot = load_robot(ROBOT)
     origin_frame = body_in_world(robot, pose_at(np.zeros(2), 0.0), np.zeros(robot.joint_count))
     motion = CpgMotion(robot, np.zeros(robot.joint_count))
-    angles: list[NDArray[np.float64]] = []
-    speeds: list[NDArray[np.float64]] = []
+    angles: list[Floats] = []
+    speeds: list[Floats] = []
     changes: list[tuple[float, str, float]] = []
     for name in (*GAITS_SHOWN, ""):
         taken_s = motion.become(GAITS[name]()) if name else motion.stop()

@@ -36,6 +36,12 @@ class Needs:
     wheels: bool = False
     """Whether the gait needs a belly that slides more easily along than across."""
 
+    @classmethod
+    def of(cls, robot: "RobotConfig", joint_rad: Floats) -> Self:
+        """Return the needs of joint angles (T, J)."""
+        yaw, pitch = (bool(joint_rad[:, k].any()) for k in (robot.yaw_joints, robot.pitch_joints))
+        return cls(yaw, pitch)
+
     def check(self, robot: "RobotConfig", what: str) -> None:
         """Reject a robot that lacks the joints.
 

@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
-from snakewalk.config.archive import MOST_STORAGE_BYTES, check_matrices, parse_json, read_bytes
+from snakewalk.config.archive import MOST_STORAGE_BYTES, parse_json, read_bytes
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.separate_reader import read_separately
+from snakewalk.controller.images import storage_file
 
 
 def read_storage(file: Path) -> dict[str, Any]:
@@ -18,31 +19,14 @@ def read_storage(file: Path) -> dict[str, Any]:
         OSError: it cannot be opened.
 
     """
-    check_matrices(file)
-    lists = _json_lists(file)
+    lists = _json_lists(file, read_bytes(file, MOST_STORAGE_BYTES))
     if lists is not None:
         return lists
-    try:
-        store = cv2.FileStorage(str(file), cv2.FILE_STORAGE_READ)
-        nodes = {name: store.getNode(name) for name in store.root().keys()}  # noqa: SIM118  no dict
-        values = {
-            name: node.mat()
-            if node.isMap()
-            else node.real()
-            if node.isReal() or node.isInt()
-            else None
-            for name, node in nodes.items()
-        }
-        store.release()
-    except (cv2.error, SystemError) as error:
-        raise InputError(
-            f"{file}: OpenCV's FileStorage cannot read it: {str(error).strip()}; choose another "
-            "file"
-        ) from None
-    return values
+    matrices, others = read_separately(file, storage_file.__name__)
+    return matrices | others
 
 
-def _json_lists(file: Path) -> dict[str, Any] | None:
+def _json_lists(file: Path, data: bytes) -> dict[str, Any] | None:
     """Values of a JSON file of plain lists and numbers, as from ``json.dump``.
 
     An object with ``data`` is a matrix of OpenCV, also next to plain lists.
@@ -58,17 +42,17 @@ def _json_lists(file: Path) -> dict[str, Any] | None:
     """
     if file.suffix.lower() != ".json":
         return None
-    text = read_bytes(file, MOST_STORAGE_BYTES).decode("utf-8-sig", errors="replace")
+    text = data.decode("utf-8-sig", errors="replace")
     try:
-        data = parse_json(text)
+        values = parse_json(text)
     except ValueError as error:
         if "//" in text or "/*" in text:
             return None
         raise InputError(f"{file}: cannot be read as JSON: {error}; correct it") from None
-    if not isinstance(data, dict):
+    if not isinstance(values, dict):
         raise InputError(f"{file}: lacks names of its matrices; write a JSON object")
     lists: dict[str, Any] = {}
-    for name, value in data.items():
+    for name, value in values.items():
         if isinstance(value, dict) and isinstance(value.get("data"), str):
             return None
         if isinstance(value, str | bool) or value is None:

@@ -2,14 +2,8 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
-
-
-def arc_lengths(line: Floats) -> Floats:
-    """(P,) length of a line (P, 2) up to each of its points."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+from snakewalk.config.arrays import Floats, Singles
 
 
 def even_line(line: Floats, arc: Floats, step: float) -> Floats:
@@ -27,7 +21,7 @@ def end_direction(line: Floats, back: int) -> Floats:
     return np.asarray(ahead / max(float(np.hypot(*ahead)), 1e-9))
 
 
-def seen_across(path: Floats, level: NDArray[np.float32], across: Floats) -> NDArray[np.float32]:
+def seen_across(path: Floats, level: Singles, across: Floats) -> Singles:
     """(P, A) values of a picture at the distances ``across`` (A,) on the sides of a path (P, 2).
 
     Outside the picture the value is 0.

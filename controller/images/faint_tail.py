@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Bools, DeepImage, Floats
+from snakewalk.config.arrays import Bools, DeepImage, Floats, Singles
 from snakewalk.controller.images.faint_parts import FAINTEST
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, contrast
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _DIRECTION_PX = 9.0  # length of the rays that are compared
 _RADIUS_PX = 9.0  # smallest radius of a bend
@@ -59,7 +59,7 @@ class FollowedTail:
 
 
 def follow_tail(
-    level: NDArray[np.float32], line: Floats, half_px: float, away_px: Floats, faintest: float
+    level: Singles, line: Floats, half_px: float, away_px: Floats, faintest: float
 ) -> FollowedTail | None:
     """Follow a ridge beyond the last point of a line; None if nothing goes on there.
 
@@ -116,7 +116,7 @@ def follow_tail(
     return FollowedTail(np.array(points), clearness)
 
 
-def _ridge(level: NDArray[np.float32], start: Floats, directions: Floats, half: float) -> Floats:
+def _ridge(level: Singles, start: Floats, directions: Floats, half: float) -> Floats:
     """(W,) mean contrast along a ray from each point (W, 2), less that of its clearer side."""
     along = np.arange(1.0, _DIRECTION_PX + 1.0)
     unit = np.column_stack([np.cos(directions), np.sin(directions)])
@@ -139,7 +139,7 @@ def _returns(points: Floats, away_px: Floats) -> bool:
     return bool((~outside[int(np.argmax(outside)) :]).any() and outside.any())
 
 
-def _noise(level: NDArray[np.float32], half: float, free: Bools) -> float | None:
+def _noise(level: Singles, half: float, free: Bools) -> float | None:
     """Standard deviation of ``_ridge`` on bare ground; None if there is too little of it."""
     y, x = np.nonzero(free)
     if len(x) < _SAMPLES:
@@ -192,7 +192,7 @@ def with_tails(
     if not added:
         return None
     smooth = gaussian_filter1d(line, _SMOOTH, axis=0, mode="nearest")
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    arc = arc_lengths(line)
     smooth = np.vstack([line[:1], smooth, line[-1:]]) + np.array([x, y])
     shares = np.linspace(0.0, arc[-1], SEGMENTS + 1)
     skeleton = in_equal_chords(smooth, np.interp(shares, arc, radius))

@@ -13,14 +13,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from skimage.morphology import skeletonize
 
-from snakewalk.config.arrays import Bools, Floats, Image, Ints
+from snakewalk.config.arrays import Bools, Floats, Image, Ints, Singles
 from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.images.pointed_tips import to_pointed_tips
 from snakewalk.controller.images.thin_body_fit import THIN_PX, fitted
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.compiling import compiled
 
-Level = NDArray[np.float32]
+Level = Singles
 SEGMENTS = 100
 _MARGIN = 3
 _LARGEST_SIDE_PX = 8000  # largest side of the enlarged cut-out
@@ -246,7 +247,7 @@ def _to_the_tips(
     Wide ends are added to ``heads``.
     """
     line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    arc = arc_lengths(line)
     deep = _sample(depth, line)
     # within a radius of the end, the axis of a blunt body turns into a corner
     inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))

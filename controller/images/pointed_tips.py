@@ -5,16 +5,15 @@ this profile, extrapolated, reaches 0.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.images.cross_profile import (
-    arc_lengths,
     end_direction,
     even_line,
     seen_across,
 )
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _STEP_PX = 0.5
 _LOW_LEVEL, _HIGH = 0.06, 0.12  # of the usual width: this part of the profile is extrapolated
@@ -33,7 +32,7 @@ _WORTH = 0.15  # widths: a shorter extension is ignored
 _MIDDLE_PART = (0.3, 0.6)  # of the length: range of the usual width
 
 
-def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
+def to_pointed_tips(line: Floats, level: Singles, wide: float, scale: float) -> Floats:
     """Return the line (P, 2), extended to the tips of ends that taper.
 
     Args:
@@ -52,7 +51,7 @@ def to_pointed_tips(line: Floats, level: NDArray[np.float32], wide: float, scale
     return np.asarray(even)
 
 
-def _lengthened_line(line: Floats, level: NDArray[np.float32], wide: float, scale: float) -> Floats:
+def _lengthened_line(line: Floats, level: Singles, wide: float, scale: float) -> Floats:
     """Extend the last end of a line of equal steps to the tip."""
     count = len(line)
     back = max(2, round(_DIRECTION_WIDTHS * wide / _STEP_PX))
@@ -92,7 +91,7 @@ def _crossing(sums: Floats, share: float) -> float | None:
     return last + float((sums[last] - share) / (sums[last] - sums[last + 1]))
 
 
-def _sums(path: Floats, level: NDArray[np.float32], wide: float) -> Floats:
+def _sums(path: Floats, level: Singles, wide: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
     reach = round(_ACROSS_WIDTHS * wide)
     across = np.arange(-reach, reach + 1.0)

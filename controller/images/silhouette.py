@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, DeepImage
+from snakewalk.config.arrays import Bools, DeepImage, Int32s, Singles
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _MARGIN = 4
@@ -33,7 +33,7 @@ class Polarity(StrEnum):
 class Silhouette:
     """One body, cut out of one image."""
 
-    level: NDArray[np.float32]
+    level: Singles
     """(h, w) contrast against the background, grey values; other things in the cut-out are 0."""
     threshold: float
     """Contrast at the boundary: half of the body's own."""
@@ -131,8 +131,8 @@ def body_threshold(contrast_image: DeepImage) -> float | None:
 
 def _threshold_of_body(
     contrast_image: DeepImage,
-    label: NDArray[np.int32],
-    stats: NDArray[np.int32],
+    label: Int32s,
+    stats: Int32s,
     middle: float,
     least: float,
 ) -> float:
@@ -171,7 +171,7 @@ def _no_silhouette() -> Silhouette:
     return Silhouette(empty, 0.5, 0.0, (0.0, 0.0), 0.0, 0.0, FrameStatus.NOTHING)
 
 
-def connected_parts(mask: DeepImage) -> tuple[NDArray[np.int32], NDArray[np.int32]] | None:
+def connected_parts(mask: DeepImage) -> tuple[Int32s, Int32s] | None:
     """Labels and statistics of the connected parts; None if all are tiny."""
     left, top, wide, high = cv2.boundingRect(mask)
     if wide * high < _LEAST_AREA_PX:

@@ -6,11 +6,10 @@ points, thickness at a few stations, and one width of the spots.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.drivers.compiling import compiled
 
 THIN_PX = 6.0
@@ -50,7 +49,7 @@ _BY_VALUES[2, 2 * _CONTROLS :] = _HATS.T
 _BEND = np.diff(np.eye(_CONTROLS), 2, axis=0)
 
 
-def fitted(line: Floats, level: NDArray[np.float32], width: float) -> tuple[Floats, float] | None:
+def fitted(line: Floats, level: Singles, width: float) -> tuple[Floats, float] | None:
     """Curve (403, 2) from tip to tip whose blurred picture is closest to ``level``.
 
     Args:

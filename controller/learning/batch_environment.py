@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Singles
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.learning.environment import SimulatedRobot, SnakeEnvironment
@@ -23,7 +23,7 @@ from snakewalk.drivers.types import BodyPose
 Actions = NDArray[np.floating[Any]]
 
 
-class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], Any]):  # type: ignore[misc]
+class SnakeBatchEnvironment(VectorEnv[Singles, Singles, Any]):  # type: ignore[misc]
     """W snakes on a level floor; action, observation and reward are ``SnakeEnvironment``'s.
 
     It has no bus: goals reach the servos at once. A robot whose episode has ended starts again in
@@ -76,7 +76,7 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Singles, dict[str, Any]]:
         """Put new robots on the floor; row k has the seed ``seed + k``."""
         count = self.num_envs
         seeds = (
@@ -98,10 +98,10 @@ class SnakeBatchEnvironment(VectorEnv[NDArray[np.float32], NDArray[np.float32], 
     def step(
         self, actions: Actions
     ) -> tuple[
-        NDArray[np.float32],
-        NDArray[np.float64],
-        NDArray[np.bool_],
-        NDArray[np.bool_],
+        Singles,
+        Floats,
+        Bools,
+        Bools,
         dict[str, Any],
     ]:
         """Send the goals (W, J), advance all robots by a cycle, and read them."""
@@ -167,7 +167,7 @@ class _RowEnvironment(SnakeEnvironment):
     def send(self, action: Actions) -> None:
         self._send(action)
 
-    def result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def result(self) -> tuple[Singles, float, bool, bool, dict[str, Any]]:
         """Return what ``step`` returns, once the batch was advanced."""
         return self._result()
 

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Singles
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import checked, load_robot, load_world
@@ -73,7 +73,7 @@ class SimulatedRobot(Protocol):
 METADATA: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
 
 
-class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class SnakeEnvironment(gymnasium.Env[Singles, Singles]):
     """A chain of servos on its ground that is to go along x, as far as it can for its energy.
 
     With J joints, head first; ``observation_names`` has a name with its unit for each number.
@@ -195,7 +195,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Singles, dict[str, Any]]:
         """Lay another robot of the same kind on the ground, torque on; needs as long as 600 steps.
 
         Raises:
@@ -223,7 +223,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def step(
         self, action: NDArray[np.floating[Any]]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    ) -> tuple[Singles, float, bool, bool, dict[str, Any]]:
         """Send goals (J,), as shares of the limits; wait for the next cycle, read all servos.
 
         Raises:
@@ -256,7 +256,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             if link.last_verdict is not None:
                 self._sent_rad = link.last_verdict.goal_rad
 
-    def _result(self) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def _result(self) -> tuple[Singles, float, bool, bool, dict[str, Any]]:
         """Read all servos at the end of a step, and return what ``step`` returns."""
         backend = self._backend
         link = self._link
@@ -306,9 +306,7 @@ class SnakeEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._shown_s = self._clock.now_s()
         self.render()
 
-    def _observe(
-        self, backend: SimulatedRobot, state: JointState
-    ) -> tuple[NDArray[np.float32], float]:
+    def _observe(self, backend: SimulatedRobot, state: JointState) -> tuple[Singles, float]:
         """Observation, and how far the centre of mass came along x since the one before."""
         assert backend.pose is not None  # a simulated one
         pose = backend.pose()
@@ -365,8 +363,8 @@ def checked_action(action: NDArray[np.floating[Any]], names: Sequence[str]) -> F
     " float64[:, :, ::1], float64[::1])"
 )
 def _fill(
-    values: NDArray[np.float32],
-    end: NDArray[np.float32],
+    values: Singles,
+    end: Singles,
     position_rad: Floats,
     velocity_rad_s: Floats,
     current_a: Floats,

@@ -5,9 +5,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Image
+from snakewalk.config.arrays import Image, Singles
 from snakewalk.controller.learning.environment import METADATA, SnakeEnvironment, checked_action
 from snakewalk.controller.motion.policy import (
     WAVE_SPAN,
@@ -31,7 +30,7 @@ _UNTRAINED_POLICY = Policy(
 )
 
 
-class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PolicyEnvironment(gymnasium.Env[Singles, Singles]):
     """A snake whose wave an agent changes; reward, end and ``info`` are ``SnakeEnvironment``'s.
 
     With n yaw joints and P = 16 values of a wave (``PolicyWave``):
@@ -63,7 +62,7 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    ) -> tuple[Singles, dict[str, Any]]:
         """Lay another robot on the ground, with a motion at its beginning."""
         super().reset(seed=seed)
         wave_seed = int(self.np_random.integers(2**31)) if seed is None else seed
@@ -71,9 +70,7 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
         self._motion = PolicyMotion(self._policy, self._snake.robot)
         return self._observe(self._motion), info
 
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Singles) -> tuple[Singles, float, bool, bool, dict[str, Any]]:
         """Change the wave, go on by a cycle.
 
         Raises:
@@ -95,5 +92,5 @@ class PolicyEnvironment(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]])
         """Close window and frame buffer; safe to call twice."""
         self._snake.close()
 
-    def _observe(self, motion: PolicyMotion) -> NDArray[np.float32]:
+    def _observe(self, motion: PolicyMotion) -> Singles:
         return motion.observe(self._snake.view).astype("f4")

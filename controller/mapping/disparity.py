@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Singles
 from snakewalk.config.errors import InputError
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -151,7 +151,7 @@ def _aligned_windows(left: Image, right: Image, disparity: Floats) -> Floats:
     return np.asarray(disparity + np.clip(shift, -_MOST_SHIFT_PX, _MOST_SHIFT_PX), dtype=float)
 
 
-def _box(values: NDArray[np.floating]) -> NDArray[np.float32]:
+def _box(values: NDArray[np.floating]) -> Singles:
     return np.asarray(cv2.blur(values, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
 
 

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from snakewalk.config.answers import LISTED, Answers
 from snakewalk.config.key_types import LengthUnit
+from snakewalk.config.table_columns import TableAnswers
 from snakewalk.controller.console.option import Flag
 
 _Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]
@@ -14,7 +15,7 @@ LARGEST = 1e6
 """Limits of lengths, m, and of factors: a value beyond them is in another unit (ours)."""
 
 
-class ElevationChoice(Answers):
+class ElevationChoice(Answers, TableAnswers):
     """Facts that a file of elevations may not state, and parts of it to use."""
 
     unit: Literal[_Length, "deg"] | None = Field(

@@ -200,8 +200,8 @@ def _read(file: Path, options: MapOptions) -> FileMap:
     if kind == ".csv":
         notes: list[str] = []
         names: list[str] = []
-        table = read_numbers(file, notes, names)
-        if table.shape[1] == 3:
+        table = read_numbers(file, notes, names, options.choice.columns)
+        if table.shape[1] == 3 or names:
             points_m, facts = points_in_metres(file, table, names, options.choice)
             upright_m = _upright(file, points_m, options)
             return _of_points(file, upright_m, None, options, facts, notes)
@@ -264,7 +264,7 @@ def _solid(file: Path, options: MapOptions) -> FileMap:
             )
         notes += cloud.notes
     elif kind == ".xyz":
-        points = read_numbers(file, notes, names)[:, :3]
+        points = read_numbers(file, notes, names, options.choice.columns)
     elif kind == ".ply":
         points, faces = read_ply(file)
     else:

@@ -106,6 +106,8 @@ def _read(
 ) -> Raster:
     if opened.count != 1 and opened.dtypes[0] == "uint8":
         raise InputError(f"{file}: is a picture of {opened.count} bands, and holds no heights")
+    if opened.dtypes[0].startswith("complex"):
+        raise InputError(f"{file}: has complex numbers, and no heights; choose another file")
     colour = opened.colorinterp[0].name
     if colour in _COLOURS:
         meaning = "classes" if colour == "palette" else "a picture"

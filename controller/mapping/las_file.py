@@ -1,23 +1,21 @@
 """LAS and LAZ: points of laser scanners, read in chunks by laspy."""
 
-import json
 import logging
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from snakewalk.config.archive import parse_json, read_head
+from snakewalk.config.archive import read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.file_units import DEGREE, unit_m, unit_name
 from snakewalk.config.reading import Facts, by_file, by_user, decided
-from snakewalk.controller.console.child_process import run_code
+from snakewalk.controller.console.separate_reader import read_separately
 from snakewalk.controller.mapping.length_units import (
     SYSTEM,
     VERTICAL_PART,
@@ -62,24 +60,6 @@ _PROJECTED_PART = re.compile(r"\b(?:PROJCS|PROJCRS|PROJECTEDCRS)\[")
 _KEY_UNITS = {9001: "m", 9002: "ft", 9003: "us-ft"}
 
 
-_MOST_MEMORY_BYTES = 3_000_000_000
-_MOST_CPU_S = 600
-"""Limits of the process that reads a file: memory and CPU time (ours)."""
-_CHILD = """
-import sys
-words, memory_bytes, cpu_s = sys.argv[1:]
-try:
-    import resource
-except ImportError:  # Windows
-    pass
-else:
-    for which, most in (("AS", memory_bytes), ("CPU", cpu_s)):
-        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
-from snakewalk.controller.mapping.las_file import child
-print(child(words))
-"""
-
-
 @dataclass(frozen=True, slots=True)
 class LasPoints:
     """Points of a file, in its units, with its statements."""
@@ -122,15 +102,10 @@ def read_las(
     require_extra("LAS and LAZ need", "laspy", "lazrs")
     read_head(file, 1)
     chosen = None if classes is None else sorted(classes)
-    with TemporaryDirectory() as folder:
-        out = Path(folder) / "points.npy"
-        said = run_child(json.dumps([str(file), chosen, crop, unit, str(out)]))
-        if "fault" in said:
-            raise InputError(f"{file}: {said['fault']}")
-        points = np.load(out)
+    arrays, said = read_separately(file, __name__, chosen, crop, unit)
     system = said["system"]
     return LasPoints(
-        points,
+        arrays["points"],
         said["unit"],
         said["height_unit"],
         None if system is None else _system(system),
@@ -139,48 +114,27 @@ def read_las(
     )
 
 
-def run_child(words: str) -> dict[str, Any]:
-    """Read a file in a separate process; return its facts, or its fault."""
-    ended = run_code(_CHILD, words, str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S))
-    try:
-        said = parse_json(ended.stdout)
-    except ValueError:
-        return {
-            "fault": "is damaged: its decoder gave up, or needed over "
-            f"{_MOST_MEMORY_BYTES / 1e9:g} GB or {_MOST_CPU_S} s"
-        }
-    assert isinstance(said, dict)
-    return said
-
-
-def child(words: str) -> str:
-    """Work of the separate process: write the points, return the file's statements as JSON."""
-    file, classes, crop, unit, out = parse_json(words)
+def child(
+    file: str, classes: Collection[int] | None, crop: Crop | None, unit: str | None
+) -> tuple[dict[str, Floats], dict[str, Any]]:
+    """Points of a file, and its statements; the work of the separate process."""
     import laspy  # noqa: PLC0415  an extra
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # the fault has its messages
-    try:
-        with laspy.open(file) as reader:
-            stated, height_unit, system = _units(reader.header)
-            plane = unit or stated
-            window = None
-            if crop is not None and plane not in (None, DEGREE):
-                window = [crop_value / unit_m(plane) for crop_value in crop]
-            points, notes = _read(reader, classes, window)
-    except InputError as error:
-        return json.dumps({"fault": str(error)})
-    except Exception as error:  # laspy and lazrs raise the exceptions of their parsers
-        return json.dumps({"fault": f"cannot be read as LAS or LAZ: {error}"})
-    np.save(out, points)
-    return json.dumps(
-        {
-            "unit": stated,
-            "height_unit": height_unit,
-            "system": system,
-            "notes": notes,
-            "cropped": window is not None,
-        }
-    )
+    with laspy.open(file) as reader:
+        stated, height_unit, system = _units(reader.header)
+        plane = unit or stated
+        window = None
+        if crop is not None and plane not in (None, DEGREE):
+            window = [crop_value / unit_m(plane) for crop_value in crop]
+        points, notes = _read(reader, classes, window)
+    return {"points": points}, {
+        "unit": stated,
+        "height_unit": height_unit,
+        "system": system,
+        "notes": notes,
+        "cropped": window is not None,
+    }
 
 
 def _read(

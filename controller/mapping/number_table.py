@@ -1,9 +1,12 @@
 """Tables of numbers: CSV and XYZ, with decimal points or decimal commas."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.config.table_columns import with_meanings
 from snakewalk.config.text_table import (
     DECIMAL_COMMA,
     MISSING,
@@ -14,13 +17,16 @@ from snakewalk.config.text_table import (
 
 
 def read_numbers(
-    file: Path, notes: list[str] | None = None, names: list[str] | None = None
+    file: Path,
+    notes: list[str],
+    names: list[str] | None = None,
+    chosen: Mapping[str, str] = MappingProxyType({}),
 ) -> Floats:
     """Numbers (rows, columns) of a table, with or without a line of names.
 
     Commas, semicolons, tabs or blanks separate them. Empty cells, ``NaN`` and ``NA`` are NaN.
     Without comma separators a table may have decimal commas. Names of columns are appended to
-    ``names``.
+    ``names``. ``chosen`` are meanings of columns, of which alone the numbers are read.
 
     Raises:
         InputError: the file is not such a table; names the first cell that is not a number.
@@ -35,6 +41,10 @@ def read_numbers(
         raise InputError(f"{file}: holds no numbers")
     mark = _separator([line for _, line in lines])
     rows = [(number, [cell.strip() for cell in line.split(mark)]) for number, line in lines]
+    if chosen:
+        named = with_meanings(file, [cells for _, cells in rows], chosen, notes)
+        named = [cells[: len(chosen)] for cells in named]
+        rows = list(zip([0, *(n for n, _ in rows[-len(named) + 1 :])], named, strict=True))
     comma = mark != "," and has_decimal_commas(file, [cells for _, cells in rows])
     if not all(_is_number(cell, comma) for cell in rows[0][1]):
         if names is not None:
@@ -43,7 +53,7 @@ def read_numbers(
     widths = {len(cells) for _, cells in rows}
     if len(widths) != 1:
         raise InputError(_uneven(file, rows, widths))
-    if comma and notes is not None:
+    if comma:
         notes.append("numbers have decimal commas")
     cells = ([cell.replace(",", ".") if comma else cell for cell in row] for _, row in rows)
     columns = [f"column {k + 1}" for k in range(widths.pop())]

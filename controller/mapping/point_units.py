@@ -9,13 +9,18 @@ import numpy as np
 from snakewalk.config.archive import ending
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.config.file_units import DEGREE, unit_m
-from snakewalk.config.reading import Fact, Facts, by_user, decided
+from snakewalk.config.file_units import DEGREE, named_unit, unit_m
+from snakewalk.config.reading import Fact, Facts, decided, stated
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import UNSTATED_UNIT, degree_cell_m, height_fact
 
-_LATITUDE = re.compile(r"lat(itude)?\b.*", re.IGNORECASE)
-_LONGITUDE = re.compile(r"(lon|lng)(g|gitude)?\b.*", re.IGNORECASE)
+_AXES = {
+    **dict.fromkeys(("x", "east", "easting", "lon", "lng", "long", "longitude"), 0),
+    **dict.fromkeys(("y", "north", "northing", "lat", "latitude"), 1),
+    **dict.fromkeys(("z", "height", "elevation", "alt", "altitude"), 2),
+}
+_NAME = re.compile(r"([a-z]+)(?:[ _]?[\[(_ ]([a-z-]+)[\])]?)?")
+"""Name of an axis, and its unit."""
 _MOST_DEGREES = 1.0
 """Larger ground is not a ground for a robot (ours)."""
 _FAR_EXTENTS = 20.0
@@ -37,22 +42,24 @@ def points_in_metres(
         InputError: the points may be degrees (the question), or a point has too few numbers.
 
     """
-    if points.shape[1] != 3:
-        raise InputError(f"{file}: holds {points.shape[1]} numbers a point; x, y and z are needed")
+    layout = _layout(names)
+    if points.shape[1] < 3 or (layout is None and names and points.shape[1] > 3):
+        raise InputError(
+            f"{file}: has {points.shape[1]} columns, {', '.join(names) or 'without names'}; add "
+            "--columns x=COLUMN, y=COLUMN and z=COLUMN"
+        )
+    order, by_names, by_format = layout or ([0, 1, 2], None, None)
+    points = points[:, order]
     if units.no_data is not None:
         points = np.where(points == units.no_data, np.nan, points)
-    fact = by_user("--unit", units.unit)
-    columns = _columns(names)
-    if columns is not None:
-        points = points[:, columns]
-        if fact is None:
-            fact = Fact(DEGREE, "file", f"the names of its columns, {', '.join(names)}")
+    fact = stated(file, "--unit", by_names, units.unit)
     if fact is None and ending(file) == ".glb":
         fact = Fact("m", "file", "its format")
     if fact is None:
         fact = _unstated(file, points)
     unit = fact.value
-    by_format = "m" if fact.source == "file" and unit != DEGREE else None
+    if fact.source == "file" and unit == "m":
+        by_format = by_format or "m"
     height = height_fact(file, fact, units.height_unit, by_format)
     facts = {"unit": fact, "height_unit": height}
     rise_m = unit_m(height.value)
@@ -63,13 +70,18 @@ def points_in_metres(
     return points * [*degree_cell_m(1.0, 1.0, _latitude(points)), rise_m], facts
 
 
-def _columns(names: Sequence[str]) -> list[int] | None:
-    """Columns of longitude, latitude and height; None if names do not state them."""
-    latitudes = [k for k, name in enumerate(names) if _LATITUDE.fullmatch(name.strip(" \"'"))]
-    longitudes = [k for k, name in enumerate(names) if _LONGITUDE.fullmatch(name.strip(" \"'"))]
-    if len(names) != 3 or len(latitudes) != 1 or len(longitudes) != 1:
+def _layout(names: Sequence[str]) -> tuple[list[int], str | None, str | None] | None:
+    """Columns of x, y, z, and units of x and of z; None if names do not state the columns."""
+    matches = [_NAME.fullmatch(name.lower().strip(" \"'/")) for name in names]
+    axes = [None if match is None else _AXES.get(match[1]) for match in matches]
+    if len(axes) == 3 and axes.count(None) == 1 and {0, 1} <= {*axes}:
+        axes[axes.index(None)] = 2
+    if any(axes.count(axis) != 1 for axis in range(3)):
         return None
-    return [longitudes[0], latitudes[0], 3 - longitudes[0] - latitudes[0]]
+    order = [axes.index(axis) for axis in range(3)]
+    units = [named_unit(match[2] or "") if (match := matches[k]) else None for k in order]
+    first = names[order[0]].lower().strip(" \"'/")
+    return order, DEGREE if first.startswith(("lon", "lng")) else units[0], units[2]
 
 
 def _latitude(points: Floats) -> float:

@@ -139,13 +139,18 @@ def require_upright(stand: CameraStand) -> None:
         )
 
 
+def disparities(pair: RectifiedPair, count: int) -> Floats:
+    """(H, W) disparities, ``count`` of them from that of a point at infinity; NaN if not seen."""
+    least = max(0, int(np.floor(-pair.offset_px)))
+    return np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
+
+
 def seen_points(pair: RectifiedPair, count: int, error_m: float) -> tuple[Floats, Floats, Floats]:
     """Disparities (H, W), points (n, 3), and their expected errors (n,).
 
     Arguments as in ``stereo_ground``.
     """
-    least = max(0, int(np.floor(-pair.offset_px)))
-    disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
+    disparity = disparities(pair, count)
     points = pair.points_m(disparity)
     distance = np.linalg.norm(points, axis=-1)
     with np.errstate(invalid="ignore"):

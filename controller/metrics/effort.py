@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.constants import GRAVITY_M_S2
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world
@@ -196,7 +195,7 @@ def cost_of_transport(energy_j: float, carried_j: float) -> float:
     return energy_j / carried_j if carried_j > _LEAST_CARRIED_J else float("inf")
 
 
-def _slip(record: RunRecord, steady: NDArray[np.bool_]) -> float:
+def _slip(record: RunRecord, steady: Bools) -> float:
     """Sideways distance of the lowest point of touching links, over the centre's distance."""
     header = record.header
     pose = record.pose

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.metrics.path_error import length_m, path_error_m, waypoint_times_s
 from snakewalk.controller.runlog.record import RunRecord
@@ -214,7 +215,7 @@ def _steepest_rad(record: RunRecord, which: int, due_m: Floats) -> float:
     if ground is None or not record.paths or not np.isfinite(due_m).all():
         return 0.0
     path_m = record.paths[which][1][:, :2]
-    at_m = np.append(0.0, np.cumsum(np.hypot(*np.diff(path_m, axis=0).T)))
+    at_m = arc_lengths(path_m)
     due_m = np.clip(due_m, 0.0, at_m[-1])
     x, y = (np.interp(due_m, at_m, path_m[:, axis]) for axis in range(2))
     steps_m = np.diff(due_m)

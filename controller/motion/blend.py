@@ -139,17 +139,20 @@ class Join:
 
     def source_time_s(self, t_s: float) -> float:
         """Time of the target's own motion at ``t_s``."""
-        x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
-        y = max(0.0, (x - DELAY) / (1.0 - DELAY))
+        x, y = self._shares(t_s)
         sped_up = (1.0 - self.rate) * (1.0 - DELAY) * cubic_sum(y)
         blended = self.duration_s * (self.rate * x + sped_up)
         return float(blended + max(t_s - self.duration_s, 0.0))
 
     def source_rate(self, t_s: float) -> float:
         """Rate s' of the target at ``t_s``."""
-        x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
-        y = max(0.0, (x - DELAY) / (1.0 - DELAY))
+        _, y = self._shares(t_s)
         return float(self.rate + cubic(y, 1.0 - self.rate))
+
+    def _shares(self, t_s: float) -> tuple[float, float]:
+        """Shares of the duration and of its part after the delay."""
+        x = min(t_s / self.duration_s, 1.0) if self.duration_s > 0.0 else 1.0
+        return x, max(0.0, (x - DELAY) / (1.0 - DELAY))
 
     def error_at(self, t_s: float) -> tuple[Floats, Floats]:
         """(J,) remaining error in angle and in speed."""

@@ -220,8 +220,8 @@ def _words(stem: str) -> set[str]:
 
 def onto_robot(
     motion: JointMotion, robot: RobotConfig, asked: Mapping[str, str], where: str
-) -> tuple[Floats, Floats, tuple[str, ...]]:
-    """Return times (T,), angles (T, J) in the order of a robot's joints, and lines about both.
+) -> JointMotion:
+    """Return a motion with the joint of the file, or ``rest``, for each joint of a robot.
 
     ``asked`` has priority, then equal names. If no name is equal and the numbers of joints agree,
     joints are mapped by the numbers in their names, within stems such as ``yaw`` and ``pitch``.
@@ -276,4 +276,5 @@ def onto_robot(
             f"{', '.join(unused)}"
         )
     complete = _complete(motion, np.stack(columns, axis=1), where)
-    return complete.time_s, complete.joint_rad, (*lines, *complete.notes)
+    names = tuple(pairs[name] for name in joint_names)
+    return replace(complete, names=names, notes=(*lines, *complete.notes))

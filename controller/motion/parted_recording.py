@@ -82,10 +82,7 @@ class PartedRecording:
         self._at = 0
         self._bridge_s = 0.0
         """Time since the present part has ended."""
-        self.needs = Needs(
-            yaw=bool(np.any(joint_rad[:, robot.yaw_joints])),
-            pitch=bool(np.any(joint_rad[:, robot.pitch_joints])),
-        )
+        self.needs = Needs.of(robot, joint_rad)
 
     @property
     def done(self) -> bool:

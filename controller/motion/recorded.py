@@ -76,10 +76,7 @@ class Recorded:
         self.duration_s = self._length_s * self.slowed + self._ramp_s
         """Duration of the motion, from rest to rest."""
         self._now_s = 0.0
-        self.needs = Needs(
-            yaw=bool(np.any(joint_rad[:, robot.yaw_joints])),
-            pitch=bool(np.any(joint_rad[:, robot.pitch_joints])),
-        )
+        self.needs = Needs.of(robot, joint_rad)
 
     @property
     def done(self) -> bool:

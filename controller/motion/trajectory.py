@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Indices
 from snakewalk.config.errors import InputError
 from snakewalk.config.joint_names import numbered_joint_names
 from snakewalk.config.robot import RobotConfig
@@ -22,7 +21,7 @@ _SAMPLES = 32
 _SLACK = 1.0 + 1e-6
 _REST_SPEED_RAD_S = 1e-3
 
-JointNumbers = NDArray[np.intp]
+JointNumbers = Indices
 
 
 class JointsNow(NamedTuple):

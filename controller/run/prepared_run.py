@@ -16,6 +16,7 @@ from snakewalk.controller.kinematics.links import mean_heading_rad
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.terrain.path import SplinePath
 
 
 class PreparedRun(Protocol):
@@ -80,6 +81,12 @@ def plan_without_path(run: RunConfig) -> PlanSummary:
     return PlanSummary(start, np.zeros((0, 2)), run.waypoint_radius_m)
 
 
+def plan_of_path(run: RunConfig, path: SplinePath) -> PlanSummary:
+    """Summarise a plan along a path."""
+    path_m = path.position(np.linspace(0.0, path.length_m, 200))
+    return PlanSummary(path_m, np.array(run.waypoints_m), run.waypoint_radius_m)
+
+
 @dataclass(frozen=True)
 class GroundedRun:
     """Base of prepared runs: the configuration and its ground."""
@@ -112,6 +119,20 @@ class PathlessRun(GroundedRun):
     def start_heading_rad(self) -> float:
         """Mean heading of the body at the start."""
         return self.run.start_heading_rad or 0.0
+
+
+@runtime_checkable
+class AsksForPort(Protocol):
+    """A prepared run that needs the user's consent before it moves servos on a port."""
+
+    def check_for_port(self) -> None:
+        """Ask for it.
+
+        Raises:
+            InputError: the question.
+
+        """
+        ...
 
 
 @runtime_checkable

@@ -202,6 +202,16 @@ def by_evidence(result: RunResult, values: Mapping[str, object]) -> dict[str, ob
     return {**dict.fromkeys(values), **believed, **numbers.evidence}
 
 
+def run_facts(result: RunResult) -> dict[str, object]:
+    """Return what every run has: robot, world, duration and trip."""
+    return {
+        "robot": result.prepared.robot.name,
+        "world": result.prepared.world.name,
+        "duration_s": round(result.outcome.duration_s, 2),
+        "tripped": result.outcome.tripped,
+    }
+
+
 def summarized(numbers: RunSummary, *keys: str) -> dict[str, object]:
     """Return numbers that need a measured pose, or their ``dead_reckoned_*``."""
     believed = () if numbers.is_measured else tuple(f"dead_reckoned_{key}" for key in keys)

@@ -48,7 +48,7 @@ from snakewalk.controller.run.pose_provider import (
     pose_faults,
     pose_provider,
 )
-from snakewalk.controller.run.prepared_run import HasWaypoints, PreparedRun
+from snakewalk.controller.run.prepared_run import AsksForPort, HasWaypoints, PreparedRun
 from snakewalk.controller.run.request import RunEnding, RunRequest, RunResult
 from snakewalk.controller.run.servo_setup import check_compliance, motor_constants
 from snakewalk.controller.runlog.evidence import PoseEvidence
@@ -170,6 +170,8 @@ def check(request: RunRequest) -> CheckedRun:
         require_extra("a shadow needs", "mujoco")
         _shadow_plugin().check(prepared.world)
     plan = prepared.check_plan()
+    if not is_simulated and isinstance(prepared, AsksForPort):
+        prepared.check_for_port()
     return CheckedRun(
         robot=robot,
         port=name,

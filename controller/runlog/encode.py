@@ -11,9 +11,9 @@ from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Bytes, Ints
+from snakewalk.config.arrays import Bytes, Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -39,7 +39,7 @@ def floats(values: ArrayLike) -> list[Any]:
 
 def exact(values: ArrayLike) -> list[Any]:
     """Nested lists of floats with every digit."""
-    array: NDArray[np.float64] = np.asarray(values, dtype=float)
+    array: Floats = np.asarray(values, dtype=float)
     if not np.isfinite(array).all():
         boxed = array.astype(object)
         boxed[~np.isfinite(array)] = None
@@ -47,7 +47,7 @@ def exact(values: ArrayLike) -> list[Any]:
     return list(array.tolist())
 
 
-def array(values: Any) -> NDArray[np.float64]:
+def array(values: Any) -> Floats:
     """Return nested lists of a log as an array; null becomes NaN."""
     return np.array(values, dtype=float)
 
@@ -69,14 +69,14 @@ def rounded_text(value: float) -> str:
     return f"{value:.{_DECIMALS}f}" if math.isfinite(value) else "null"
 
 
-def exact_text(values: NDArray[np.float64]) -> str:
+def exact_text(values: Floats) -> str:
     """JSON of ``exact``, for one row (n,)."""
     if not math.isfinite(values.dot(values)):
         return encode(exact(values))
     return _template(((len(values),),), _EXACT) % tuple(values.tolist())
 
 
-def rounded_texts(arrays: Sequence[NDArray[np.float64]]) -> list[str]:
+def rounded_texts(arrays: Sequence[Floats]) -> list[str]:
     """JSON of ``floats`` for several arrays, (n,) or (n, m) each, at the cost of one."""
     flat = np.concatenate([values.ravel() for values in arrays])
     if not math.isfinite(flat.dot(flat)):
@@ -116,7 +116,7 @@ def _lists(shapes: tuple[tuple[int, ...], ...]) -> Ints:
 
 
 @compiled(f"int64({readonly_array()}, {readonly_array('int64', 2)}, uint8[::1])")
-def _print_rounded(values: NDArray[np.float64], lists: Ints, out: Bytes) -> int:  # noqa: C901  a compiled loop
+def _print_rounded(values: Floats, lists: Ints, out: Bytes) -> int:  # noqa: C901  a compiled loop
     """Print finite ``values`` as ``_template`` does; how many bytes, or -1 where it must be used.
 
     The template is needed for large numbers, and for those so near the middle between two of six

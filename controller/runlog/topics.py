@@ -11,10 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.controller.runlog.column import (
     ANY,
     JOINT,
@@ -33,7 +30,7 @@ FLAT_V = 0.15
 """Span up to which a supply holds no information (ours)."""
 FLAT_C = 1.0
 """Span up to which a temperature holds no information (ours)."""
-Flags = NDArray[np.bool_]
+Flags = Bools
 Texts = tuple[str, ...]
 _TIME = Column("clock of the run, s", "exact", is_known=True)
 _per_joint = partial(Column, shape=(JOINT,))

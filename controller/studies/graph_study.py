@@ -8,9 +8,8 @@ from xml.etree.ElementTree import ParseError
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.shape.graphs import (
     Graph,
@@ -131,14 +130,14 @@ def run_study(graph: str, rule: str, repeats: int, seed: int = 0) -> StudyResult
     )
 
 
-def return_gaps(done: Walk) -> NDArray[np.int64]:
+def return_gaps(done: Walk) -> Ints:
     """Steps between consecutive visits of the same state, (returns,)."""
     order = np.argsort(done.path, kind="stable")
     is_reversal = done.path[order][1:] == done.path[order][:-1]
     return np.asarray(np.diff(order)[is_reversal])
 
 
-def _first_visits(done: Walk) -> NDArray[np.bool_]:
+def _first_visits(done: Walk) -> Bools:
     first = np.zeros(len(done.path), dtype=bool)
     first[np.unique(done.path, return_index=True)[1]] = True
     return first

@@ -10,7 +10,7 @@ from typing import Literal, Self
 import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
 from scipy.ndimage import distance_transform_edt, map_coordinates
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import cg
 
 from snakewalk.config.arrays import Bools, Floats, Ints
@@ -195,18 +195,22 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
         both = (below >= 0) & (above >= 0)
         pairs.append(np.stack([below[both], above[both]]))
     low, high = np.concatenate(pairs, axis=1)
-    diagonal = np.arange(count)
-    laplace = coo_array(
-        (
-            np.concatenate([weight, -np.ones(2 * len(low))]),
-            (np.concatenate([diagonal, low, high]), np.concatenate([diagonal, high, low])),
-        ),
-        shape=(count, count),
-    ).tocsr()
+    laplace = laplacian(weight, low, high)
     solved, _ = cg(laplace, right, x0=out[holes], rtol=1e-6, maxiter=_ROUNDS)
     filled_m = np.array(z_m, dtype=float)
     filled_m[holes] = solved + base
     return filled_m
+
+
+def laplacian(weight: Floats, low: Ints, high: Ints) -> csr_array:
+    """Matrix of samples with weights (n,), of which pairs (m,) are neighbours."""
+    diagonal = np.arange(len(weight))
+    return coo_array(
+        (
+            np.concatenate([weight, -np.ones(2 * len(low))]),
+            (np.concatenate([diagonal, low, high]), np.concatenate([diagonal, high, low])),
+        ),
+    ).tocsr()
 
 
 def opened(holes: Bools, radius: float) -> Bools:

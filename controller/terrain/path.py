@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.drivers.compiling import compiled
 
 _STEP_M = 0.01
@@ -30,7 +31,7 @@ class SplinePath:
         points = points[is_distinct]
         if len(points) < 2:
             raise InputError("a path needs two different points: the start and a waypoint")
-        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        chord = arc_lengths(points)
         spline = scipy.interpolate.CubicSpline(chord, points, bc_type="natural")
         self._tabulate(spline(np.linspace(0.0, chord[-1], max(2, round(chord[-1] / _STEP_M) + 1))))
 
@@ -42,7 +43,7 @@ class SplinePath:
         return path
 
     def _tabulate(self, fine_m: Floats) -> None:
-        self._s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(fine_m, axis=0).T))])
+        self._s = arc_lengths(fine_m)
         self._points = fine_m
         self._xy = np.ascontiguousarray(fine_m.T)
 

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from snakewalk.config.answers import LISTED, Answers
 from snakewalk.config.errors import InputError
+from snakewalk.config.table_columns import TableAnswers
 
 FEWEST = 4
 """Points for a curve."""
@@ -43,7 +44,7 @@ class AnimalChoice(Answers):
     )
 
 
-class Choice(AnimalChoice):
+class Choice(AnimalChoice, TableAnswers):
     """Facts that a file of tracks may not state, and parts of it to use."""
 
     keypoints: Annotated[tuple[str, ...] | None, LISTED] = Field(

@@ -4,6 +4,7 @@ import numpy as np
 import scipy  # scipy.interpolate loads when it is first used
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 SEGMENTS = 100
 """Segments of a skeleton, [PT] 2.5."""
@@ -24,10 +25,10 @@ def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
     if int(distinct.sum()) < 4:
         raise ValueError("a body needs 4 distinct points")
     kept = points[distinct]
-    arc_px = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(kept, axis=0).T))])
+    arc_px = arc_lengths(kept)
     spline = scipy.interpolate.make_interp_spline(arc_px, kept)
     fine = np.linspace(0.0, arc_px[-1], segments * _FINE_STEPS + 1)
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(spline(fine), axis=0).T))])
+    arc = arc_lengths(spline(fine))
     equal = np.interp(np.linspace(0.0, arc[-1], segments + 1), arc, fine)
     return np.asarray(spline(equal), dtype=float)
 

@@ -15,9 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools
+from snakewalk.config.arrays import Bools, Int32s
 from snakewalk.drivers.bus.fast_path import FastPath, FastPathPort
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
@@ -160,7 +159,7 @@ class ControlCycle:
         """
         return self._line.since_sent_s
 
-    def write_goals(self, goals: NDArray[np.int32]) -> None:
+    def write_goals(self, goals: Int32s) -> None:
         """Send raw goals (N,); servos do not reply to a sync write."""
         if self._fast_path is None:
             self._send(self._goals.encode(goals))
@@ -171,7 +170,7 @@ class ControlCycle:
         elif sent < self._goals.size:
             self._port.write(self._goals.encode(goals)[sent:])
 
-    def read(self, goals: NDArray[np.int32] | None = None) -> GroupReadReply:
+    def read(self, goals: Int32s | None = None) -> GroupReadReply:
         """Read the block of all servos; ``data`` is (N, read_bytes).
 
         Goals (N,) are sent first if given, with the request in one write.
@@ -183,7 +182,7 @@ class ControlCycle:
         self.begin_read(goals)
         return self.finish_read()
 
-    def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
+    def begin_read(self, goals: Int32s | None = None) -> None:
         """Send the request, after goals (N,) if given; ``finish_read`` returns the reply.
 
         Requests on other ports may begin between the two.
@@ -286,7 +285,7 @@ class ControlCycle:
         self._line.reserve(len(packet) * self._byte_s)
         self._port.write(packet)
 
-    def _begin_read(self, request: GroupReadRequest, goals: NDArray[np.int32] | None) -> float:
+    def _begin_read(self, request: GroupReadRequest, goals: Int32s | None) -> float:
         packet = request.packet if goals is None else self._goals.encode(goals) + request.packet
         if self._failed_in_a_row:  # these bytes answer an older request
             self.counters.late_bytes += self._port.getBytesAvailable()

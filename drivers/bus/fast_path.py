@@ -5,9 +5,7 @@ It accepts only regular replies. It returns all other bytes unchanged to ``Contr
 
 from typing import Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from snakewalk.config.arrays import Int32s
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
@@ -21,11 +19,11 @@ class FastPath(Protocol):
         """Longest remaining time of an irregular reply."""
         ...
 
-    def write(self, goals: NDArray[np.int32]) -> int:
+    def write(self, goals: Int32s) -> int:
         """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         ...
 
-    def begin(self, goals: NDArray[np.int32] | None) -> bool:
+    def begin(self, goals: Int32s | None) -> bool:
         """Send the request, after ``goals`` (N,) if given; False if nothing was sent.
 
         Raises:

@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Int32s
 from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.bus.control_cycle import ControlCycle
 from snakewalk.drivers.bus.fast_path import FastPath
@@ -72,7 +71,7 @@ class FeetechWrite(GroupWrite):
         self._row: RegisterRow = facts.registers[name]
         self.size = len(self.encode(np.zeros(len(ids), np.int32)))
 
-    def encode(self, values: NDArray[np.int32]) -> bytes:
+    def encode(self, values: Int32s) -> bytes:
         """Packets that write ``values`` (N,)."""
         row = self._row
         entry_bytes = 1 + self._row.size
@@ -170,7 +169,7 @@ class FeetechSingleReads(FeetechCycle):
         """Largest possible age of the values of a read, s."""
         return self._clock.now_s() - self._begun_s
 
-    def begin_read(self, goals: NDArray[np.int32] | None = None) -> None:
+    def begin_read(self, goals: Int32s | None = None) -> None:
         """Send goals (N,) if given; ``finish_read`` asks the servos."""
         if goals is not None:
             self.write_goals(goals)

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bytes, Int32s
 from snakewalk.drivers.protocol.frames import PARAMS_AT, fill
 from snakewalk.drivers.protocol.packet import (
     BROADCAST_ID,
@@ -26,11 +26,11 @@ class GroupWrite:
         self.size = len(self._frame)
         """Bytes of the write packet without stuffing."""
 
-    def template(self) -> NDArray[np.uint8]:
+    def template(self) -> Bytes:
         """New packet to fill."""
         return self._frame.copy()
 
-    def encode(self, values: NDArray[np.int32]) -> bytes:
+    def encode(self, values: Int32s) -> bytes:
         """Packet that writes ``values`` (N,), stuffed if necessary."""
         self._values[:] = values
         sendable = fill(self._frame, self._values)

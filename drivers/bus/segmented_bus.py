@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import astuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Int32s
 from snakewalk.drivers.bus.control_cycle import ControlCycle, CycleCounters
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus, PingReply
 from snakewalk.drivers.bus.group_read import GroupReadReply
@@ -241,7 +241,7 @@ class SegmentedCycle:
         """Largest possible age of the values of a read, s."""
         return max(cycle.since_sent_s for cycle in self._cycles.values())
 
-    def write_goals(self, goals: NDArray[np.int32]) -> None:
+    def write_goals(self, goals: Int32s) -> None:
         """Send raw goals (N,).
 
         Raises:

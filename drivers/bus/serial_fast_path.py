@@ -2,9 +2,8 @@
 
 import numpy as np
 from numba import boolean, float64, int32, int64, intp, types, uint8, uintp
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes, Floats
+from snakewalk.config.arrays import Bytes, Floats, Int32s, Ints
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
@@ -88,7 +87,7 @@ class SerialFastPath:
         """Longest remaining time of an irregular reply."""
         return float(self._plan[REMAINING_NS] * 1e-9)
 
-    def write(self, goals: NDArray[np.int32]) -> int:
+    def write(self, goals: Int32s) -> int:
         """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         fd = self._port.descriptor
         if fd is None:
@@ -99,7 +98,7 @@ class SerialFastPath:
         values[:] = goals
         return int(_send_goals(fd, self._work, values, self._plan, self._free_s))
 
-    def begin(self, goals: NDArray[np.int32] | None) -> bool:
+    def begin(self, goals: Int32s | None) -> bool:
         """Send the request, after ``goals`` (N,) if given; False if nothing was sent.
 
         Raises:
@@ -158,9 +157,7 @@ def _reserve_line(free_s: Floats, from_ns: int, wire_ns: int) -> int:
 
 
 @compiled(int64(int32, _ROW, int32[::1], int64[::1], float64[::1]))
-def _send_goals(
-    fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64], free_s: Floats
-) -> int:
+def _send_goals(fd: int, work: Bytes, values: Int32s, plan: Ints, free_s: Floats) -> int:
     """Fill ``values`` into the sync write and send it; return the number of bytes sent.
 
     It is 0 if the frame needs stuffing, or the device is gone or full.
@@ -176,7 +173,7 @@ def _send_goals(
 
 
 @compiled(int64(int32, _ROW, int32[::1], int64[::1]))
-def _send_request(fd: int, work: Bytes, values: NDArray[np.int32], plan: NDArray[np.int64]) -> int:
+def _send_request(fd: int, work: Bytes, values: Int32s, plan: Ints) -> int:
     """Discard the input, send the request, after ``values`` if given.
 
     Returns the number of bytes sent.
@@ -197,7 +194,7 @@ def _receive(
     work: Bytes,
     data: Bytes,
     with_goals: bool,
-    plan: NDArray[np.int64],
+    plan: Ints,
     free_s: Floats,
 ) -> int:
     """Wait for the reply and decode it.

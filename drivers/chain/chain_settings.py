@@ -47,7 +47,6 @@ def chain_settings(
 
     ``goal_pwm`` is the servo's PWM Limit(36).
     """
-    low, high = units.limits_raw[joint]
     pitch = robot.all_axes[joint] == "p"
     if pitch and not units.limits_current[joint]:  # such a model is soft only with a small output
         goal_pwm = units.pwm_raw(joint, robot.current_limits_a[joint], goal_pwm)
@@ -62,16 +61,25 @@ def chain_settings(
         ChainSetting("Drive Mode", 0, TIME_PROFILE | TORQUE_ON_BY_GOAL, usual=False),
         ChainSetting(STARTUP, 0, usual=False),
         ChainSetting("Shutdown", SHUTDOWN_ALARMS, SHUTDOWN_ALARMS, usual=False),
-        ChainSetting("Min Position Limit", int(low)),
-        ChainSetting("Max Position Limit", int(high)),
-        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
-        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
-        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
+        *_limits_and_gains(robot, units, joint),
         ChainSetting("Feedforward 1st Gain", 0, usual=False),
         ChainSetting("Feedforward 2nd Gain", 0, usual=False),
         ChainSetting("Profile Acceleration", 0),
         ChainSetting("Profile Velocity", 0),
         ChainSetting("Goal PWM", goal_pwm, usual=False),
+    )
+
+
+def _limits_and_gains(
+    robot: RobotConfig, units: JointUnits, joint: int
+) -> tuple[ChainSetting, ...]:
+    low, high = units.limits_raw[joint]
+    return (
+        ChainSetting("Min Position Limit", int(low)),
+        ChainSetting("Max Position Limit", int(high)),
+        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
+        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
+        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
     )
 
 
@@ -83,7 +91,6 @@ def _feetech_settings(
     Lock comes first: the servo loses later writes to the EEPROM area at power-off.
     """
     facts = robot.servo_records[joint]
-    low, high = units.limits_raw[joint]
     speed = 1 if facts.motor is None else facts.motor.no_load_rpm / facts.units.velocity_rpm
     shutdown = feetech.shutdown_alarms(facts)
     return (
@@ -93,11 +100,7 @@ def _feetech_settings(
         ChainSetting("Return Delay Time", 0),
         ChainSetting("Operating Mode", feetech.POSITION_MODE),
         ChainSetting("Shutdown", shutdown, shutdown, usual=False),
-        ChainSetting("Min Position Limit", int(low)),
-        ChainSetting("Max Position Limit", int(high)),
-        ChainSetting("Position P Gain", robot.position_p_gains[joint]),
-        ChainSetting("Position I Gain", robot.position_i_gains[joint]),
-        ChainSetting("Position D Gain", robot.position_d_gains[joint]),
+        *_limits_and_gains(robot, units, joint),
         # HLS servos use copies in the RAM
         ChainSetting("Kp", robot.position_p_gains[joint]),
         ChainSetting("Ki", robot.position_i_gains[joint]),

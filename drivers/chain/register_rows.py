@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Ints
 from snakewalk.drivers.bus.chain_bus import ChainBus
 
 
@@ -47,7 +47,7 @@ class RegisterRows:
             rows[places, : kind.itemsize] = part.view(np.uint8).reshape(len(places), -1)
         return rows.tobytes()
 
-    def decode(self, data: Bytes) -> NDArray[np.int64]:
+    def decode(self, data: Bytes) -> Ints:
         """(N,) values of rows (N, n)."""
         if self._kind is not None:
             column = np.ascontiguousarray(data).view(self._kind)[:, 0]

@@ -9,9 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.bus.chain_bus import ChainBus
@@ -457,7 +455,7 @@ def _ids_in_words(ids: Sequence[int]) -> str:
     return ", ".join(map(str, ids))
 
 
-def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
+def check_pose(robot: RobotConfig, position_rad: Floats) -> None:
     """Reject an impossible start pose.
 
     Raises:
@@ -469,7 +467,7 @@ def check_pose(robot: RobotConfig, position_rad: NDArray[np.float64]) -> None:
         raise ChainError(faults)
 
 
-def pose_faults(robot: RobotConfig, position_rad: NDArray[np.float64]) -> list[str]:
+def pose_faults(robot: RobotConfig, position_rad: Floats) -> list[str]:
     """Joints well beyond their limits, one line each."""
     return [
         f"{robot.joint_label(joint)}: stands at {angle:.2f} rad, beyond its "

@@ -9,9 +9,8 @@ last bytes. If it polls, it estimates the delay of replies from cycle to cycle.
 
 import numpy as np
 from numba import int32, int64, intp, types, uint8, uintp
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Ints
 from snakewalk.drivers.compiling import compiled
 
 _tcflush = types.ExternalFunction("tcflush", int32(int32, int32))
@@ -39,7 +38,7 @@ early replies in a row."""
 
 
 @compiled(int64(int64[::1]))
-def _now_ns(time: NDArray[np.int64]) -> int:
+def _now_ns(time: Ints) -> int:
     _clock_gettime(_MONOTONIC, time.ctypes.data)  # into struct timespec
     return int(time[0]) * _SECOND_NS + int(time[1])
 
@@ -51,7 +50,7 @@ def now_ns() -> int:
 
 
 @compiled(int64(int64[::1], int64, int64, int64))
-def update(latency_estimate: NDArray[np.int64], late_ns: int, least_ns: int, spin_ns: int) -> int:
+def update(latency_estimate: Ints, late_ns: int, least_ns: int, spin_ns: int) -> int:
     """Update the estimate: a reply was complete ``late_ns`` after its earliest possible time.
 
     If a reply was complete before the first poll (``late_ns`` = -``least_ns``), its real time is
@@ -83,7 +82,7 @@ def receive(  # noqa: C901  a compiled loop
     least_ns: int,
     wait_ns: int,
     spin_ns: int,
-    latency_estimate: NDArray[np.int64],
+    latency_estimate: Ints,
 ) -> int:
     """Receive until a reply is complete or the deadline has passed; return the byte count.
 

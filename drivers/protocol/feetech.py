@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from enum import IntEnum, IntFlag
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Int32s
 from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.errors import ControlTableError
 from snakewalk.drivers.protocol.packet import ALERT, StatusPacket
@@ -156,9 +155,7 @@ class BlockFormat:
         for offset in self._swapped:
             out[:, offset], out[:, offset + 1] = blocks[:, offset + 1], blocks[:, offset]
         for index, bit in self._signs:
-            raw: NDArray[np.int32] = (
-                out[:, index].astype(np.int32) | out[:, index + 1].astype(np.int32) << 8
-            )
+            raw: Int32s = out[:, index].astype(np.int32) | out[:, index + 1].astype(np.int32) << 8
             magnitude = raw & (1 << bit) - 1
             value = np.where(raw >> bit & 1, -magnitude, magnitude)
             out[:, index], out[:, index + 1] = value & 0xFF, value >> 8 & 0xFF

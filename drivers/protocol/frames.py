@@ -4,10 +4,7 @@ The loops are compiled at import, never in a cycle. Irregular replies are left t
 ``drivers.bus.group_read``.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Int32s
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.crc import TABLE
 
@@ -105,7 +102,7 @@ def read_fast(raw: Bytes, head: Bytes, ids: Bytes, data: Bytes, error: Bytes) ->
 
 
 @compiled(f"boolean({_ROW}, int32[::1])", makes_arrays=False)
-def fill(frame: Bytes, values: NDArray[np.int32]) -> bool:
+def fill(frame: Bytes, values: Int32s) -> bool:
     """Write ``values`` (N,) and the CRC into a sync write; False if it needs stuffing."""
     for servo in range(len(values)):
         value = int(values[servo])

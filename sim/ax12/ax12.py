@@ -151,9 +151,6 @@ class Ax12Servos(SimulatedServos):
         if self._readings.any:
             self._readings.apply()
 
-    def _torque_is_on(self) -> Bools:
-        return np.asarray((self["Torque Enable"] == 1) & self.powered)
-
     def _wheel(self) -> Bools:
         return np.asarray((self["CW Angle Limit"] == 0) & (self["CCW Angle Limit"] == 0))
 

@@ -6,6 +6,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Indices
 from snakewalk.drivers.protocol.packet import BITS_PER_BYTE
 from snakewalk.drivers.protocol.protocol1 import (
     BROADCAST_ID,
@@ -69,19 +70,19 @@ class Ax12Line(Wire):
         except KeyError:
             return None
 
-    def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
+    def write_register(self, rows: Indices, name: str, value: int) -> None:
         """Set a register of servos, like another program."""
         self.servos[name][rows] = value
 
-    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+    def mute(self, rows: Indices, on: bool) -> None:
         """Suppress or restore the replies of servos; they still obey."""
         self._muted[rows] = on
 
-    def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
+    def deafen(self, rows: Indices, on: bool) -> None:
         """Let servos ignore sync writes, or accept them again."""
         self._deaf[rows] = on
 
-    def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
+    def set_alert(self, rows: Indices, on: bool) -> None:
         """Do nothing: replies of Protocol 1.0 have no alert bit."""
 
     def refresh_ids(self) -> None:

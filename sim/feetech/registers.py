@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Ints
 from snakewalk.config.servo_model import RegisterRow, ServoModel
 from snakewalk.drivers.protocol.feetech import decode_word, encode_word
 
@@ -21,9 +21,7 @@ class FeetechRegisters:
     def __init__(self, facts: ServoModel, servos: int) -> None:
         self.facts = facts
         self._rows = dict(sorted(facts.registers.items(), key=lambda item: item[1].address))
-        self.values: dict[str, NDArray[np.int64]] = {
-            name: np.zeros(servos, np.int64) for name in self._rows
-        }
+        self.values: dict[str, Ints] = {name: np.zeros(servos, np.int64) for name in self._rows}
         self._kept = {
             name: np.zeros(servos, np.int64)
             for name, row in self._rows.items()
@@ -33,7 +31,7 @@ class FeetechRegisters:
         for row in range(servos):
             self.reset(row, kept_names=())
 
-    def __getitem__(self, name: str) -> NDArray[np.int64]:
+    def __getitem__(self, name: str) -> Ints:
         """(S,) live view of a register."""
         return self.values[name]
 

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.drivers.protocol.feetech import (
     CALIBRATE_MIDDLE,
@@ -37,7 +36,7 @@ class FeetechAlarms(Ax12Alarms):
 
     def __init__(
         self,
-        register: Callable[[str], NDArray[np.int64]],
+        register: Callable[[str], Ints],
         kinds: Sequence[str],
         drive: ServoDrive,
         motor: MotorModel,
@@ -128,7 +127,7 @@ class FeetechServos(SimulatedServos):
             registers.put(row, "ID", servo_id)
             self.reboot(row)
 
-    def __getitem__(self, name: str) -> NDArray[np.int64]:
+    def __getitem__(self, name: str) -> Ints:
         """(S,) live view of a register."""
         return self.registers[name]
 
@@ -239,10 +238,7 @@ class FeetechServos(SimulatedServos):
         if self._readings.any:
             self._readings.apply()
 
-    def _torque_is_on(self) -> Bools:
-        return np.asarray((self["Torque Enable"] == 1) & self.powered)
-
-    def _mode(self) -> NDArray[np.int64]:
+    def _mode(self) -> Ints:
         if "Operating Mode" in self.facts.registers:
             return self["Operating Mode"]
         # an SCS servo without limits turns endlessly, with Goal Time as its PWM
@@ -253,7 +249,7 @@ class FeetechServos(SimulatedServos):
         """Whether mode 3 is the step mode."""
         return "Open-loop PWM" in self.facts.registers
 
-    def _offset(self) -> NDArray[np.int64]:
+    def _offset(self) -> Ints:
         if "Homing Offset" in self.facts.registers:
             return self["Homing Offset"]
         return np.zeros(len(self), np.int64)
@@ -274,7 +270,7 @@ class FeetechServos(SimulatedServos):
         coarse = self._has_steps() & self._phase(Phase.FINE_VELOCITY)
         return np.where(coarse, _COARSE, 1.0) * self.facts.rad_s_per_velocity
 
-    def _resolution(self) -> NDArray[np.int64]:
+    def _resolution(self) -> Ints:
         """(S,) sensor steps of one position."""
         if "Angular Resolution" in self.facts.registers:
             return self["Angular Resolution"]
@@ -385,7 +381,7 @@ class FeetechServos(SimulatedServos):
         path.position[wheels] = np.clip(ahead, shaft - 0.5, shaft + 0.5)[wheels]
         path.goal[wheels] = path.position[wheels]
 
-    def _push(self, mode: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    def _push(self, mode: Ints) -> tuple[Floats, Floats]:
         """(S,) open-loop output, and (S,) current limits, A."""
         registers = self.registers
         facts = self.facts
@@ -398,6 +394,6 @@ class FeetechServos(SimulatedServos):
         name = "Open-loop PWM" if self._has_steps() else "Goal Time"
         return np.where(mode == PUSH, registers[name] / _FULL, 0.0), none
 
-    def _goal_pwm(self) -> NDArray[np.int64]:
+    def _goal_pwm(self) -> Ints:
         name = "Goal PWM" if "Goal PWM" in self.facts.registers else "PWM Limit"
         return self.registers[name]

@@ -7,9 +7,8 @@ That handles all special cases (stuffing, a missing ID, a silent servo).
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Indices
 from snakewalk.drivers.bus.group_read import GroupReadRequest
 from snakewalk.drivers.protocol.crc import crc16
 from snakewalk.drivers.protocol.frames import IRREGULAR
@@ -34,7 +33,7 @@ class GroupRead(ABC):
         address: int,
         length: int,
         ids: Bytes,
-        rows: NDArray[np.intp],
+        rows: Indices,
         status: int,
         delays_s: tuple[float, ...],
     ) -> None:
@@ -131,7 +130,7 @@ class GroupFastPath:
         self._status_address = self._bank.register("Hardware Error Status").address
         self._version = -1
         self._reads: dict[bytes, GroupRead] = {}
-        self._goals: tuple[bytes, bytes, NDArray[np.intp]] | None = None
+        self._goals: tuple[bytes, bytes, Indices] | None = None
 
     def execute(self, raw: bytes, now_s: float, gapless: bool) -> list[Reply] | None:
         """Execute ``raw`` if it is plain, else return None and change nothing.

@@ -3,8 +3,8 @@
 from collections import defaultdict
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bools
 from snakewalk.sim.servo.bank import ServoBank
 
 NOBODY = -1
@@ -29,7 +29,7 @@ class IdDirectory:
         self._first: dict[int, list[int]] = {}
         self._second: dict[int, list[int]] = {}
 
-    def refresh(self, baud: int, powered: NDArray[np.bool_]) -> None:
+    def refresh(self, baud: int, powered: Bools) -> None:
         """Look the servos up again after a change of IDs, baud rates or power."""
         bank = self._bank
         columns = (bank["ID"], bank["Secondary(Shadow) ID"], bank["Baud Rate"], powered, self.mute)

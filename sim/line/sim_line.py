@@ -10,9 +10,8 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bytes
+from snakewalk.config.arrays import Bytes, Indices, Int32s, SignedInts
 from snakewalk.drivers.bus.group_read import GroupReadReply, GroupReadRequest
 from snakewalk.drivers.bus.group_write import GroupWrite
 from snakewalk.drivers.bus.line_reservation import LineReservation
@@ -87,7 +86,7 @@ class LineFastPath:
         """Remaining time of the last request's reply."""
         return self._limit_s - self._wire.clock.now_s()
 
-    def write(self, goals: NDArray[np.int32]) -> int:
+    def write(self, goals: Int32s) -> int:
         """Send goals (N,); return the number of bytes sent, 0 if the port must send them."""
         packet = self._goals.encode(goals)
         if not self._wire.begin(packet):
@@ -95,7 +94,7 @@ class LineFastPath:
         self._line.reserve(len(packet) * BITS_PER_BYTE / self._wire.getBaudRate())
         return len(packet)
 
-    def begin(self, goals: NDArray[np.int32] | None) -> bool:
+    def begin(self, goals: Int32s | None) -> bool:
         """Send the request; False without sending after ``goals`` or on a busy line."""
         request = self._request
         wire = self._wire
@@ -182,19 +181,19 @@ class SimLine(Wire):
         bank = self.bank
         return bank[name].dtype if name in bank and bank.has(row, name) else None
 
-    def write_register(self, rows: NDArray[np.intp], name: str, value: int) -> None:
+    def write_register(self, rows: Indices, name: str, value: int) -> None:
         """Set a register of servos, like another program."""
         self.bank[name][rows] = value
 
-    def mute(self, rows: NDArray[np.intp], on: bool) -> None:
+    def mute(self, rows: Indices, on: bool) -> None:
         """Suppress or restore the replies of servos; they still obey."""
         self.directory.mute[rows] = on
 
-    def deafen(self, rows: NDArray[np.intp], on: bool) -> None:
+    def deafen(self, rows: Indices, on: bool) -> None:
         """Let servos ignore sync writes, or accept them again."""
         self.directory.deaf[rows] = on
 
-    def set_alert(self, rows: NDArray[np.intp], on: bool) -> None:
+    def set_alert(self, rows: Indices, on: bool) -> None:
         """Set or clear a false alert bit in the replies of servos."""
         self.bank.false_alert[rows] = on
 
@@ -202,7 +201,7 @@ class SimLine(Wire):
         """Look the IDs up again after a change of IDs, power or muting."""
         self._handler.refresh_ids()
 
-    def shown(self, register: str) -> NDArray[np.signedinteger]:
+    def shown(self, register: str) -> SignedInts:
         """(S,) values of a register as a read would return them; a copy."""
         self.firmware.refresh()
         return self.bank[register].copy()

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Int32s, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.sim.physics.addresses import call, copy_words
 from snakewalk.sim.physics.layout import StepLayout
@@ -32,9 +31,9 @@ _SAFE = 1.0 + 1e-9
 class BellyContacts:
     """All contacts that the bellies of one model can have with its ground, in MuJoCo's order."""
 
-    words: NDArray[np.int64]
+    words: Ints
     """(C, words of an ``mjContact``) what is the same in every step."""
-    geoms: NDArray[np.int32]
+    geoms: Int32s
     """(C, 2) plane and belly."""
     shapes_m: Floats
     """(C, 3) where on the belly's axis the ball lies that touches, its radius, and the margin."""
@@ -79,9 +78,7 @@ NO_CONTACTS = BellyContacts(
 """Value of a model whose contacts MuJoCo finds."""
 
 
-def _sunk(
-    model: mujoco.MjModel, planes: TangentPlanes, bellies: NDArray[np.bool_]
-) -> mujoco.MjData:
+def _sunk(model: mujoco.MjModel, planes: TangentPlanes, bellies: Bools) -> mujoco.MjData:
     """A straight body, slightly sunk into its ground: it has all its contacts."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -101,7 +98,7 @@ def _sunk(
     return data
 
 
-def _reach_m2(model: mujoco.MjModel, bellies: NDArray[np.bool_]) -> Floats:
+def _reach_m2(model: mujoco.MjModel, bellies: Bools) -> Floats:
     """``BellyContacts.reach_m2``, for pairs that may touch in MuJoCo."""
     reach_m = np.zeros(model.nbody)
     for geom in np.flatnonzero(bellies):
@@ -143,8 +140,8 @@ def links_near(centre_m: Floats, reach_m2: Floats, work: Floats) -> bool:
 def write_contacts(
     reals: Floats,
     fields: tuple[int, int, int, int, int],
-    words: NDArray[np.int64],
-    geoms: NDArray[np.int32],
+    words: Ints,
+    geoms: Int32s,
     shapes_m: Floats,
     place_m: Floats,
     axes: Floats,
@@ -152,7 +149,7 @@ def write_contacts(
     plane_quat: Floats,
     turn: int,
     plane_axes: Floats,
-    claimed_slots: NDArray[np.int64],
+    claimed_slots: Ints,
 ) -> int:
     """Write all present contacts in sequence; returns their number, -1 for MuJoCo's own search.
 

@@ -8,9 +8,8 @@ law: the drag is passive, and the same along and across.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.friction_law import gauges
 
 LANES = 8
@@ -87,7 +86,7 @@ def friction_force(
     )
 
 
-def make_lanes(contacts: int) -> tuple[Floats, NDArray[np.int64]]:
+def make_lanes(contacts: int) -> tuple[Floats, Ints]:
     """Make a table for a number of contacts, and the link of each."""
     groups = (contacts + LANES - 1) // LANES
     return np.zeros(groups * ROWS), np.zeros(groups * LANES, np.int64)

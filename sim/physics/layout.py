@@ -13,8 +13,8 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Ints
 from snakewalk.drivers.fallbacks import is_forced
 from snakewalk.sim.physics.step_memory import FUNCTIONS, POINTERS, WHOLE
 
@@ -63,7 +63,7 @@ class StepLayout:
             **{f"{name}_at": address for name, address in self.functions.items()},
         }
 
-    def contact_words(self, data: mujoco.MjData) -> NDArray[np.int64]:
+    def contact_words(self, data: mujoco.MjData) -> Ints:
         """Copy the present contacts as (contacts, words of eight bytes)."""
         size = data.ncon * self.contact["size"] // _WORD_BYTES
         memory = (ctypes.c_int64 * size).from_address(data.contact.dist.ctypes.data)

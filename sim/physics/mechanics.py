@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WorldConfig
@@ -50,7 +49,7 @@ class Mechanics:
     The inertia of the rotors is MuJoCo's."""
     planes: TangentPlanes
     """Planes that support the body on a height field."""
-    contact_role: NDArray[np.int32]
+    contact_role: Int32s
     """(geoms,) role of a geom in contacts: ``GROUND``, ``FOOT``, or 0 for others."""
     load_n: Floats
     """(L,) force of the ground on each link in the last step, N."""

@@ -11,7 +11,7 @@ from numba import carray
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.sim.physics.addresses import pointer
 from snakewalk.sim.physics.step_state import (
     Body,
@@ -126,9 +126,9 @@ def reals_at(address: int, shape: Any) -> Floats:
     return view
 
 
-def integers_at(address: int, shape: Any) -> NDArray[np.int32]:
+def integers_at(address: int, shape: Any) -> Int32s:
     """View 32-bit integers at an address."""
-    view: NDArray[np.int32] = carray(pointer(address), shape, np.int32)
+    view: Int32s = carray(pointer(address), shape, np.int32)
     return view
 
 

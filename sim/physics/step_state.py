@@ -2,12 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from snakewalk.config.arrays import Floats, Int32s, Ints
 
-from snakewalk.config.arrays import Floats
-
-Lanes = tuple[Floats, NDArray[np.int64]]
+Lanes = tuple[Floats, Ints]
 """Type of the lanes that ``friction.make_lanes`` returns."""
 
 
@@ -30,7 +27,7 @@ class Chain(NamedTuple):
     """(L, 3) points on the joints' axes; row 0 is the head's free joint."""
     axis: Floats
     """(L, 3) directions of the joints' axes."""
-    parents: NDArray[np.int32]
+    parents: Int32s
     """(B,) parents of the bodies in the tree."""
 
 
@@ -57,8 +54,8 @@ class Links(NamedTuple):
 class Geoms(NamedTuple):
     """Body and contact role of each geom."""
 
-    body: NDArray[np.int32]
-    role: NDArray[np.int32]
+    body: Int32s
+    role: Int32s
 
 
 class Motors(NamedTuple):
@@ -142,6 +139,6 @@ class Contacts(NamedTuple):
     """The present contacts as numbers and, in the same memory, as integers."""
 
     reals: Floats
-    integers: NDArray[np.int32]
+    integers: Int32s
     count: int  # type: ignore[assignment]
     at: ContactFields

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Int32s
 from snakewalk.config.heightfield import HeightField
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -218,11 +217,11 @@ def touch(
 )
 def lay_planes(
     places_m: Floats,
-    balls: NDArray[np.int32],
+    balls: Int32s,
     ball_m: Floats,
     z_m: Floats,
     corner_m: tuple[float, float, float],
-    planes: NDArray[np.int32],
+    planes: Int32s,
     plane_m: Floats,
     plane_quat: Floats,
 ) -> None:
@@ -273,9 +272,9 @@ class TangentPlanes:
     """The planes of one model and their field."""
 
     model: mujoco.MjModel
-    balls: NDArray[np.int32]
+    balls: Int32s
     """(B,) geoms of the bellies; none on a level floor."""
-    planes: NDArray[np.int32]
+    planes: Int32s
     """(B, PLANES) planes at each ball."""
     radius_m: Floats
     """(B,) of the balls."""

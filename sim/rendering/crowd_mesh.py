@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.sim.rendering.looks import EYE, PUPIL, Rgba
-from snakewalk.sim.rendering.shade import DARK, under_sun
+from snakewalk.sim.rendering.shade import DARK, bind_to_world, dark, under_sun
 
 MESHES = ((7, 4), (13, 6), (33, 12))
 """Rings and sides of a body at each level, farthest first (ours)."""
@@ -213,10 +213,7 @@ def _soft_edge() -> Image:
     along, across = np.meshgrid(np.linspace(0.0, 1.0, wide), np.linspace(-1.0, 1.0, high))
     soft = np.clip(1.6 * (1.0 - np.abs(across)), 0.0, 1.0)
     soft *= np.clip(14.0 * np.minimum(along, 1.0 - along), 0.0, 1.0)
-    picture = np.empty((high, wide, 4), dtype=np.uint8)
-    picture[..., :3] = np.rint(255.0 * DARK[:3])
-    picture[..., 3] = np.rint(255.0 * 1.5 * DARK[3] * soft)
-    return picture
+    return dark(1.5 * DARK[3] * soft)
 
 
 def _material(spec: mujoco.MjSpec, name: str, picture: Image, *, alpha: bool) -> None:
@@ -242,10 +239,7 @@ def _skin(
     skin.face = (faces[None] + shift).ravel().tolist()
     skin.vert = np.tile(np.column_stack([uv, np.zeros(corners)]), (capacity, 1)).ravel()
     skin.texcoord = np.tile(uv, (capacity, 1)).ravel()
-    skin.bodyname = ["world"]
-    skin.bindpos, skin.bindquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    skin.vertid = [list(range(corners * capacity))]
-    skin.vertweight = [[1.0] * (corners * capacity)]
+    bind_to_world(skin, corners * capacity)
 
 
 def _draw(

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Bytes
 from snakewalk.config.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class MovieFile:
             {"crf": "23", "preset": "veryfast"} if codec == "libx264" else {"qscale": "4"}
         )
 
-    def add(self, pixels: NDArray[np.uint8]) -> None:
+    def add(self, pixels: Bytes) -> None:
         """Append one frame (height, width, 3)."""
         frame = self._frame(np.ascontiguousarray(pixels), format="rgb24")
         self._file.mux(self._stream.encode(frame))

@@ -87,10 +87,15 @@ def add_sheet(spec: mujoco.MjSpec) -> None:
     skin.vert = corners.ravel()
     skin.texcoord = corners[:, :2].ravel()
     skin.face = np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]).ravel().tolist()
+    bind_to_world(skin, len(corners))
+
+
+def bind_to_world(skin: mujoco.MjsSkin, corners: int) -> None:
+    """Bind all corners of a skin to the world."""
     skin.bodyname = ["world"]
     skin.bindpos, skin.bindquat = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    skin.vertid = [list(range(len(corners)))]
-    skin.vertweight = [[1.0] * len(corners)]
+    skin.vertid = [list(range(corners))]
+    skin.vertweight = [[1.0] * corners]
 
 
 def shade_picture(place: Floats) -> Image:
@@ -103,9 +108,14 @@ def shade_picture(place: Floats) -> Image:
     covered[texel[:, 1], texel[:, 0]] = True
     covered = binary_closing(covered, np.ones((3, 3), dtype=bool), iterations=2)
     soft = gaussian_filter(covered.astype(float), _SOFT)
-    picture = np.empty((_TEXELS, _TEXELS, 4), dtype=np.uint8)
+    return dark(_LAYER * soft)
+
+
+def dark(alpha: Floats) -> Image:
+    """(H, W, 4) picture of a shadow with an opacity (H, W)."""
+    picture = np.empty((*alpha.shape, 4), dtype=np.uint8)
     picture[..., :3] = np.rint(255.0 * DARK[:3])
-    picture[..., 3] = np.rint(255.0 * _LAYER * soft)
+    picture[..., 3] = np.rint(255.0 * alpha)
     return picture
 
 

@@ -6,9 +6,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from snakewalk.config.arrays import AnyInts
 from snakewalk.config.errors import InputError
 from snakewalk.config.faults import FaultPlan
 from snakewalk.config.loader import checked, load
@@ -74,7 +72,7 @@ class ServoBus:
             self._thread.start()
         return self._server.path
 
-    def __getitem__(self, register: str) -> NDArray[np.integer]:
+    def __getitem__(self, register: str) -> AnyInts:
         """(S,) current values of a register, in the order of the IDs; a copy.
 
         Raises:

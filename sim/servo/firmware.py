@@ -7,9 +7,8 @@ then are registers read or written.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools
+from snakewalk.config.arrays import Bools, Bytes, Indices
 from snakewalk.config.servo_model import TABLE_BYTES
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
@@ -225,7 +224,7 @@ class Firmware(FaultyServos):
         self._set_drive_goals()
         self._watchdog.arm(on)
 
-    def write_goals(self, rows: NDArray[np.intp], raw: NDArray[np.uint8], offset: int) -> None:
+    def write_goals(self, rows: Indices, raw: Bytes, offset: int) -> None:
         """Goal Position(116) of many servos: entries of ``raw`` from ``offset``, ID and 4 bytes.
 
         Values out of limits are rejected.
@@ -246,7 +245,7 @@ class Firmware(FaultyServos):
         if not plain:
             self._set_drive_goals()
 
-    def enable_by_goal(self, rows: NDArray[np.intp]) -> None:
+    def enable_by_goal(self, rows: Indices) -> None:
         """Torque on by goal update (Drive Mode(10), bit 3), unless an error holds it off."""
         for row in rows:
             asks = self.bank["Drive Mode"][row] & TORQUE_ON_BY_GOAL
@@ -263,7 +262,7 @@ class Firmware(FaultyServos):
             self.bank.reset(rows, kept_names=factory_keeping)
         self.power_up(rows)
 
-    def power_up(self, rows: NDArray[np.intp]) -> None:
+    def power_up(self, rows: Indices) -> None:
         """State after power-on or reboot: one turn of position, goal = present, no alarms."""
         self._reset_turns(np.isin(np.arange(len(self.bank)), rows))
         self.protection.restart(rows)
@@ -311,7 +310,7 @@ class Firmware(FaultyServos):
         torque[:] = on
         self.apply_registers()
 
-    def restore_power(self, rows: NDArray[np.intp]) -> None:
+    def restore_power(self, rows: Indices) -> None:
         """Restore the supply: the servos restart without their turn counts."""
         self.powered[rows] = True
         self.bank.reset(rows, kept_names=(), ram_only=True)
@@ -360,13 +359,13 @@ class Firmware(FaultyServos):
         self.drive.goal_rad[:] = drive_goal
         self.blocked_shaft.hold(updated)
 
-    def _reset_turns(self, which: NDArray[np.bool_]) -> None:
+    def _reset_turns(self, which: Bools) -> None:
         scales = self._scales
         turned = np.rint(self.plant.position_rad * self._sign * scales.positions_per_rad)
         from_low = turned + self._centre - scales.lowest_position
         self._turns[which] = np.floor(from_low / scales.positions_per_turn)[which]
 
-    def _hold(self, late: NDArray[np.bool_]) -> None:
+    def _hold(self, late: Bools) -> None:
         """Hold the servos whose watchdog has expired at their angle, without a profile.
 
         Their profile registers become 0 (e-manual, Bus Watchdog(98), example, step 4).

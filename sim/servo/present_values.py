@@ -3,9 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Bools, Floats, Indices
 from snakewalk.drivers.protocol.registers import (
     CURRENT_MODE,
     PWM_MODE,
@@ -65,7 +64,7 @@ class PresentValues:
         self.supply_at = _span(bank, "Present Input Voltage", "Present Temperature")
         """Addresses of voltage and temperature."""
 
-    def restart_clock(self, rows: NDArray[np.intp], time_s: float) -> None:
+    def restart_clock(self, rows: Indices, time_s: float) -> None:
         """Realtime Tick(120) of these servos counts from 0 again."""
         self._start_s[rows] = time_s
 
@@ -112,7 +111,7 @@ class PresentValues:
         status = np.where(placed, status, 0) | PROFILE_ONGOING * ongoing
         bank["Moving Status"][:] = status | np.where(control_loops.position, path.kind, 0)
 
-    def turning(self) -> NDArray[np.bool_]:
+    def turning(self) -> Bools:
         """(S,) faster than Moving Threshold(24)."""
         threshold = self._bank["Moving Threshold"] * self._scales.rad_s_per_velocity
         return np.abs(self._plant.velocity_rad_s) > threshold

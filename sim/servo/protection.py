@@ -10,9 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import AnyInts, Floats, Indices
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.protocol.registers import VOLTAGE_UNIT_V, Alarm
 from snakewalk.sim.plant import Plant, ServoDrive
@@ -112,19 +111,19 @@ class Protection:
         present_kinds = self._bank.facts[row].alarms
         return {kind: bit for kind, bit in ALARMS.items() if kind in present_kinds}
 
-    def supply(self, volts: float | None, rows: NDArray[np.intp] | None = None) -> None:
+    def supply(self, volts: float | None, rows: Indices | None = None) -> None:
         """Set the supply of all servos, or of ``rows``; None: the usual voltage."""
         self._supply.change(volts, rows)
 
-    def heat(self, rows: NDArray[np.intp], celsius: float) -> None:
+    def heat(self, rows: Indices, celsius: float) -> None:
         """Set housing temperatures."""
         self.temperature_c[rows] = celsius
 
-    def detect(self, rows: NDArray[np.intp], error: int) -> None:
+    def detect(self, rows: Indices, error: int) -> None:
         """Raise an error of some servos; Shutdown(63) may end the torque."""
         self._set_errors(np.isin(np.arange(len(self._bank)), rows) * error)
 
-    def restart(self, rows: NDArray[np.intp]) -> None:
+    def restart(self, rows: Indices) -> None:
         """Restart the overload count; heat stays."""
         self._blocked_s[rows] = 0.0
 
@@ -161,7 +160,7 @@ class Protection:
         )
         return True
 
-    def _set_errors(self, errors: NDArray[np.integer]) -> None:
+    def _set_errors(self, errors: AnyInts) -> None:
         bank = self._bank
         bank["Hardware Error Status"][:] |= errors.astype(np.uint8)
         bank["Torque Enable"][(bank["Hardware Error Status"] & bank["Shutdown"]) != 0] = 0

@@ -4,9 +4,8 @@ Arguments are arrays and numbers: numba needs five times longer to unpack a tupl
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import AnyInts, Bytes, Floats, Indices, Ints
+from snakewalk.config.arrays import AnyInts, Bools, Bytes, Floats, Indices, Ints
 from snakewalk.drivers.compiling import compiled, readonly_array
 from snakewalk.drivers.protocol.frames import (
     PARAMS_AT,
@@ -168,7 +167,7 @@ def accept_goals(
     frame: Floats,
     ticks_per_rad: Floats,
     goal_rad: Floats,
-    taken: NDArray[np.bool_],
+    taken: Bools,
 ) -> None:
     """Write Goal Position of a sync write into the tables; values out of limits are rejected.
 

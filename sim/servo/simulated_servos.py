@@ -150,6 +150,9 @@ class SimulatedServos(FaultyServos):
     def _update_drive(self, seconds: float) -> None:
         """Let the registers drive the motors for ``seconds``."""
 
+    def _torque_is_on(self) -> Bools:
+        return np.asarray((self["Torque Enable"] == 1) & self.powered)
+
     def __len__(self) -> int:
         return len(self.powered)
 

@@ -9,7 +9,7 @@ from typing import Final
 TOPS: Final = ("config", "drivers", "sim", "controller")
 CORE: Final = (
     *("kinematics", "mechanics", "shape", "terrain", "gaits", "motion", "runlog", "walk"),
-    *("runtime", "track", "pose", "metrics", "console", "images", "figures", "run"),
+    *("runtime", "console", "track", "pose", "metrics", "images", "figures", "run"),
 )
 """Packages of the controller that know no feature package; only ``run`` knows bus and simulator."""
 FEATURES: Final = (

@@ -75,7 +75,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.pose": (8_550, "0243-a-known-motion-calibrates-a-source.md"),
     "controller.studies": (21_000, "0238-drag-is-identified-as-friction-is.md"),
     "controller.view": (10_050, "0277-end-of-a-run-in-the-browser.md"),
-    "controller.run": (22_750, "0295-logs-in-parts.md"),
+    "controller.run": (22_950, "0291-a-mapping-is-checked-once-for-a-port.md"),
     "controller.runlog": (8_300, "0295-logs-in-parts.md"),
     "controller.exchange": (18_400, "0264-one-place-decides-about-units.md"),
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),

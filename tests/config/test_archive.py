@@ -6,7 +6,6 @@ import struct
 import tracemalloc
 import warnings
 import zipfile
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import pytest
 import trimesh
 from mcap.writer import Writer
 from PIL import Image as Pillow
+from scipy.io import savemat
 
 from snakewalk.config.archive import FREE_BYTES, check_expansion, read_arrays, read_bytes
 from snakewalk.config.errors import InputError
@@ -79,9 +79,7 @@ def lzma_wcon(path: Path) -> None:
 
 
 def mat(path: Path) -> None:
-    variable = zlib.compress(struct.pack("<II", 14, MANY) + bytes(MANY), 1)
-    head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-    path.write_bytes(head + struct.pack("<II", 15, len(variable)) + variable)
+    savemat(path, {"points": np.zeros(MANY // 8)}, do_compression=True)
 
 
 def hdf5(path: Path) -> None:
@@ -214,7 +212,7 @@ def test_what_has_no_end_is_not_read_to_it() -> None:
 )
 def test_a_calibration_that_opencv_would_crash_on_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "lens.yml").write_text(text)
-    with pytest.raises(InputError, match=r"lens\.yml: is not a calibration file: "):
+    with pytest.raises(InputError, match=r"lens\.yml: (is damaged|cannot be read): "):
         Lens.read(tmp_path / "lens.yml")
 
 

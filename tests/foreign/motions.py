@@ -10,6 +10,7 @@ from snakewalk.config.loader import load_robot
 from snakewalk.config.playback import JointRequest
 from snakewalk.config.reading import Facts
 from snakewalk.controller.run.kinds.playback_run import foreign_joints
+from snakewalk.controller.track.readers.load import load_file
 from tests.controller.exchange.joint_motions.test_joint_motions import bag, dataset
 from tests.foreign.case import Case, Values
 
@@ -36,6 +37,8 @@ def true_rad(time_s: np.ndarray) -> np.ndarray:
 
 def read(file: Path, options: dict[str, Any]) -> tuple[Values, Facts]:
     motion = foreign_joints(str(file), ROBOT, JointRequest(**options))
+    if motion is None:  # as `play` goes on
+        load_file(file)
     assert motion is not None
     # a second publisher begins later, by one row at most
     errors = [

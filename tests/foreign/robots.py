@@ -24,6 +24,9 @@ RIGHT = {
     "limit_rad": LIMIT_RAD,
     "error_m": 0.0,
 }
+CHAIN = {"length_m": 5 * 0.07, "mass_kg": sum(float(f"0.1{k}") for k in range(5)),
+         "joints": 4, "error_m": 0.0, "limit_rad": 1.0, "widest_rad": 1.3}  # fmt: skip
+"""Chain of the SDF models."""
 LIMITS_RAD = (-LIMIT_RAD, LIMIT_RAD)
 Write = Callable[[Path], Path]
 
@@ -180,8 +183,7 @@ def models() -> Iterator[Case]:
     total = mjcf('angle="radian" settotalmass="1.8"')
     yield case("mjcf", "settotalmass 1.8", total, RIGHT | {"mass_kg": 1.8})
 
-    chain = {"length_m": 5 * 0.07, "mass_kg": sum(float(f"0.1{k}") for k in range(5)),
-             "joints": 4, "error_m": 0.0, "limit_rad": 1.0, "widest_rad": 1.3}  # fmt: skip
+    chain = CHAIN
     old = described(version="1.4", axes="model")
     yield case("sdf", "version 1.4: axes in the model's frame", old, chain)
     for version in ("1.5", "1.6", "1.7", "1.8", "1.9"):

@@ -42,7 +42,7 @@ ROOT: Final = Path(__file__).resolve().parents[2]
 READING: Final = frozenset(
     {
         *("read_bytes", "read_head", "read_text", "read_rows", "read_lines", "read_arrays"),
-        *("read_json_object", "read_storage", "check_matrices", "open_footage", "read_numbers"),
+        *("read_json_object", "read_storage", "open_footage", "read_numbers"),
         *("VideoCapture", "FileStorage", "loadmat", "AnyReader", "read_table", "c3d", "imread"),
     }
 )
@@ -73,7 +73,8 @@ PARTS: Final = {
     "controller/images/mesh_files.py": "elevations, and bodies of animals",
     **{
         f"controller/track/readers/{name}.py": "tracks"
-        for name in ("arrays", "bvh", "hdf5", "marker_tables", "markers", "tables")
+        for name in ("arrays", "bvh", "c3d_file", "hdf5", "marker_tables", "markers", "mat_file",
+                     "tables")
     },
 }  # fmt: skip
 """Modules that only an entry calls, and what they read."""
@@ -84,12 +85,13 @@ OTHERS: Final = {
             "config/strict_toml.py", "drivers/chain/fingerprint_file.py", "sim/sniff/trace.py",
             "controller/animals/fish/fish_synthesis.py", "controller/animals/fish/postures.py",
             "controller/animals/mesh/body_model.py", "controller/animals/mesh/body_motion.py",
-            "controller/bench/calibration/progress.py", "controller/bench/eeprom_backup.py",
+            "controller/bench/eeprom_backup.py",
             "controller/bench/guided_setup.py", "controller/bench/loop_compiler.py",
             "controller/capture/capture.py", "controller/capture/corrections.py",
             "controller/capture/part_folder.py", "controller/capture/review.py",
-            "controller/console/command.py", "controller/console/table.py",
-            "controller/learning/commands/policy_learn.py", "controller/learning/policy_trials.py",
+            "controller/console/command.py", "controller/console/result_files.py",
+            "controller/console/table.py",
+            "controller/learning/policy_trials.py",
             "controller/rehearsal/commands/rehearse.py", "controller/rehearsal/commands/tasks.py",
             "controller/rehearsal/result_lines.py", "controller/repertoire/repertoire.py",
             "controller/repertoire/repertoire_planning.py",
@@ -103,6 +105,7 @@ OTHERS: Final = {
         OWN,
     ),
     "config/archive.py": "bounds each read",
+    "controller/images/storage_file.py": "matrices of a calibration, for its readers",
     "controller/images/calibration_storage.py": "lists of a calibration in JSON, for its readers",
     "controller/mapping/mosaic/place_mesh.py": "writes a mesh",
     "config/text_table.py": "cells of a table, for its readers",

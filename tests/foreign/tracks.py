@@ -234,7 +234,7 @@ def tables() -> Iterator[Case]:
         write = midlines((f"x_{unit}", f"y_{unit}"), size)
         yield case(f"columns x_{unit}", write, right())
     unknown = midlines(("x_cubits", "y_cubits"), 1 / 457.2)
-    yield case("columns x_cubits", unknown, "expected the columns")
+    yield case("columns x_cubits", unknown, "expected t, frame, point")
 
     for statement, write, length_m in (
         ("t in ms", worms({"t": "ms"}, (1e3, 1, 1)), LENGTH_M),

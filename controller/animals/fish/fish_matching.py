@@ -1,7 +1,7 @@
 """Postures from files: a film, two films, or midlines that were tracked already."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -105,11 +105,8 @@ def match_footage(
     )
     postures = film.postures
     value = None if postures.value is None else round(float(np.nanmedian(postures.value)), 3)
-    facts = MatchFacts(
-        frames=postures.frames,
-        matched=int(postures.found.sum()),
-        rate_hz=round(postures.rate_hz, 3),
-        largest_angles_deg=_largest_angles_deg(postures),
+    facts = replace(
+        _facts(postures),
         length_px=round(film.model.length_px, 1),
         fins=film.model.fin,
         rate_assumed=above.footage.rate_assumed,
@@ -130,16 +127,15 @@ def read_midlines(file: Path, build: str, rate_hz: float | None) -> MatchedRecor
     track = load_track(str(file), with_keys(ALL, {"rate": rate_hz}, str(file)))
     postures = postures_of_track(track, fish_model(build).joints_at)
     rest = track.angles_rad - postures.tangents_rad()[postures.found]
-    facts = MatchFacts(
+    left_over_deg = round(float(np.degrees(np.sqrt(np.mean(rest**2)))), 2)
+    return MatchedRecording(postures, replace(_facts(postures), left_over_deg=left_over_deg), None)
+
+
+def _facts(postures: Postures) -> MatchFacts:
+    size = np.degrees(np.nanmax(np.abs(postures.angles_rad), axis=0))
+    return MatchFacts(
         frames=postures.frames,
         matched=int(postures.found.sum()),
         rate_hz=round(postures.rate_hz, 3),
-        largest_angles_deg=_largest_angles_deg(postures),
-        left_over_deg=round(float(np.degrees(np.sqrt(np.mean(rest**2)))), 2),
+        largest_angles_deg=[float(angle) for angle in size.round(1)],
     )
-    return MatchedRecording(postures, facts, None)
-
-
-def _largest_angles_deg(postures: Postures) -> list[float]:
-    size = np.degrees(np.nanmax(np.abs(postures.angles_rad), axis=0))
-    return [float(angle) for angle in size.round(1)]

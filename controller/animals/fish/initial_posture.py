@@ -11,6 +11,7 @@ from skimage.morphology import skeletonize
 from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.controller.animals.fish.model import FishModel
 from snakewalk.controller.animals.fish.postures import midline_angles
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _NEIGHBOURS = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
 
@@ -55,7 +56,7 @@ def midline_starts(model: FishModel, midline: Floats) -> list[Floats]:
     midlines = []
     for points in (midline, midline[::-1]):
         head, angles = midline_angles(points, model.joints_at)
-        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        chord = arc_lengths(points)
         place = model.joints_at[0] * chord[-1]
         base = [np.interp(place, chord, points[:, k]) for k in range(2)]
         midlines.append(np.array([*base, head, *angles]))

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.arrays import Bools, Floats, Image, Singles
 from snakewalk.controller.animals.fish.raster import Window, draw_area, draw_edge, draw_pieces
 
 EDGE_WEIGHT = 0.3
@@ -76,12 +75,12 @@ class Target:
         """V = J + W K, Eq. 3."""
         return self.area(outline_px) + weight * self.edge(outline_px)
 
-    def soft(self, outline_px: Floats) -> NDArray[np.float32]:
+    def soft(self, outline_px: Floats) -> Singles:
         """Area of an outline, blurred as ``soft_area`` is."""
         draw_area(self._canvas, self.window, outline_px)
         return self._soften(self._canvas)
 
-    def _soften(self, area: Image) -> NDArray[np.float32]:
+    def _soften(self, area: Image) -> Singles:
         width = 2 * self._thickness + 1
         blurred = cv2.blur(area, (width, width))
         return np.asarray(blurred, dtype=np.float32) * np.float32(1.0 / 255.0)

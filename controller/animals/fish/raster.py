@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Image
+from snakewalk.config.arrays import Floats, Image, Int32s
 from snakewalk.controller.animals.fish.model import FishModel
 
 _SHIFT = 4  # cv2 accepts coordinates in sixteenths of a pixel
@@ -42,7 +41,7 @@ class Window:
         small = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
         return np.asarray(small, dtype=np.uint8)
 
-    def sixteenths(self, points_px: Floats) -> NDArray[np.int32]:
+    def sixteenths(self, points_px: Floats) -> Int32s:
         """Points (n, 2), x right and y up, as cv2 wants them."""
         rows, columns = self.shape
         x = (points_px[:, 0] + 0.5 - self.left) * (columns / self.width) - 0.5

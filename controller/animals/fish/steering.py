@@ -12,6 +12,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.animals.fish.postures import Postures
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.kinematics.smoothstep import quintic
 
 _SEARCH_S = 0.4
@@ -79,8 +80,7 @@ def _place(motion: Postures, dimensions: int) -> Floats:
 
 def _bend(place: Floats, begin: int, end: int, missing: Floats) -> tuple[Floats, Floats]:
     """Shift places from ``begin`` on, in place; returns turns of head and pitch up to ``end``."""
-    step = np.diff(place[begin : end + 1], axis=0)
-    far = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+    far = arc_lengths(place[begin : end + 1, :2])
     share = far / max(far[-1], 1e-12)
     grown = np.asarray(quintic(share))
     before = place[begin : end + 1].copy()

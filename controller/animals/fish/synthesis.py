@@ -16,6 +16,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.fish.piece_graph import PieceGraph, placed
 from snakewalk.controller.animals.fish.postures import Postures, tangents
 from snakewalk.controller.animals.fish.surroundings import OPEN_WATER, Surroundings
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.smoothstep import quintic
 
@@ -301,8 +302,7 @@ def _append_piece(pieces: PieceGraph, node: _Node, piece: int, by_rule: bool, ai
     path = placed(part.base, node.base[:2], node.head_rad)
     if len(node.base) == 3 and part.rise is not None:
         path = np.column_stack([path, node.base[2] + part.rise[:, 0]])
-    step = np.diff(path[:, :2], axis=0)
-    travelled = node.way + np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
+    travelled = node.way + arc_lengths(path[:, :2])
     reached = node.reached_at
     start = 1
     while len(reached) < len(aim.points):

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.animals.fish.matching import EDGE_WEIGHT, SilhouetteFrame, Target
 from snakewalk.controller.animals.fish.model import FishModel
 from snakewalk.controller.animals.fish.raster import Window
@@ -76,7 +75,7 @@ class TopViewFit:
         model = self._model
         return model.outline(model.midline(parameters[:2], float(parameters[2]), parameters[3:]))
 
-    def picture(self, parameters: Floats) -> NDArray[np.float32]:
+    def picture(self, parameters: Floats) -> Singles:
         """Blurred area of parameters."""
         return self._target.soft(self.outline(parameters))
 
@@ -139,8 +138,8 @@ def search(
 
 
 def refine(
-    picture: Callable[[Floats], NDArray[np.float32]],
-    target: NDArray[np.float32],
+    picture: Callable[[Floats], Singles],
+    target: Singles,
     start: Floats,
     *,
     rounds: int,

@@ -16,6 +16,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.body_model import BodyModel
 from snakewalk.controller.animals.mesh.mesh import round_tips, tips
 from snakewalk.controller.animals.mesh.pde_surface import TURN
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.track.resample import SEGMENTS
 
 CURVES = 37
@@ -191,6 +192,6 @@ def _ring(loop: Floats, x: float) -> Floats:
 def _arcs(loop: Floats, last: int) -> Floats:
     """(AROUND / 2, 2) equal arcs from the first corner towards corner ``last``, without the end."""
     part = loop[: last + 1]
-    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(part, axis=0).T))])
+    arc = arc_lengths(part)
     station = np.linspace(0.0, arc[-1], AROUND // 2 + 1)[:-1]
     return np.stack([np.interp(station, arc, part[:, k]) for k in range(2)], axis=1)

@@ -108,20 +108,23 @@ def tube_faces(points: int, around: int) -> Ints:
     """Two triangles for each side between rings, and a fan at each tip."""
     k = np.arange(around)
     after = (k + 1) % around
-    first_corner = np.arange(points - 1)[:, None] * around
-    a, b, c, d = (
-        first_corner + k,
-        first_corner + after,
-        first_corner + around + k,
-        first_corner + around + after,
-    )
-    sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)]).reshape(-1, 3)
     last = (points - 1) * around
     head = points * around
     tail = points * around + 1
     front = np.stack([np.full(around, head), k, after], axis=-1)
     back = np.stack([np.full(around, tail), last + after, last + k], axis=-1)
-    return np.concatenate([sides, front, back]).astype(np.int64)
+    return np.concatenate([band_faces(points, around), front, back]).astype(np.int64)
+
+
+def band_faces(rings: int, around: int) -> Ints:
+    """Two triangles for each side between rings; a ring of one place gives flat ones."""
+    k = np.arange(around)
+    first_corner = np.arange(rings - 1)[:, None] * around
+    a = first_corner + k
+    b = first_corner + (k + 1) % around
+    c, d = a + around, b + around
+    sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
+    return sides.reshape(-1, 3).astype(np.int64)
 
 
 def vertex_normals(vertices: Floats, faces: Ints) -> Floats:

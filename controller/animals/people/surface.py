@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image, Ints
-from snakewalk.controller.animals.mesh.mesh import vertex_normals
+from snakewalk.controller.animals.mesh.mesh import band_faces, vertex_normals
 from snakewalk.controller.animals.mesh.patches import Tube
 from snakewalk.controller.animals.mesh.pde_surface import TURN
 from snakewalk.controller.animals.mesh.rig import Rig
@@ -88,7 +88,7 @@ def _rig(skeleton: PersonSkeleton, parts: tuple[BodyPart, ...]) -> Rig:
         u = low + (0.005 + 0.99 * place) * (high - low)
         across = 0.5 + 0.49 * np.cos(np.arange(AROUND) * TURN / AROUND)
         uv.append(np.stack([np.repeat(u, AROUND), np.tile(across, rows)], axis=-1))
-        faces.append(_outwards(_band_faces(rows), points) + start)
+        faces.append(_outwards(band_faces(rows, AROUND), points) + start)
         row_bones, row_shares = _row_weights(part, rows)
         bones.append(np.repeat(row_bones, AROUND, axis=0))
         shares.append(np.repeat(row_shares, AROUND, axis=0))
@@ -115,21 +115,6 @@ def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:
     kept = np.argsort(-between, axis=1, kind="stable")[:, :3]
     share = np.take_along_axis(between, kept, axis=1)
     return kept.astype(np.int64), share / share.sum(axis=1, keepdims=True)
-
-
-def _band_faces(rows: int) -> Ints:
-    """Two triangles for each side between two rows; a row at a tip gives one flat one."""
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
-    row_starts = np.arange(rows - 1)[:, None] * AROUND
-    a, b, c, d = (
-        row_starts + k,
-        row_starts + after,
-        row_starts + AROUND + k,
-        row_starts + AROUND + after,
-    )
-    sides = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
-    return sides.reshape(-1, 3).astype(np.int64)
 
 
 def _outwards(faces: Ints, points: Floats) -> Ints:

@@ -15,6 +15,7 @@ from snakewalk.controller.animals.legged.prototype import LEGS, footfall, printe
 from snakewalk.controller.console.result_files import check_picture
 from snakewalk.controller.figures.path import draw_ground
 from snakewalk.controller.figures.style import WIDTH_IN, legend_above, save_picture, style
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _MARGIN_M = 0.3
 _CYCLES = 4
@@ -129,7 +130,7 @@ def _feet(axes: Axes, animal: AnimalConfig) -> None:
 def _heights(axes: Axes, animal_motion: SynthesisedAnimal) -> None:
     motion = animal_motion.motion
     middle = animal_motion.middle_m
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(middle, axis=0).T))])
+    along = arc_lengths(middle)
     ground: Floats = np.zeros(len(middle))
     if animal_motion.ground is not None:
         ground = animal_motion.ground.elevation_m(*middle.T)

@@ -38,6 +38,7 @@ from snakewalk.controller.figures.style import (
     save_picture,
     style,
 )
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _BODY_SPACING = 1.15
 """Body lengths between the bodies drawn."""
@@ -83,7 +84,7 @@ def _map(axes: Axes, walk: SynthesisedWalk, ground: HeightField | None, title: s
     path_m = walk.path.position(np.linspace(0.0, walk.path.length_m, 400))
     axes.plot(*path_m.T, color=PATH, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
     axes.plot(*centre.T, color=CENTRE, linewidth=1.6, label="mass centre")
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(centre, axis=0).T))])
+    along = arc_lengths(centre)
     length_m = float(np.hypot(*np.diff(points[0], axis=0).T).sum())
     marks = np.arange(0.0, along[-1], _BODY_SPACING * length_m)
     some = np.unique(np.append(np.searchsorted(along, marks), len(points) - 1))

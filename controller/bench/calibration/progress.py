@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.base import Strict
-from snakewalk.config.errors import ConfigError, InputError
+from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import read_progress, write_result
 
 
 class SeenBend(Strict):
@@ -136,15 +135,4 @@ class ProgressFile:
             self.path.unlink()
 
     def _read(self) -> CalibrationProgress:
-        try:
-            return CalibrationProgress.model_validate_json(read_bytes(self.path, MOST_JSON_BYTES))
-        except FileNotFoundError:
-            raise InputError(
-                f"{self.path}: no such file, so there is nothing to continue; leave --resume out"
-            ) from None
-        except ValidationError as error:
-            fault = error.errors(include_url=False)[0]
-            place = ".".join(map(str, fault["loc"]))
-            raise ConfigError(
-                f"{self.path}: {place}: {fault['msg']}; start again with --force"
-            ) from None
+        return read_progress(self.path, CalibrationProgress)

@@ -8,9 +8,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import DeepImage, Floats, Image
+from snakewalk.config.arrays import DeepImage, Floats, Image, Indices, Int32s
 from snakewalk.config.colours import HEAD, rgb
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
@@ -51,7 +50,7 @@ def drawn(
     return canvas
 
 
-def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.int32]:
+def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> Int32s:
     """Draw a body of a frame onto its canvas; returns its line there, sixteenths of a pixel."""
     high_px, wide_px = canvas.shape[:2]
     factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
@@ -62,7 +61,7 @@ def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> NDArray[np.
     return np.asarray(line, dtype=np.int32)
 
 
-def _draw_line(canvas: Any, line: NDArray[np.int32], thick: int, head_px: int) -> None:
+def _draw_line(canvas: Any, line: Int32s, thick: int, head_px: int) -> None:
     """Draw a line in sixteenths of a pixel, and its head."""
     cv2.polylines(canvas, [line], False, _BODY, thick, cv2.LINE_AA, 4)
     cv2.circle(canvas, tuple(int(v) for v in line[0]), head_px * 16, _HEAD, -1, cv2.LINE_AA, 4)
@@ -241,7 +240,7 @@ def _chosen(captured: Capture, places: int) -> list[int]:
     return bad + _spread(np.flatnonzero(good), places - len(bad))
 
 
-def _spread(numbers: NDArray[np.intp], most: int) -> list[int]:
+def _spread(numbers: Indices, most: int) -> list[int]:
     place = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
     return [int(numbers[round(k)]) for k in place]
 

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, DeepImage, Floats, Ints
+from snakewalk.config.arrays import Bools, DeepImage, Floats, Int32s, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.background import background_candidates, median_background
 from snakewalk.controller.images.body_detector import BodyDetector, usual_polarity
@@ -26,7 +25,7 @@ FEATURES = ("length", "width", "contrast")
 class Blobs:
     """The n blobs of a frame."""
 
-    label: NDArray[np.int32]
+    label: Int32s
     """(H, W) 1 to n in the blobs, 0 elsewhere."""
     boxes: Ints
     """(n, 4) left, top, width, height, px."""
@@ -84,7 +83,7 @@ def blobs_of(
 
 
 def _measured_blob(
-    label: NDArray[np.int32], contrast_image: DeepImage, number: int, box: Ints
+    label: Int32s, contrast_image: DeepImage, number: int, box: Ints
 ) -> tuple[Floats, Floats]:
     """Centroid of a blob, and its shape: the rectangle of equal area and perimeter."""
     left, top, wide, high = (int(v) for v in box)

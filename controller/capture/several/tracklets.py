@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Int32s, Ints
 from snakewalk.controller.capture.several.blobs import Blobs
 
 _LEAST_OVERLAP = 0.15  # of the smaller blob's pixels: the blobs show the same animal
@@ -252,9 +251,7 @@ class TrackletBuilder:
         return crossing
 
 
-def _shared_pixels(
-    before: NDArray[np.int32], label: NDArray[np.int32], old_indices: int, new_indices: int
-) -> Floats:
+def _shared_pixels(before: Int32s, label: Int32s, old_indices: int, new_indices: int) -> Floats:
     """(n, m) pixels that two blobs of two frames share."""
     both = (before > 0) & (label > 0)
     pair = (before[both] - 1) * new_indices + (label[both] - 1)

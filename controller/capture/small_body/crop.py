@@ -9,6 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.image_file import ImageFile, StoredImage
 from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
+from snakewalk.controller.capture.verification.frame_store import surroundings
 
 LONGEST_PX = 120.0
 """Bodies up to this length are fitted."""
@@ -40,10 +41,8 @@ def crop_body(image: DeepImage, ground: DeepImage, points_px: Floats) -> Crop:
     """Cut the body of (P, 2) points out; the crop contains views of both images."""
     length = float(np.hypot(*np.diff(points_px, axis=0).T).sum())
     reach = max(_MARGIN_LENGTHS * length, _LEAST_MARGIN_PX)
-    left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
-    right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
-    window = (slice(int(top), int(bottom)), slice(int(left), int(right)))
-    return Crop(image[window], ground[window], (int(left), int(top)))
+    window, corner_px = surroundings(points_px, reach)
+    return Crop(image[window], ground[window], corner_px)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,12 +195,12 @@ class View:
         )
 
 
-def bends_of(line: Floats) -> Floats:
-    """(BENDS,) of a line (P, 2), head first, of equal steps."""
+def bends_of(line: Floats, bends: int = BENDS) -> Floats:
+    """(bends,) of a line (P, 2), head first, of equal steps."""
     step = -np.diff(line, axis=0)
     angle = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     place = (np.arange(len(angle)) + 0.5) / len(angle)
-    return np.asarray(np.linalg.lstsq(bend_basis(place), angle, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(bend_basis(place, bends), angle, rcond=None)[0])
 
 
 def reversed_body(frame: Floats) -> Floats:

@@ -47,9 +47,9 @@ class Grid:
         return cls(along, int(np.clip(np.ceil(wide / spacing), 1, _ROWS)))
 
 
-def bend_basis(place: Floats) -> Floats:
-    """(P, BENDS) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head, 1 the tail."""
-    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, BENDS - 2), [1.0] * 3])
+def bend_basis(place: Floats, bends: int = BENDS) -> Floats:
+    """(P, bends) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head, 1 the tail."""
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, bends - 2), [1.0] * 3])
     return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
 
 

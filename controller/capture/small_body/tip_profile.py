@@ -5,16 +5,15 @@ contrast, or below the noise, before it ends. The profile is continued in a stra
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.images.cross_profile import (
-    arc_lengths,
     end_direction,
     even_line,
     seen_across,
 )
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 
 _HIGH, _LOW_LEVEL = 0.3, 0.06  # of the usual sum: between these the profile falls towards 0
 _HIGHEST_LOW_LEVEL = 0.2
@@ -41,9 +40,7 @@ NO_ENDS = np.full((2, 3), np.nan)
 """Ends of a frame without a body."""
 
 
-def profile_ends(
-    line: Floats, radius_px: Floats, level: NDArray[np.float32], blur_px: float
-) -> Floats:
+def profile_ends(line: Floats, radius_px: Floats, level: Singles, blur_px: float) -> Floats:
     """(2, 3) x, y of the end of a body's profile at its first and last point, and the doubt.
 
     The doubt, px, is the unseen part of the profile, less that of a round tip.
@@ -90,7 +87,7 @@ def tips_error_px(beyond_px: Floats) -> float:
 
 def _end(
     line: Floats,
-    level: NDArray[np.float32],
+    level: Singles,
     wide: float,
     step: float,
     usual: float,
@@ -128,7 +125,7 @@ def _crossing(profile: Floats, share: float) -> float:
     return 0.0 if k == 0 else k - (share - profile[k]) / float(profile[k - 1] - profile[k])
 
 
-def _sums(path: Floats, level: NDArray[np.float32], wide: float, step: float) -> Floats:
+def _sums(path: Floats, level: Singles, wide: float, step: float) -> Floats:
     """(P,) contrast summed across the path, less that of the ground on both sides."""
     reach = _ACROSS_WIDTHS * wide + _ACROSS_MARGIN_PX
     across = np.arange(-reach, reach + 0.5 * step, step)

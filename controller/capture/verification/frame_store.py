@@ -21,6 +21,13 @@ class CutOut:
     """Position x, y of the cut-out's first pixel."""
 
 
+def surroundings(points_px: Floats, reach_px: float) -> tuple[tuple[slice, slice], tuple[int, int]]:
+    """Window of a frame around points (P, 2), and the x, y of its first pixel."""
+    left, top = np.maximum(np.floor(points_px.min(axis=0) - reach_px), 0.0).astype(int).tolist()
+    right, bottom = (np.ceil(points_px.max(axis=0) + reach_px).astype(int) + 1).tolist()
+    return (slice(top, bottom), slice(left, right)), (left, top)
+
+
 @dataclass(slots=True)
 class FrameStore:
     """Cut-outs by frame number."""
@@ -31,13 +38,12 @@ class FrameStore:
     def put(self, number: int, frame: DeepImage, points_px: Floats, length_px: float) -> None:
         """Keep the surroundings of some points (P, 2) of a frame (H, W[, C])."""
         reach = max(_MARGIN_LENGTHS * length_px, _LEAST_MARGIN_PX)
-        left, top = np.maximum(np.floor(points_px.min(axis=0) - reach), 0.0).astype(int)
-        right, bottom = np.ceil(points_px.max(axis=0) + reach).astype(int) + 1
-        part = np.ascontiguousarray(frame[top:bottom, left:right])
+        window, corner_px = surroundings(points_px, reach)
+        part = np.ascontiguousarray(frame[window])
         if not part.size:
             return
         part = part if part.dtype == np.uint8 else part.astype(np.float16)
-        self._places[number] = (self.file.add(part), (int(left), int(top)))
+        self._places[number] = (self.file.add(part), corner_px)
 
     def get(self, number: int) -> CutOut | None:
         """The cut-out of a frame; None for a frame without one."""

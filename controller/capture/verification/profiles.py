@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.capture.verification.frame_store import CutOut
 from snakewalk.controller.images.medial_axis import Skeleton
 
@@ -93,7 +92,7 @@ def _squares(places: Floats, line: Floats) -> Floats:
     return x * x + y * y
 
 
-def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floats) -> Floats:
+def _rings(image: Singles, line: Floats, half: Floats, outward: Floats) -> Floats:
     """(rings, angles, C) ground minus picture beyond the first point of a line."""
     wide = 2.0 * float(half[_AT_TIP].mean())
     low, high = _RING_FROM[0] * wide + _RING_FROM[1], _RING_TO[0] * wide + _RING_TO[1]
@@ -114,7 +113,7 @@ def _rings(image: NDArray[np.float32], line: Floats, half: Floats, outward: Floa
     return out
 
 
-def _grey_values(image: NDArray[np.float32], places: Floats) -> Floats:
+def _grey_values(image: Singles, places: Floats) -> Floats:
     """(..., C) grey values at places (A, B, 2); NaN outside the image."""
     x, y = np.moveaxis(places, -1, 0).astype(np.float32)
     shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)

@@ -4,9 +4,10 @@ import re
 from pathlib import Path
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.file_units import ANGLES_RAD, TIMES_S
+from snakewalk.config.file_units import ANGLES_RAD, DEGREE, TIMES_S
 from snakewalk.config.playback import JointRequest
 from snakewalk.config.reading import stated
+from snakewalk.config.table_columns import with_meanings
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
 from snakewalk.controller.motion.joint_motion import (
@@ -19,7 +20,7 @@ from snakewalk.controller.motion.joint_motion import (
 _TIME = re.compile("(?:time|t|timestamp)(?:_(s|ms|us|ns))?|(s)econds")
 """Name of the column of time, and the unit that it states."""
 _MIDLINE_COLUMNS = {"frame", "point", "frame_idx", "scorer"}
-_UNIT = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees)[\])]?$", re.IGNORECASE)
+_UNIT = re.compile(r"^(.*?)[ _.]?[\[(]?(rad|deg|radians|degrees|°)[\])]?$", re.IGNORECASE)
 
 
 @plugin("joints", "csv")
@@ -41,14 +42,18 @@ class JointTable:
 
     def read(self, path: Path, request: JointRequest) -> JointMotion:
         """Read the table; see ``JointReader.read``."""
-        first, *rows = (row for row in read_rows(path, "CSV") if any(row))
+        notes: list[str] = []
+        every = with_meanings(path, read_rows(path, "CSV"), request.columns, notes)
+        first, *rows = (row for row in every if any(row))
         cells = [cell.strip() for cell in first]
+        if not cells[-1] and not any(row[len(cells) - 1 :] and row[len(cells) - 1] for row in rows):
+            cells.pop()
         names = []
         units = []
         for cell in cells[1:]:
             matched = _UNIT.match(cell)
             names.append((matched[1] if matched else cell).strip() or cell)
-            units.append("?" if matched is None else matched[2].lower()[:3])
+            units.append("?" if matched is None else matched[2].lower().replace("°", DEGREE)[:3])
         for line, row in enumerate(rows, start=2):
             if any(row[len(cells) :]):
                 raise InputError(
@@ -73,7 +78,7 @@ class JointTable:
         time = stated(path, "--time-unit", by_name, request.time_unit)
         time = time_unit(path, values[:, 0], cells[0], time)
         time_s = values[:, 0] * TIMES_S[time.value]
-        return joint_motion(path, time_s, names, angles, unit=unit, time=time)
+        return joint_motion(path, time_s, names, angles, notes, unit=unit, time=time)
 
 
 def _plain_name(name: str) -> str:

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 import mujoco
 
 from snakewalk.config.errors import Assumptions, InputError
-from snakewalk.controller.console.child_process import run_code, run_program
+from snakewalk.controller.console.child_process import run_limited, run_program
 from snakewalk.controller.exchange.robot_import.mjcf_source import prepare_mjcf
 from snakewalk.controller.exchange.robot_import.model_source import (
     LineElement,
@@ -22,20 +22,10 @@ from snakewalk.controller.exchange.robot_import.urdf_source import prepare_urdf
 
 _MOST_MEMORY_BYTES = 2_000_000_000
 _MOST_CPU_S = 10
+_MOST = _MOST_MEMORY_BYTES, _MOST_CPU_S
 """Limits of MuJoCo's compiler and of xacro: memory and CPU time (ours)."""
 _REPORTED_EXIT = 3
-_LIMITS = """
-import sys
-*words, memory_bytes, cpu_s = sys.argv[1:]
-try:
-    import resource
-except ImportError:  # Windows
-    pass
-else:
-    for which, most in (("AS", memory_bytes), ("CPU", cpu_s), ("FSIZE", memory_bytes)):
-        resource.setrlimit(getattr(resource, "RLIMIT_" + which), (int(most), int(most)))
-"""
-_COMPILER = f"""{_LIMITS}
+_COMPILER = f"""
 source, made = words
 import mujoco
 try:
@@ -44,7 +34,7 @@ except (ValueError, RuntimeError, MemoryError) as error:
     print(error or type(error).__name__)
     sys.exit({_REPORTED_EXIT})
 """
-_XACRO = f"""{_LIMITS}
+_XACRO = """
 import xacro
 sys.argv = words
 xacro.main()
@@ -109,8 +99,7 @@ def _expanded_xacro(path: Path) -> str:
     wait_s = 6.0 * _MOST_CPU_S
     try:
         if find_spec("xacro") is not None:
-            limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
-            ended = run_code(_XACRO, "xacro", str(path), *limits, timeout_s=wait_s)
+            ended = run_limited(_XACRO, "xacro", str(path), most=_MOST, timeout_s=wait_s)
         elif (program := shutil.which("xacro")) is not None:
             ended = run_program([program, str(path)], timeout_s=wait_s)
         else:
@@ -147,10 +136,8 @@ def compile_model(source: Path, compiled_file: Path) -> str | None:
 
     A model may ask for any memory and time, and crash the compiler; that process is limited in all.
     """
-    limits = str(_MOST_MEMORY_BYTES), str(_MOST_CPU_S)
-    ended = run_code(
-        _COMPILER, str(source), str(compiled_file), *limits, folder=source.parent
-    )  # MuJoCo writes its log there
+    words = str(source), str(compiled_file)
+    ended = run_limited(_COMPILER, *words, most=_MOST, folder=source.parent)  # its log is there
     if ended.returncode == _REPORTED_EXIT:
         return ended.stdout
     if ended.returncode or not compiled_file.is_file():

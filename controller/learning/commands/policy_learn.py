@@ -5,16 +5,14 @@ from statistics import fmean
 from typing import Annotated
 
 import typer
-from pydantic import ValidationError
 
-from snakewalk.config.archive import MOST_JSON_BYTES, read_bytes
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, Workers, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import read_progress, write_result
 from snakewalk.controller.learning.wave_search import (
     SearchProgress,
     search_progress,
@@ -96,16 +94,7 @@ def _resumed_progress(file: Path, asked: SearchProgress) -> SearchProgress:
         InputError: the file is missing or broken, or of a search with other arguments.
 
     """
-    try:
-        progress = SearchProgress.model_validate_json(read_bytes(file, MOST_JSON_BYTES))
-    except FileNotFoundError:
-        raise InputError(
-            f"{file}: no such file, so there is nothing to continue; leave --resume out"
-        ) from None
-    except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        place = ".".join(map(str, fault["loc"]))
-        raise InputError(f"{file}: {place}: {fault['msg']}; start again with --force") from None
+    progress = read_progress(file, SearchProgress)
     before = progress.model_dump()
     now = asked.model_dump()
     other = [

@@ -11,7 +11,7 @@ from snakewalk.controller.console.options import Robot, Set, Shadow, World, key_
 from snakewalk.controller.console.progress import TimeBar
 from snakewalk.controller.console.run_options import RunOptions
 from snakewalk.controller.run.factory import prepare_policy
-from snakewalk.controller.run.results import show_result, summarized
+from snakewalk.controller.run.results import run_facts, show_result, summarized
 from snakewalk.controller.run.run_for_user import run_for_user
 
 Name = Annotated[
@@ -47,10 +47,7 @@ def run_policy(
     result = run_for_user(prepared, results, options, bar=bar, shadow=shadow)
     facts: dict[str, object] = {
         "policy": name,
-        "robot": prepared.robot.name,
-        "world": prepared.world.name,
-        "duration_s": round(result.outcome.duration_s, 2),
-        "tripped": result.outcome.tripped,
+        **run_facts(result),
         "slowed_to": round(result.outcome.least_rate, 3),
         **summarized(result.summary, "travelled_m"),
         "electrical_energy_j": result.summary.electrical_energy_j,

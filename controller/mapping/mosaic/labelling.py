@@ -5,12 +5,11 @@ A label of a pixel p is a place in its window of the second picture and a scale.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Floats, Ints, Singles
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-Costs = NDArray[np.float32]
+Costs = Singles
 """(rows, columns, scales, window, window) data term of each label; infinite outside of SEARCH."""
 _COST = readonly_array("float32", dimensions=5, layout="C")
 _INTS = readonly_array("int64", dimensions=3, layout="C")

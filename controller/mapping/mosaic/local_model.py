@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.mapping.disparity import match
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
-from snakewalk.controller.mapping.stereo_ground import DISPARITY_ERROR_PX
+from snakewalk.controller.mapping.stereo_ground import DISPARITY_ERROR_PX, disparities
 
 LEAST_DISPARITY_PX = 2.0
 """Below it a depth is uncertain by 15 % or more and the pixel is a hole (ours)."""
@@ -47,8 +46,7 @@ class LocalModel:
             InputError: fewer than a hundredth of the pixels match.
 
         """
-        least = max(0, int(np.floor(-pair.offset_px)))
-        disparity = np.where(pair.seen, match(pair.left, pair.right, count, least), np.nan)
+        disparity = disparities(pair, count)
         disparity[_has_no_texture(pair.left)] = np.nan
         with np.errstate(invalid="ignore"):
             disparity[disparity + pair.offset_px < LEAST_DISPARITY_PX] = np.nan

@@ -5,6 +5,7 @@ from scipy.sparse import coo_array, csgraph
 from scipy.sparse.linalg import splu
 
 from snakewalk.config.arrays import Bools, Floats
+from snakewalk.controller.terrain.elevation_map import laplacian
 
 
 def continued(values: Floats, given: Bools, shape: Floats) -> Floats:
@@ -54,14 +55,7 @@ def continued(values: Floats, given: Bools, shape: Floats) -> Floats:
     bordered = np.bincount(part_of, weights=weight)[part_of] > 0.0
     weight = weight + np.bincount(low, minlength=count) + np.bincount(high, minlength=count)
     weight[weight == 0.0] = 1.0
-    diagonal = np.arange(count)
-    matrix = coo_array(
-        (
-            np.concatenate([weight, -np.ones(2 * len(low))]),
-            (np.concatenate([diagonal, low, high]), np.concatenate([diagonal, high, low])),
-        ),
-        shape=(count, count),
-    ).tocsr()
+    matrix = laplacian(weight, low, high)
     kept = np.flatnonzero(bordered)
     solved = np.zeros_like(right)
     if len(kept):

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.arrays import Bools, Bytes, Floats, Image, Singles
 from snakewalk.controller.mapping.mosaic.local_model import joined
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -28,7 +28,7 @@ _BOOLS = readonly_array("bool_", 2, "A")
 class Canvas:
     """A picture with its depth buffer."""
 
-    colour: NDArray[np.uint8]
+    colour: Bytes
     """(H, W, 3) colours of the picture."""
     depth_m: Floats
     """(H, W); infinite where nothing was drawn."""
@@ -105,7 +105,7 @@ def draw(
     np.copyto(canvas.colour, colour, where=fresh)
 
 
-def _texels(values: NDArray[Any], places_px: NDArray[np.float32]) -> NDArray[Any]:
+def _texels(values: NDArray[Any], places_px: Singles) -> NDArray[Any]:
     """(H, W, k) bilinear values at columns and rows (H, W, 2); 0 or NaN outside."""
     return np.asarray(
         cv2.remap(
@@ -139,7 +139,7 @@ def _rasterise(
     drawn: Bools,
     blocked: Bools,
     depth: Floats,
-    source: NDArray[np.float32],
+    source: Singles,
 ) -> None:
     """Write the depth and the source (column, row) of the nearest triangle of each pixel.
 

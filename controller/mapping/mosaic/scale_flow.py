@@ -7,9 +7,8 @@ The paper minimises ``D = corr``, whose least value is the worst match. This mod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints, Singles
 from snakewalk.controller.mapping.mosaic.labelling import Costs, flow_of, labelled
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
@@ -29,7 +28,7 @@ PENALTY = 0.12
 LEAST_CORRELATION = 0.5
 """Correlation below which a pixel has no physical counterpart (ours)."""
 
-Picture = NDArray[np.float32]
+Picture = Singles
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from snakewalk.config.arrays import Bools, Floats, Image
+from snakewalk.config.arrays import Bools, Floats, Image, Ints, Singles
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, sampled
 
 SCALES = tuple(10.0 / k for k in range(10, 0, -1))
@@ -47,12 +46,12 @@ class ScaleMatches:
     """(n,) correlations of the pairs."""
 
 
-def grey(image: Image) -> NDArray[np.float32]:
+def grey(image: Image) -> Singles:
     """(H, W) grey levels."""
     return np.asarray(np.asarray(image, dtype=np.float32).mean(axis=2), dtype=np.float32)
 
 
-def reduced(picture: NDArray[np.float32], scale: float) -> NDArray[np.float32]:
+def reduced(picture: Singles, scale: float) -> Singles:
     """Picture at size ``1 / scale``; pixel centre (u, v) maps to (u / scale, v / scale)."""
     if scale == 1.0:
         return picture
@@ -161,7 +160,7 @@ def match_around(
     return _as_matches(kept)
 
 
-def _redrawn(picture: NDArray[np.float32], places_px: Floats, scale: Floats) -> NDArray[np.float32]:
+def _redrawn(picture: Singles, places_px: Floats, scale: Floats) -> Singles:
     """(H, W) samples of a picture at places, each from the reduction with the nearest scale."""
     nearest = np.full(scale.shape, -1)
     known = np.isfinite(places_px).all(axis=-1) & np.isfinite(scale)
@@ -182,7 +181,7 @@ def _bilinear(values: Floats, place_px: Floats) -> Floats:
     return np.asarray(np.einsum("i,j,ijk->k", [1 - b, b], [1 - a, a], square))
 
 
-def _corners(picture: NDArray[np.float32], usable: Bools, margin_px: int) -> NDArray[np.int64]:
+def _corners(picture: Singles, usable: Bools, margin_px: int) -> Ints:
     """(n, 2) columns and rows of the interest points in the usable part, inside a margin."""
     inside = np.zeros(picture.shape, np.uint8)
     edge = margin_px + 1
@@ -192,7 +191,7 @@ def _corners(picture: NDArray[np.float32], usable: Bools, margin_px: int) -> NDA
     return np.asarray(np.rint(places), np.int64)
 
 
-def _patch(picture: NDArray[np.float32], column: int, row: int, radius: int) -> NDArray[np.float32]:
+def _patch(picture: Singles, column: int, row: int, radius: int) -> Singles:
     return picture[row - radius : row + radius + 1, column - radius : column + radius + 1]
 
 
@@ -202,8 +201,8 @@ def _as_matches(rows: Sequence[Sequence[float]]) -> ScaleMatches:
 
 
 def _best_match(
-    patch: NDArray[np.float32],
-    pyramid: list[tuple[float, NDArray[np.float32]]],
+    patch: Singles,
+    pyramid: list[tuple[float, Singles]],
     centre: Floats,
     half_px: float,
 ) -> tuple[float, float, float, float] | None:
@@ -250,7 +249,7 @@ def _best_match(
     return best
 
 
-def _vertex(values: NDArray[np.float32], peak_index: int) -> float:
+def _vertex(values: Singles, peak_index: int) -> float:
     """Offset of a parabola's vertex through a maximum and its neighbours."""
     if not 0 < peak_index < len(values) - 1:
         return 0.0

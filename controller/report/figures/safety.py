@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from snakewalk.config.arrays import Floats, Ints
 from snakewalk.config.colours import FAULT, GREY, WARNING
 from snakewalk.controller.figures.style import canvas, label_time, legend_above, name_joints
 from snakewalk.controller.runlog.record import RunRecord
@@ -39,7 +39,7 @@ def _raster(axes: Axes, record: RunRecord) -> None:
     legend_above(axes, 3)
 
 
-def _marks(record: RunRecord, kind: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _marks(record: RunRecord, kind: str) -> tuple[Floats, Ints]:
     """Times and joints of a kind of verdict; a verdict on no joint in particular is on all."""
     cycle = record.cycle
     all_joints = tuple(range(cycle.asked_rad.shape[1]))

@@ -33,7 +33,7 @@ from snakewalk.controller.run.commands.gait_options import Param, parameters
 from snakewalk.controller.run.factory import prepare_commanded
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name
 from snakewalk.controller.run.observers import PAGE, Observers, open_observer
-from snakewalk.controller.run.results import show_result
+from snakewalk.controller.run.results import run_facts, show_result
 from snakewalk.controller.run.run_for_user import run_for_user
 
 _WEEK_S = 604_800.0
@@ -143,10 +143,7 @@ def ros(
             observers=nullcontext(Observers(link, page=page)),
         )
     facts = {
-        "robot": prepared.robot.name,
-        "world": prepared.world.name,
-        "duration_s": round(result.outcome.duration_s, 2),
-        "tripped": result.outcome.tripped,
+        **run_facts(result),
         "peak_current_a": result.summary.peak_current_a,
     }
     show_result(result, facts, run_options)

@@ -21,7 +21,7 @@ from snakewalk.controller.run.hands import Hands, open_hands
 from snakewalk.controller.run.kinds.gait_factory import prepare_gait
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.request import RunResult
-from snakewalk.controller.run.results import by_evidence, show_result, summarized
+from snakewalk.controller.run.results import by_evidence, run_facts, show_result, summarized
 from snakewalk.controller.run.run_for_user import observers_of, run_for_user
 from snakewalk.controller.run.run_keys import with_compliance
 
@@ -115,10 +115,7 @@ def run_gait(
 def _facts(prepared: GaitRun, result: RunResult) -> dict[str, object]:
     facts: dict[str, object] = {
         "gait": prepared.config.name,
-        "robot": prepared.robot.name,
-        "world": prepared.world.name,
-        "duration_s": round(result.outcome.duration_s, 2),
-        "tripped": result.outcome.tripped,
+        **run_facts(result),
         "slowed_to": round(result.outcome.least_rate, 3),
     }
     if prepared.config.then:

@@ -1,5 +1,6 @@
 """A run that plays a recording in time on a robot."""
 
+import zlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +11,7 @@ from snakewalk.config.archive import read_head
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.playback import JointRequest, PlaybackConfig
-from snakewalk.config.reading import Facts, with_stored
+from snakewalk.config.reading import Facts, stored, with_stored
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.world import WaterGround
 from snakewalk.controller.console.plugins import plugins
@@ -35,21 +36,20 @@ def foreign_joints(track: str, robot: RobotConfig, asked: JointRequest) -> Joint
 
     """
     path = Path(track)
-    reader = _reader(path)
+    reader = _reader(path, asked)
     if reader is None:
-        names = ("joints", "unit", "topic", "episode")
+        names = ("joints", "unit", "topic", "episode", "columns")
         given = [name for name in names if getattr(asked, name) not in (None, {})]
         if given:
             option = "--joint" if given[0] == "joints" else f"--{given[0]}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None
     request, lines = with_stored(path, asked)
-    motion = reader.read(path, request)
-    time_s, joint_rad, notes = onto_robot(motion, robot, request.joints, track)
-    return replace(motion, time_s=time_s, joint_rad=joint_rad, notes=(*lines, *notes))
+    motion = onto_robot(reader.read(path, request), robot, request.joints, track)
+    return replace(motion, notes=(*lines, *motion.notes))
 
 
-def _reader(path: Path) -> JointReader | None:
+def _reader(path: Path, asked: JointRequest) -> JointReader | None:
     if not path.exists():
         return None
     head = b""
@@ -58,6 +58,9 @@ def _reader(path: Path) -> JointReader | None:
             head = read_head(path, _HEAD_BYTES)
         except OSError as error:
             raise InputError(f"{path}: {error.strerror or error}") from None
+    columns = asked.columns or stored(path).get("columns")
+    if columns:
+        head = ",".join([*columns, "joint"]).encode()
     for plugin in plugins("joints"):
         reader: JointReader = plugin.load()()
         if reader.accepts(path, head):
@@ -129,6 +132,38 @@ class PlaybackRun(PathlessRun):
             *lines,
             f"the joints come to rest at each of {len(cuts)} gaps, of up to {longest_s:.3g} s, "
             "and move evenly from the row before to the row after",
+        )
+
+    def check_for_port(self) -> None:
+        """Ask for the user's consent to a new mapping of joints before it moves servos.
+
+        Raises:
+            InputError: the question, with a drawing of the body and a table.
+
+        """
+        motion = self._foreign
+        if motion is None:
+            return
+        labels = [self.robot.joint_label(k) for k in range(self.robot.joint_count)]
+        pairs = list(zip(labels, motion.names, strict=True))
+        code = f"{zlib.crc32(repr(pairs).encode()):08x}"
+        request, _ = with_stored(Path(self.run.track), self._asked_playback.request)
+        if request.mapping == code:
+            return
+        body = "".join(f"={k}=" for k in range(1, len(pairs) + 1))
+        range_deg = np.degrees([motion.joint_rad.min(axis=0), motion.joint_rad.max(axis=0)]).T
+        raise InputError(
+            [
+                f"{self.run.track}: check which joint of the file moves which servo:",
+                f"head <{body}> tail",
+                *(
+                    f"{k}: {label}: {name}, {low:.0f}° to {high:.0f}°"
+                    for k, ((label, name), (low, high)) in enumerate(
+                        zip(pairs, range_deg.tolist(), strict=True), start=1
+                    )
+                ),
+                f"add --mapping {code} --remember if this is right, --joint ROBOT=FILE if not",
+            ]
         )
 
     @property

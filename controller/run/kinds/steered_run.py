@@ -11,6 +11,7 @@ from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.kinds.gait_run import GaitRun
 from snakewalk.controller.run.kinds.walk_run import PathRun
+from snakewalk.controller.run.prepared_run import plan_of_path
 from snakewalk.controller.runlog.record import PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.walk.course import Course
@@ -52,11 +53,7 @@ class SteeredRun(PathRun, GaitRun):
         except InputError as error:
             faults = [f"run {self.run.name}: {fault}" for fault in error.faults]
             raise InputError(faults) from None
-        return PlanSummary(
-            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
-            waypoints_m=np.array(self.run.waypoints_m),
-            waypoint_radius_m=self.run.waypoint_radius_m,
-        )
+        return plan_of_path(self.run, self.path)
 
     def make_source(self, on_event: OnEvent) -> MotionSource:
         """Return a fresh motion."""

@@ -1,7 +1,7 @@
 """A run of the snake walk: recording, library of shapes, path, pilot, forecast and margins."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from snakewalk.controller.mechanics.pitch_fit import PitchFitter
 from snakewalk.controller.mechanics.rollout import Rollout
 from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.motion.source import MotionSource, Pace
-from snakewalk.controller.run.prepared_run import GroundedRun, pose_with
+from snakewalk.controller.run.prepared_run import GroundedRun, plan_of_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
 from snakewalk.controller.runtime.forecast import Forecast, forecast, margin_faults
@@ -283,10 +283,8 @@ class WalkRun(PathRun):
 
         """
         ahead = self.forecast()
-        return PlanSummary(
-            path_m=self.path.position(np.linspace(0.0, self.path.length_m, 200)),
-            waypoints_m=np.array(self.run.waypoints_m),
-            waypoint_radius_m=self.run.waypoint_radius_m,
+        return replace(
+            plan_of_path(self.run, self.path),
             predicted_speed_m_s=self.gain * ahead.pulse_m / ahead.duration_s,
             states=None if self.run.motion == "serpenoid" else self.library.counts,
         )

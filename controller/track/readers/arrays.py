@@ -1,29 +1,23 @@
 """Recordings as named arrays: .npz and MATLAB files of bodies, .npy files of joint angles."""
 
-import math
-import struct
-import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy  # scipy.io loads when it is first used
 from numpy.typing import NDArray
 
-from snakewalk.config.archive import DAMAGE, MOST_BYTES, check_expansion, read_arrays, read_bytes
+from snakewalk.config.archive import DAMAGE, read_arrays
 from snakewalk.config.arrays import Floats
-from snakewalk.config.errors import InputError, first_line
+from snakewalk.config.errors import InputError
+from snakewalk.controller.console.separate_reader import read_separately
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
-from snakewalk.controller.track.readers.formats import KNOWN
+from snakewalk.controller.track.readers import mat_file
 from snakewalk.controller.track.resample import body_points
 from snakewalk.controller.track.track import Track, track_from_points
 
-_MAT_HEAD = 128
-_MAT_PACKED = 15
-_PIECE = 1_000_000
 SKELETON_RATE_HZ = 30.0
 JOINT_RATE_HZ = 32.0
 """Defaults: neither kind of file holds a frame rate."""
@@ -75,52 +69,8 @@ def load_npz(file: Path, choice: Choice) -> Track:
 
 def load_mat(file: Path, choice: Choice) -> Track:
     """Load a MATLAB file up to version 7 with ``track_from_arrays``; 7.3 is HDF5."""
-    size = file.stat().st_size
-    check_expansion(file, size, _unpacked_mat(read_bytes(file)))
-    try:
-        said = 8 * sum(math.prod(shape) for _, shape, _ in scipy.io.whosmat(file))
-        check_expansion(file, size, said)  # also for cells and structs
-        mat_arrays = scipy.io.loadmat(file)
-    except InputError:
-        raise
-    except Exception as error:
-        raise InputError(
-            f"{file}: is no MAT file that can be read: {first_line(error)}; known: {KNOWN}"
-        ) from None
-    arrays = {
-        name: np.asarray(data) for name, data in mat_arrays.items() if not name.startswith("__")
-    }
+    arrays, _ = read_separately(file, mat_file.__name__)
     return track_from_arrays(file, arrays, choice)
-
-
-def _unpacked_mat(data: bytes) -> int:
-    """Size in bytes of a MATLAB file's unpacked content; each variable is packed separately."""
-    order = "<" if data[126:128] == b"IM" else ">"
-    position = _MAT_HEAD
-    size = 0
-    while position + 8 <= len(data):
-        kind, length = struct.unpack_from(f"{order}II", data, position)
-        position += 8
-        if kind == _MAT_PACKED:
-            size += _unpacked_bytes(memoryview(data)[position : position + length])
-        else:
-            size += length
-        position += length
-    return size
-
-
-def _unpacked_bytes(packed: memoryview) -> int:
-    """Unpacked bytes of a zlib stream, counted piece by piece up to a fault."""
-    stream = zlib.decompressobj()
-    size = 0
-    rest: bytes | memoryview = packed
-    try:
-        while rest and size <= MOST_BYTES:
-            size += len(stream.decompress(rest, _PIECE))
-            rest = stream.unconsumed_tail
-    except zlib.error:
-        pass
-    return size
 
 
 def track_from_arrays(

@@ -184,9 +184,12 @@ _MARKERS: dict[str, Callable[[Path, Choice], Track | Keypoints]] = {
 
 def _format(file: Path) -> Format:
     try:
-        return format_of(read_head(file, HEAD_BYTES))
+        head = read_head(file, HEAD_BYTES)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(f"{file}: is in UTF-16; save it in UTF-8")
+    return format_of(head)
 
 
 def _json(file: Path) -> str:

@@ -1,4 +1,4 @@
-"""Motion-capture markers, projected onto a plane: QTM's TSV, and C3D (by ezc3d).
+"""Motion-capture markers, projected onto a plane, of C3D and of QTM's TSV.
 
 A TSV begins with lines of a name and its values (``FREQUENCY``, ``MARKER_NAMES``, ...). A line of
 column names may follow, then rows of x, y, z per marker, mm. Some exports begin rows with frame and
@@ -13,12 +13,14 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.config.errors import InputError, first_line
+from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.file_units import LENGTHS_M, named_unit, unit_m
 from snakewalk.config.reading import Fact
 from snakewalk.config.text_table import numbers_of, read_rows
+from snakewalk.controller.console.separate_reader import read_separately
 from snakewalk.controller.track.choice import FEWEST, PLANES, Choice
+from snakewalk.controller.track.readers import c3d_file
 from snakewalk.controller.track.readers.keypoints import Keypoints
 
 _ACROSS = {"x": "yz", "y": "xz", "z": "xy"}
@@ -71,21 +73,11 @@ def load_qtm(file: Path, choice: Choice) -> Keypoints:
 def load_c3d(file: Path, choice: Choice) -> Keypoints:
     """Load a C3D; see ``load.load_file``."""
     require_extra(f"{file}: C3D needs", "ezc3d")
-    import ezc3d  # noqa: PLC0415  an extra
-
-    try:
-        c3d = ezc3d.c3d(str(file))
-        about = c3d["parameters"]["POINT"]
-        names = [str(name) for name in about["LABELS"]["value"]]
-        unit = str((about.get("UNITS", {}).get("value") or [""])[0])
-        stated = float(about["RATE"]["value"][0])
-        screen = (about.get("Y_SCREEN", {}).get("value") or [""])[0]
-        stated_up = str(screen).strip().lower()
-        up = stated_up if stated_up in ("+x", "+y", "+z") else "z"
-        places = np.asarray(c3d["data"]["points"], dtype=float)[:3].transpose(2, 1, 0)
-    except Exception as error:
-        raise InputError(f"{file}: is no C3D that can be read: {first_line(error)}") from None
-    return projected(file, names[: places.shape[1]], places, unit, stated or None, choice, ups=up)
+    arrays, said = read_separately(file, c3d_file.__name__)
+    places = arrays["places"]
+    up = said["up"] if said["up"] in ("+x", "+y", "+z") else "z"
+    names = said["names"][: places.shape[1]]
+    return projected(file, names, places, said["unit"], said["rate_hz"] or None, choice, ups=up)
 
 
 def marker_places(

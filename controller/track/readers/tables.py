@@ -10,6 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import TIMES_S, named_unit, unit_m
 from snakewalk.config.reading import by_user
+from snakewalk.config.table_columns import preview, with_meanings
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.motion.joint_motion import time_unit
 from snakewalk.controller.track.choice import Choice
@@ -34,7 +35,14 @@ _NO_LENGTHS = ("lengths", "px")
 
 def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
     """Load any of these kinds of CSV; see ``load.load_file``."""
+    notes: list[str] = []
     every = read_rows(file, f"recording (known: {KNOWN})")
+    every = with_meanings(file, every, choice.columns, notes)
+    loaded = _of_rows(file, every, choice)
+    return replace(loaded, notes=(*notes, *loaded.notes))
+
+
+def _of_rows(file: Path, every: list[list[str]], choice: Choice) -> Track | Keypoints:
     if is_vicon(every):
         return load_vicon(file, every, choice)
     if is_motive(every):
@@ -66,9 +74,12 @@ def load_csv(file: Path, choice: Choice) -> Track | Keypoints:
     if keypoints and "frame_idx" in column:
         return _sleap(file, rows, column, keypoints, choice)
     raise InputError(
-        f"{file}: expected the columns t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), "
-        "SLEAP's frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
-        f"coords in the first lines; found {', '.join(rows[0][:6])[:80]}"
+        [
+            f"{file}: expected t, frame, point, x_m, y_m (or x_mm, y_mm; mxmm, mymm), SLEAP's "
+            "frame_idx and <keypoint>.x, <keypoint>.y, or DeepLabCut's scorer, bodyparts and "
+            f"coords; found {', '.join(rows[0][:6])[:80]}; add --columns MEANING=COLUMN",
+            *preview(rows),
+        ]
     )
 
 

@@ -323,7 +323,10 @@ ROWS = [
     ("gait repertoire run deep.json", "deep.json: not a plan (nested too deeply)"),
     ("robot import noise.bin -o r.toml", "noise.bin: is no XML: not well-formed"),
     ("robot import /dev/zero -o r.toml", "/dev/zero: is larger than the 16 MB that are read"),
-    ("world stereo a.png b.png --calibration deep.yml -o w.toml", "nested 99999 deep"),
+    (
+        "world stereo a.png b.png --calibration deep.yml -o w.toml",
+        "deep.yml: is damaged: its decoder",
+    ),
     ("gait repertoire play noise.bin", "noise.bin: not a repertoire"),
     ("gait repertoire play --speed nan", "--speed: must be a finite number (got nan)"),
     ("gait repertoire play --turn=-inf", "--turn: must be a finite number (got -inf)"),

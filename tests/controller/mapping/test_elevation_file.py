@@ -214,7 +214,7 @@ FAULTS = {
     "none.obj": (b"v 1 2 3\n", "holds no triangles|cannot be read"),
     "none.stl": (b"solid\n", "holds no triangles|cannot be read"),
     "none.glb": (b"glTF", "cannot be read"),
-    "four.xyz": (b"1 2\n3 4\n", "2 numbers a point"),
+    "four.xyz": (b"1 2\n3 4\n", "2 columns, without names"),
 }  # fmt: skip
 
 
@@ -303,7 +303,7 @@ def test_columns_named_as_degrees_are_degrees_in_any_order(tmp_path: Path, names
         found = read_elevation(tmp_path / name, MapOptions())
         np.testing.assert_allclose(found.size_m, SIZE_M, rtol=2e-3)
         assert found.facts["unit"].value == "deg"
-        assert found.facts["unit"].basis.startswith("the names of its columns, ")
+        assert found.facts["unit"].basis.startswith("the names of its columns")
 
 
 def test_small_scans_near_their_origin_are_metres(tmp_path: Path) -> None:

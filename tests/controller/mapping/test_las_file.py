@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.console import separate_reader
 from snakewalk.controller.console.pool import process_pool
 from snakewalk.controller.mapping import las_file
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
@@ -78,7 +79,7 @@ UTM = CRS.from_epsg(32632).to_wkt()
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read intact files here; the command and the broken files show the process of its own."""
-    monkeypatch.setattr(las_file, "run_child", lambda words: json.loads(child(words)))
+    monkeypatch.setattr(las_file, "read_separately", lambda file, _, *given: child(file, *given))
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -210,9 +211,9 @@ def test_the_command_reads_it_and_notes_what_it_left_out(tmp_path: Path) -> None
     assert "--classes 2;9: must be a whole number" in str(wrong.exception)
 
 
-def limited_child(words: str, memory_bytes: str) -> str:
-    resource.setrlimit(resource.RLIMIT_AS, (int(memory_bytes), int(memory_bytes)))
-    return child(words)
+def limited_child(words: tuple[str, ...], memory_bytes: int) -> str:
+    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
+    return separate_reader.child(*words)
 
 
 @pytest.fixture
@@ -221,11 +222,11 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     with ExitStack() as stack:
         pools: list[ProcessPoolExecutor] = []
 
-        def run_code(_code: str, words: str, memory_bytes: str, _cpu_s: str) -> SimpleNamespace:
+        def run_limited(_: str, *words: str, most: tuple[int, int]) -> SimpleNamespace:
             if not pools:
                 pools.append(stack.enter_context(process_pool(1)))
             try:
-                said = pools[0].submit(limited_child, words, memory_bytes).result()
+                said = pools[0].submit(limited_child, words, most[0]).result()
             except BrokenProcessPool:
                 pools.clear()
             except MemoryError:
@@ -234,7 +235,7 @@ def one_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
                 return SimpleNamespace(stdout=said)
             return SimpleNamespace(stdout="")
 
-        monkeypatch.setattr(las_file, "run_code", run_code)
+        monkeypatch.setattr(separate_reader, "run_limited", run_limited)
         yield
 
 
@@ -270,7 +271,7 @@ def test_broken_files_end_with_a_line(tmp_path: Path) -> None:
 def test_a_decoder_that_aborts_is_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     points, kinds = cloud()
     file = write(tmp_path / "a.laz", points, kinds, wkt=UTM)
-    monkeypatch.setattr(las_file, "_CHILD", "import os; os.abort()")
+    monkeypatch.setattr(separate_reader, "_CHILD", "import os; os.abort()")
     with pytest.raises(
         InputError, match=r"a\.laz: is damaged: its decoder gave up, or needed over"
     ):

@@ -305,10 +305,10 @@ def test_decimal_commas_are_read_where_commas_can_be_nothing_else(tmp_path: Path
     )
     assert notes == ["numbers have decimal commas"]
     file.write_text("1,25 2,5 3\n4,0 5,0 6,5\n")
-    np.testing.assert_array_equal(read_numbers(file), [[1.25, 2.5, 3.0], [4.0, 5.0, 6.5]])
+    np.testing.assert_array_equal(read_numbers(file, []), [[1.25, 2.5, 3.0], [4.0, 5.0, 6.5]])
     file.write_text("1,250;2,500\n3,000;4,125\n")
     with pytest.raises(InputError, match="'1,250' has a comma for decimals or for thousands"):
-        read_numbers(file)
+        read_numbers(file, [])
 
 
 def test_a_cell_that_is_no_number_is_named_by_row_and_column(tmp_path: Path) -> None:
@@ -317,10 +317,10 @@ def test_a_cell_that_is_no_number_is_named_by_row_and_column(tmp_path: Path) -> 
     with pytest.raises(
         InputError, match="line 5: column 2: expected a number or nothing, found 'five'"
     ):
-        read_numbers(file)
+        read_numbers(file, [])
     file.write_text("1,2,3\n4,5\n")
     with pytest.raises(InputError, match="line 2 holds 2 numbers, line 1 holds 3"):
-        read_numbers(file)
+        read_numbers(file, [])
 
 
 def pcd(file: Path, points: Any, width: int, height: int, viewpoint: str = "0 0 0 1 0 0 0") -> Path:

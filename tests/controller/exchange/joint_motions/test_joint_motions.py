@@ -1,6 +1,7 @@
 """Joint angles of CSV tables, ROS 2 bags and LeRobot datasets play on a robot's joints."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from snakewalk.controller.console.plugins import names
 from snakewalk.controller.exchange.joint_motions.ros_joints import motion_of_rows
 from snakewalk.controller.motion.joint_motion import joint_motion, onto_robot
 from snakewalk.controller.run.factory import prepare_playback
+from snakewalk.controller.run.request import RunRequest
+from snakewalk.controller.run.run_robot import check
 from tests.helpers.command import snakewalk
 
 ROBOT = load_robot("yaw16")
@@ -196,7 +199,9 @@ def test_joints_are_mapped_by_request_and_the_rest_is_reported() -> None:
     ):
         onto_robot(motion, ROBOT, {}, "a")
     asked = {name: f"m{k}" for k, name in enumerate(NAMES)} | {NAMES[3]: "rest"}
-    _, joints, lines = onto_robot(motion, ROBOT, asked, "a")
+    mapped = onto_robot(motion, ROBOT, asked, "a")
+    joints, lines = mapped.joint_rad, mapped.notes
+    assert mapped.names == tuple(asked.values())
     assert not joints[:, 3].any()
     np.testing.assert_array_equal(joints[:, 4], ANGLES[:, 4])
     assert lines[1] == "2 joints of the file are not used, 2 of them move: m3, m16"
@@ -211,9 +216,9 @@ def test_gaps_and_rows_without_a_value_are_counted() -> None:
     angles = ANGLES[kept].copy()
     angles[5, 2] = np.nan
     motion = joint_motion(Path("a"), TIME_S[kept], NAMES, angles, **STATED)
-    time_s, joints, (_, *notes) = onto_robot(motion, ROBOT, {}, "a")
-    assert len(time_s) == len(joints) == 50
-    assert notes == [
+    mapped = onto_robot(motion, ROBOT, {}, "a")
+    assert len(mapped.time_s) == len(mapped.joint_rad) == 50
+    assert list(mapped.notes[1:]) == [
         "1 of 51 rows lack a value and are left out",
         "10 rows are missing in 2 gaps of up to 0.5 s",
     ]
@@ -274,7 +279,7 @@ def test_names_of_one_stem_are_mapped_by_their_numbers(tmp_path: Path) -> None:
 def mapping(names: list[str], robot: str) -> str:
     """Return how joints of a file, one of which moves, are mapped onto a robot."""
     motion = joint_motion(Path("a.csv"), TIME_S, names, ANGLES, **STATED)
-    return onto_robot(motion, load_robot(robot), {}, "a.csv")[2][0]
+    return onto_robot(motion, load_robot(robot), {}, "a.csv").notes[0]
 
 
 def test_names_of_several_stems_are_mapped_by_their_numbers_within_the_robots_stems() -> None:
@@ -419,3 +424,25 @@ def test_damaged_files_of_each_reader_end_in_one_line(tmp_path: Path, seed: int)
                 faults = error.faults
             assert len(faults) == 1
         file.write_bytes(whole)
+
+
+def test_a_new_mapping_is_asked_about_once_before_it_moves_servos(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    table(file, ["time_s", *(f"m{k}_rad" for k in range(16))])
+    prepared = prepare_playback(str(file), robot="yaw16")
+    request = RunRequest(prepared, None, "./tty")
+    with pytest.raises(InputError) as asked:
+        check(request)
+    lines = asked.value.faults
+    assert re.fullmatch("head <=1==2=.*=16=> tail", lines[1])
+    assert lines[2] == "1: joint yaw_01 (ID 1): m0, -17° to 17°"
+    code = re.search("--mapping ([0-9a-f]{8}) --remember", lines[-1])
+    assert code is not None
+    file.with_name("a.csv.reading.toml").write_text(f'mapping = "{code[1]}"')
+    check(request)
+    check(RunRequest(prepare_playback(str(file), mapping=code[1], robot="yaw16"), None, "./tty"))
+    turned = {name: f"m{15 - k}" for k, name in enumerate(NAMES)}
+    another = prepare_playback(str(file), joints=turned, robot="yaw16")
+    with pytest.raises(InputError, match=r"a\.csv: check which joint"):
+        check(RunRequest(another, None, "./tty"))
+    check(RunRequest(another, None, None))

@@ -2,7 +2,6 @@
 
 import math
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -14,6 +13,7 @@ from typer.testing import CliRunner
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.cli.command_line import app
+from snakewalk.controller.console.child_process import run_limited
 from snakewalk.controller.exchange.robot_export import mjcf_text, urdf_text
 from snakewalk.controller.exchange.robot_import import model_compiler
 from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
@@ -460,10 +460,7 @@ def test_the_compiler_is_limited(tmp_path: Path) -> None:
     """The limits hold in a process of its own, as the command runs it."""
     (tmp_path / "m.xml").write_text("<mujoco><worldbody/></mujoco>")
     assert COMPILE(tmp_path / "m.xml", tmp_path / "m.mjb") is None
-    ended = subprocess.run(
-        [sys.executable, "-c", model_compiler._LIMITS + "bytearray(3_000_000_000)", "a", "b",
-         "2000000000", "10"], capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    ended = run_limited("bytearray(3_000_000_000)", most=(2_000_000_000, 10))
     assert "MemoryError" in ended.stderr
 
 

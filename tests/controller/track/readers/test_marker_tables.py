@@ -243,3 +243,15 @@ def write_in_space(path: Path, space: np.ndarray) -> None:
         kept = len(cells) - places.size
         lines[k] = separator.join([*cells[:kept], *(f"{value:.4f}" for value in places)])
     path.write_text("\n".join(lines) + "\n")
+
+
+def test_a_c3d_on_which_the_library_ends_its_process_is_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
+    from tests.foreign.tracks import c3d
+
+    file = c3d("mm", RATE_HZ)(tmp_path)
+    whole = file.read_bytes()
+    for size in (600, 805, 1000, len(whole) // 2):
+        file.write_bytes(whole[:size])
+        with pytest.raises(InputError, match=r"m\.c3d: .*copy or export it again"):
+            load_file(file)

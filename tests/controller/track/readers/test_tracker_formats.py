@@ -212,7 +212,7 @@ def test_matlab_before_and_since_version_7_3(old: bool, tmp_path: Path) -> None:
         load_file(tmp_path / "d.mat")
     data = (tmp_path / "a.mat").read_bytes()
     (tmp_path / "cut.mat").write_bytes(data[: len(data) // 3])
-    with pytest.raises(InputError, match=r"that can be read.*known: a CSV") as caught:
+    with pytest.raises(InputError, match=r"cut\.mat: (cannot be read|is no HDF5)") as caught:
         load_file(tmp_path / "cut.mat")
     assert len(caught.value.faults) == 1
 
