@@ -1,12 +1,14 @@
 """Behaviours of the live page in Chromium: widths, connections, tabs, reloads, colours, the end.
 
-One browser and one simulated run, which waits while a test looks. ``python -m
-pytest --collect-only`` of this file lists the behaviours.
+One browser and one simulated run, which waits while a test looks. Each test names the phase of the
+run that it needs; after a failed test, or in a later phase, another run begins. ``python -m pytest
+--collect-only`` of this file lists the behaviours.
 """
 
 import re
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,12 +22,13 @@ from tests.helpers.proxy import Proxied
 from tests.helpers.stepped_page import SteppedPage
 
 pytestmark = [
-    pytest.mark.nightly("49 looks at one page in a browser, which a busy computer delays"),
+    pytest.mark.nightly("48 looks at one page in a browser, which a busy computer delays"),
     IN_A_BROWSER,
 ]
 WIDTHS: Final = ((390, 844), (768, 1024), (1400, 900))
 SIZES: Final = pytest.mark.parametrize("size", WIDTHS, ids=[str(width) for width, _ in WIDTHS])
 CONFIRMED: Final = "stop requested"
+ENDED: Final = "the run has ended: stop requested by E-STOP of the page"
 NO_SCENE: Final = """
     for (const name of ["Arrays", "Elements", "ArraysInstanced", "ElementsInstanced"])
         WebGL2RenderingContext.prototype["draw" + name] = () => {};
@@ -33,6 +36,15 @@ NO_SCENE: Final = """
     window.requestAnimationFrame = (draw) => setTimeout(() => ask(draw), 100);
 """
 """The scene is not drawn: these tests look at the panels, on a computer without GPU."""
+
+
+PHASES: Final = ("waiting", "running", "pressed", "ended")
+"""Phases of a run in their order."""
+
+
+def during(phase: str) -> pytest.MarkDecorator:
+    """Mark a test that needs another phase than a running run."""
+    return pytest.mark.parametrize("stage", [phase], indirect=True)
 
 
 class Stage:
@@ -46,6 +58,39 @@ class Stage:
         self.context = browser.new_context(viewport={"width": 1400, "height": 900})
         self.context.add_init_script(NO_SCENE)
         self.tab = self.opened()
+        self.phase = 0
+
+    def reach(self, phase: int) -> None:
+        """Let the run come to a phase."""
+        steps: tuple[Callable[[], object], ...] = (self.begin, self.press, self.end)
+        for step in steps[self.phase : phase]:
+            step()
+        self.phase = phase
+
+    def begin(self) -> None:
+        self.run.start()
+        self.run.go(3.0)
+        self.tab.get_by_text("torque off at once, latched").wait_for()
+
+    def press(self) -> None:
+        self.tab.keyboard.press("Escape")
+        self.tab.get_by_text(CONFIRMED, exact=True).wait_for()
+
+    def end(self) -> Any:
+        """Let the run end, and return its result."""
+        finished = self.run.end()
+        self.tab.get_by_text(ENDED).wait_for()
+        return finished
+
+    def tidy(self) -> None:
+        """Leave one light tab of usual size, and a connection without faults."""
+        for tab in self.context.pages:
+            if tab is not self.tab:
+                tab.close()
+        self.tab.set_viewport_size({"width": 1400, "height": 900})
+        self.tab.emulate_media(color_scheme="light")
+        if 0 < self.phase < PHASES.index("ended"):
+            self.calm()
 
     def opened(self) -> Any:
         """Open the page in another tab of the same browser."""
@@ -82,7 +127,8 @@ class Stage:
 
     def close(self) -> None:
         self.proxy.go_on()
-        self.run.close()
+        with suppress(AssertionError):  # a run that a failed test left waiting
+            self.run.close()
         self.proxy.close()
         self.context.close()
 
@@ -108,33 +154,62 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def stage(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("stage")
-        patch.setenv("XDG_RUNTIME_DIR", str(folder))
-        staged = Stage(browser, folder)
-        yield staged
+def stages(browser: Any) -> Iterator[list[Stage]]:
+    """The run of the last test, if the next one may use it."""
+    kept: list[Stage] = []
+    yield kept
+    for staged in kept:
         staged.close()
+
+
+@pytest.fixture
+def stage(
+    stages: list[Stage],
+    browser: Any,
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Iterator[Stage]:
+    phase = PHASES.index(getattr(request, "param", "running"))
+    if stages and stages[0].phase > phase:
+        stages.pop().close()
+    if not stages:
+        folder = tmp_path_factory.mktemp("stage")
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("XDG_RUNTIME_DIR", str(folder))
+            stages.append(Stage(browser, folder))
+    failed = request.session.testsfailed
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", str(stages[0].run.folder.parent))
+        stages[0].reach(phase)
+        yield stages[0]
+    if request.session.testsfailed > failed:
+        stages.pop().close()
+    else:
+        stages[0].tidy()
 
 
 # before the run
 
 
+@during("waiting")
 def test_before_the_run_e_stop_is_off_and_the_page_says_that_it_waits(stage: Stage) -> None:
     stage.tab.get_by_text("waiting for the run").wait_for()
     assert stage.tab.get_by_role("button", name="E-STOP").is_disabled()
 
 
+@during("waiting")
 def test_before_the_run_no_settings_of_the_drawing_library_are_shown(stage: Stage) -> None:
     stage.tab.get_by_text("snakewalk", exact=True).wait_for()
     stage.tab.wait_for_timeout(500.0)
     assert not stage.tab.get_by_text("Dev Settings").is_visible()
 
 
+@during("waiting")
 def test_the_title_is_ours_from_the_start(stage: Stage) -> None:
     stage.tab.wait_for_function("document.title === 'snakewalk'")
 
 
+@during("waiting")
 def test_a_reload_before_the_run_waits_again(stage: Stage) -> None:
     stage.tab.reload()
     stage.tab.get_by_text("waiting for the run").wait_for()
@@ -143,9 +218,9 @@ def test_a_reload_before_the_run_waits_again(stage: Stage) -> None:
 # the run
 
 
+@during("waiting")
 def test_e_stop_can_be_pressed_when_the_run_begins(stage: Stage) -> None:
-    stage.run.start()
-    stage.run.go(3.0)
+    stage.reach(PHASES.index("running"))
     stage.tab.get_by_text("torque off at once, latched").wait_for()
     assert stage.tab.get_by_role("button", name="E-STOP").is_enabled()
 
@@ -402,13 +477,16 @@ def test_a_press_during_a_stall_is_not_confirmed_until_the_run_confirms_it(stage
     assert CONFIRMED not in stage.text("state")
     stage.proxy.go_on()
     stage.tab.get_by_text(CONFIRMED, exact=True).wait_for()
+    stage.phase = PHASES.index("pressed")
 
 
+@during("pressed")
 def test_a_reload_after_the_press_shows_it(stage: Stage) -> None:
     stage.tab.reload()
     stage.tab.get_by_text(CONFIRMED, exact=True).wait_for()
 
 
+@during("pressed")
 def test_a_second_press_and_a_press_in_a_second_tab_are_harmless(stage: Stage) -> None:
     other = stage.opened()
     other.get_by_text(CONFIRMED, exact=True).wait_for()
@@ -421,51 +499,55 @@ def test_a_second_press_and_a_press_in_a_second_tab_are_harmless(stage: Stage) -
 # the end
 
 
+@during("pressed")
 def test_the_run_ends_with_e_stop_and_every_tab_says_so(stage: Stage) -> None:
-    finished = stage.run.end()
+    finished = stage.end()
+    stage.phase = PHASES.index("ended")
     assert finished.outcome.tripped == "stop requested by E-STOP of the page"
     for tab in stage.context.pages:
-        tab.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+        tab.get_by_text(ENDED).wait_for()
         assert tab.get_by_role("button", name="E-STOP").is_disabled()
 
 
+@during("ended")
 def test_the_end_has_the_verdict_and_a_title(stage: Stage) -> None:
     stage.tab.wait_for_function(f"{ROOT}.querySelector('#verdict').textContent !== ''")
     assert stage.run.finished.verdict.text in stage.text("verdict")
     stage.tab.wait_for_function("document.title === 'snakewalk: the run has ended'")
 
 
+@during("ended")
 def test_the_end_has_no_banner(stage: Stage) -> None:
     stage.run.view.now_s += 60.0
     stage.tab.wait_for_timeout(1200.0)
     assert stage.tab.evaluate(NOT_OLD)
 
 
+@during("ended")
 def test_escape_after_the_end_does_nothing(stage: Stage) -> None:
     stage.tab.keyboard.press("Escape")
     stage.tab.wait_for_timeout(300.0)
     assert "the run has ended" in stage.text("state")
 
 
+@during("ended")
 def test_a_reload_after_the_end_shows_the_end(stage: Stage) -> None:
     stage.tab.reload()
-    stage.tab.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+    stage.tab.get_by_text(ENDED).wait_for()
     stage.tab.get_by_text("joint yaw_16 (ID 16)").wait_for()
     assert not stage.tab.get_by_text("Dev Settings").is_visible()
 
 
-def test_the_end_stays_when_the_server_is_gone(stage: Stage) -> None:
+@during("ended")
+def test_end_and_verdict_stay_when_the_server_is_gone_also_after_a_reload(stage: Stage) -> None:
     stage.tab.wait_for_function(f"{ROOT}.querySelector('#verdict').textContent !== ''")
     stage.tab.wait_for_function("caches.match('/end').then((kept) => kept !== undefined)")
     stage.run.view.close()
     stage.proxy.cut()
     stage.tab.wait_for_timeout(1500.0)
     assert "the run has ended" in stage.text("state")
-
-
-def test_a_reload_without_a_server_shows_end_and_verdict(stage: Stage) -> None:
     stage.tab.reload()
-    stage.tab.get_by_text("the run has ended: stop requested by E-STOP of the page").wait_for()
+    stage.tab.get_by_text(ENDED).wait_for()
     stage.tab.get_by_text(stage.run.finished.verdict.sentence).first.wait_for()
     assert stage.tab.title() == "snakewalk: the run has ended"
     stage.tab.emulate_media(color_scheme="dark")
