@@ -15,6 +15,7 @@ from typing import IO
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.child_process import start_module
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.console.plugins import without_collections
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.fallbacks import fallbacks_in_use
@@ -52,12 +53,12 @@ def loop_modules(package: str) -> list[str]:
     return modules
 
 
-def compile_with_progress(shares: tuple[tuple[str, ...], ...] = ALL) -> int:
-    """Compile loops like ``compile_loops``, with a progress bar."""
+def compile_with_progress(*, runs: bool) -> int:
+    """Compile all loops, or only those of ``runs``, with a progress bar; return their number."""
     with ProgressBar("compiling loops") as bar:
         return compile_loops(
-            lambda done, total, name: bar.update(done, total, note=name.rpartition(".")[2]),
-            shares,
+            lambda done, total, name: bar.update(done, total, note=name.split(".")[2]),
+            FOR_RUNS if runs else ALL,
         )
 
 
@@ -130,14 +131,16 @@ def _compile_share(packages: list[str]) -> None:
     for package in packages:
         for name in loop_modules(f"snakewalk.{package}"):
             try:
-                importlib.import_module(name)
+                with without_collections():
+                    importlib.import_module(name)
             except ModuleNotFoundError as error:
                 if (error.name or "").startswith("snakewalk"):
                     raise
                 # a package of an extra is not installed; its commands are not available either
             print("module", name, flush=True)
     if "sim" in packages:
-        _step_a_body()
+        with without_collections():
+            _step_a_body()
     for note in fallbacks_in_use():
         print("note", note, flush=True)
 

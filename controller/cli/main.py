@@ -54,10 +54,16 @@ _NOTICE_S = 3.0
 
 
 class CompilationNotice:
-    """Prints a line at the first compiled loop of a process, and then how many are compiled."""
+    """Prints a line at the first compiled loop of a process, and then how many are compiled.
 
-    def __init__(self, print_line: Callable[[str], None]) -> None:
+    ``compile_others`` is called at the second loop: a single one is quickly compiled.
+    """
+
+    def __init__(
+        self, print_line: Callable[[str], None], compile_others: Callable[[], None] | None = None
+    ) -> None:
         self._print_line, self._clock = print_line, WallClock()
+        self._compile_others = compile_others
         self._count = 0
         self._next_s = 0.0
 
@@ -70,6 +76,9 @@ class CompilationNotice:
                 "compiling loops for this computer, once; in advance: snakewalk tools compile"
             )
             self._next_s = now_s + _NOTICE_S
+        elif self._count == 2 and self._compile_others:
+            with suppress(RuntimeError, ImportError):  # else this process compiles them
+                self._compile_others()
         elif now_s >= self._next_s:
             self._print_line(f"compiled {self._count} loops; last: {loop}")
             self._next_s = now_s + _NOTICE_S
@@ -89,6 +98,7 @@ _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _STOP = "snakewalk.controller.bench.emergency_stop"
 """Name of the only command that must not wait for imports."""
+_COMPILER = "snakewalk.controller.bench.loop_compiler"
 _NO_MEMORY = "not enough memory; end other programs, or raise the limit (ulimit -v)"
 _TOO_MANY_FILES = "too many open files; raise the limit (ulimit -n 1024)"
 _INTERRUPTED = 130
@@ -113,7 +123,9 @@ def main() -> None:
             from snakewalk.controller.cli.command_line import app  # noqa: PLC0415  an interrupt may come during it
 
         _tell_of_pipes()
-        observe_compilation(CompilationNotice(_print_line))
+        observe_compilation(
+            CompilationNotice(_print_line, _compile_loops if is_run(sys.argv[1:]) else None)
+        )
         app(prog_name="snakewalk")
     except SystemExit as stop:
         if isinstance(stop.code, int) and stop.code > _BY_SIGNAL and stop.code != _INTERRUPTED:
@@ -181,6 +193,15 @@ def _stop_at_once(words: list[str]) -> None:
         code = import_module(_STOP).stop_now(words[1:])
         if code is not None:
             raise SystemExit(code)
+
+
+def is_run(words: list[str]) -> bool:
+    """Whether a command needs nearly all loops."""
+    return "run" in words[:2]
+
+
+def _compile_loops() -> None:
+    import_module(_COMPILER).compile_with_progress(runs=True)
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:

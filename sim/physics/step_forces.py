@@ -324,34 +324,22 @@ def _weigh(body: Body, contacts: Contacts, force_n: Floats) -> None:
 
 callable_in_loops(gauges)
 
-register_jitable(error_model="numpy", inline="always")(friction_force)
-
-register_jitable(error_model="numpy")(rub)
-
-register_jitable(error_model="numpy")(stop_share)
-
-register_jitable(error_model="numpy")(shaft_torque)
-
-register_jitable(error_model="numpy")(immersed)
-
-register_jitable(error_model="numpy")(add_water)
-
-register_jitable(error_model="numpy", inline="always")(_move)
-
-register_jitable(error_model="numpy", inline="always")(_collect)
-
-register_jitable(error_model="numpy")(_line_up)
-
-register_jitable(error_model="numpy")(_add_friction)
-
-register_jitable(error_model="numpy", inline="always")(_weigh)
-
-register_jitable(error_model="numpy")(has_friction)
-
-register_jitable(error_model="numpy")(_through_teeth)
-
-register_jitable(error_model="numpy")(_settle_teeth)
-
-register_jitable(error_model="numpy", inline="always")(apply_forces)
-
-register_jitable(error_model="numpy", inline="always")(settle)
+for _function in (
+    friction_force,
+    rub,
+    stop_share,
+    shaft_torque,
+    immersed,
+    add_water,
+    _move,
+    _collect,
+    _line_up,
+    _add_friction,
+    _weigh,
+    has_friction,
+    _through_teeth,
+    _settle_teeth,
+    apply_forces,
+    settle,
+):
+    register_jitable(error_model="numpy")(_function)

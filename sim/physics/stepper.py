@@ -46,10 +46,6 @@ from snakewalk.sim.physics.step_state import Contacts, Motors
 from snakewalk.sim.physics.tangent_planes import lay_planes
 from snakewalk.sim.plant import ServoDrive
 
-register_jitable(error_model="numpy")(make_lanes)
-
-register_jitable(error_model="numpy")(write_contacts)
-
 
 class Steps(Protocol):
     """Drive, friction and ``mj_step``, a number of times."""
@@ -182,11 +178,8 @@ def _run(steps: int, memory: NDArray[np.void]) -> float:
     return float(reals_at(m.time_at, (1,))[0])
 
 
-register_jitable(error_model="numpy")(_bellies_at)
-
-register_jitable(error_model="numpy")(_find_contacts)
-
-register_jitable(error_model="numpy")(_step1)
+for _function in (make_lanes, write_contacts, _bellies_at, _find_contacts, _step1):
+    register_jitable(error_model="numpy")(_function)
 
 run_steps = compiled_when_called(_run)
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.bench.loop_compiler import ALL, FOR_RUNS, compile_with_progress
+from snakewalk.controller.bench.loop_compiler import compile_with_progress
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Json, show
 
@@ -24,5 +24,5 @@ def compile_all(
     """Compile all loops once, after installation, so that no later command waits for it."""
     if importlib.util.find_spec("numba") is None:
         raise InputError("compile: numba is not installed, and loops run uncompiled")
-    count = compile_with_progress(FOR_RUNS if runs else ALL)
+    count = compile_with_progress(runs=runs)
     show({"compiled_loops": count}, as_json)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from snakewalk.config.extras import require_extra
-from snakewalk.controller.bench.loop_compiler import FOR_RUNS, compile_with_progress
+from snakewalk.controller.bench.loop_compiler import compile_with_progress
 from snakewalk.controller.console.child_process import run_command, start
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import VIEW_AT, ViewAt
@@ -51,4 +51,4 @@ def _compile_behind() -> None:
     """In a child: compile the loops of runs at a low priority."""
     if importlib.util.find_spec("numba") is not None:
         os.nice(_NICE)
-        compile_with_progress(FOR_RUNS)
+        compile_with_progress(runs=True)

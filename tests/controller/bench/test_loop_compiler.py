@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from snakewalk.controller.bench.loop_compiler import compile_loops, loop_modules
-from snakewalk.controller.cli.main import CompilationNotice
+from snakewalk.controller.cli.main import CompilationNotice, is_run
 from snakewalk.drivers.compilation import observe_compilation, report_compiled
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -85,3 +85,33 @@ def test_the_notice_is_one_line_and_then_progress(monkeypatch: pytest.MonkeyPatc
     report_compiled("f")
     assert "snakewalk tools compile" in lines[0]
     assert lines[1:] == ["compiled 3 loops; last: c", "compiled 5 loops; last: e"]
+
+
+def test_the_second_loop_of_a_run_has_the_others_compiled_in_children() -> None:
+    """A failed child leaves the loops to this process."""
+    calls: list[str] = []
+
+    def fail() -> None:
+        calls.append("children")
+        raise RuntimeError
+
+    notice = CompilationNotice(calls.append, fail)
+    for name in "abc":
+        notice(name)
+    assert calls[1:] == ["children"]
+
+
+@pytest.mark.parametrize(
+    ("words", "compiles"),
+    [
+        ("run", True),
+        ("run flat-slalom", True),
+        ("gait run rolling", True),
+        ("trials run", True),
+        ("gait list", False),
+        ("doctor --port /dev/ttyUSB0", False),
+        ("", False),
+    ],
+)
+def test_only_commands_that_run_compile_in_children(words: str, compiles: bool) -> None:
+    assert is_run(words.split()) is compiles
