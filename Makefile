@@ -11,7 +11,7 @@ STAMP := $(VENV)/.ready
 
 PYTEST := PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
-.PHONY: setup lock loops fallbacks run test lint types unit quick slow nightly docs bench campaign lerobot warp failures clean
+.PHONY: setup lock loops fallbacks run test lint types unit quick slow nightly pages docs bench campaign lerobot warp failures clean
 
 setup: $(STAMP)
 
@@ -71,6 +71,11 @@ nightly: loops
 	$(BIN)/python -m benchmarks.hard_walks --walks 200 --planted -o build/planted-walks.jsonl
 	$(BIN)/python -m tests.mutation
 	$(BIN)/python -m benchmarks
+
+# make pages     the commands of the pages, as printed; PAGES="feetech or robots" chooses some
+PAGES ?= docs
+pages: loops
+	$(PYTEST) -m "slow or not slow" tests/controller/cli/test_printed_commands.py -k "$(PAGES)"
 
 # make docs      the site, in build/docs; a link that leads nowhere inside it, or any other warning, is an error
 docs: setup

@@ -17,6 +17,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
+from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
 pytestmark = pytest.mark.slow
@@ -185,12 +186,21 @@ def test_a_wheel_holds_every_file_and_one_top_level_name(source: Path, wheel: Pa
     assert {name for name in names if ".dist-info/" not in name} == shipped(source)
 
 
-@pytest.mark.nightly("builds the wheel twice: 7 s of CPU")
+@pytest.mark.slow
 def test_a_wheel_built_from_the_sdist_is_the_same(
     source: Path, wheel: Path, tmp_path: Path
 ) -> None:
+    """Both state the same valid metadata, with the page that a package index shows."""
     sdist = build("sdist", source, tmp_path)
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        stated = Metadata.from_email(archive.read(name))
     with tarfile.open(sdist) as file:
+        inner = file.extractfile(f"snakewalk-{stated.version}/PKG-INFO")
+        assert inner is not None
+        in_sdist = Metadata.from_email(inner.read())
+        assert in_sdist.as_rfc822().as_bytes() == stated.as_rfc822().as_bytes()
+        assert (stated.description or "").startswith("# snakewalk")
         file.extractall(tmp_path / "unpacked", filter="data")
     (unpacked,) = (tmp_path / "unpacked").iterdir()
     (tmp_path / "again").mkdir()

@@ -8,7 +8,9 @@ They are run as printed, in this process, with a budget that the pages do not sh
 - a film is made by ``log report`` only, and a page without pictures;
 - of a study's runs the first one is made, in this process; of a graph's walks one; of actions the
   those of ``ACTIONS`` are recorded; a film of a crowd has two frames;
-- ``bus serve`` looks at its port a few times.
+- ``bus serve`` looks at its port a few times;
+- a command on one port finds the servos of its robot on a simulated line (``line_of``); ``--yes``
+  answers its questions.
 
 What a line takes from its reader, a film or a map, is a small one under the printed name. A line
 that stood on an earlier page, and reads nothing of its own page, is not run again: its files are
@@ -33,13 +35,21 @@ import pytest
 import rasterio
 from rasterio.transform import from_origin
 
+from snakewalk.config.loader import load_robot
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.corrections import Corrections
+from snakewalk.drivers.protocol.registers import baud_code
+from snakewalk.sim.feetech.servos import FeetechServos
+from snakewalk.sim.servo.bank import ServoBank
+from snakewalk.sim.servo.bench import BenchPlant
+from snakewalk.sim.servo.motor import measured_gearbox
+from snakewalk.sim.servo.protection import SupplyAndAmbient
 from tests.controller.exchange.robot_import.test_robot_import import SWIMMER
 from tests.docs.test_commands_in_pages import PAGES, ROOT, printed
 from tests.helpers.command import snakewalk
 from tests.helpers.in_process import work_in_this_process
+from tests.helpers.line_port import OpenedFeetechLine, OpenedLine, line_port
 from tests.oracles.rendered_snake import SnakeScene, film
 from tests.oracles.tracked_animal import table
 
@@ -47,24 +57,23 @@ MOTION_S = 0.2
 ACTIONS = {"forward-fast", "left-sharp", "right-sharp", "brake", "rest"}
 LOOKS = 5
 PENDULUM = "needs recordings of a pendulum: tests/controller/studies/identification"
-BUS = (
-    "needs a bus: run on a simulated line by tests/controller/bench (test_bus_commands and others)"
-)
+PORTS = "needs several ports: tests/controller/bench/test_two_makes_service.py and others"
+HANDS = "asks which joint moved: tests/controller/bench/test_chain_calibration.py"
+SENDER = "needs a sender of poses or a camera: tests/controller/pose, tests/controller/cameras"
+SEVERAL = "needs a film of several animals: tests/controller/capture/test_several_animals.py"
+PLACES = "needs photographs of a place: tests/controller/mapping/mosaic/test_walkthrough_command.py"
+PUBLISHED = "needs published keypoints: tests/controller/animals/fish/test_fish_command.py"
+FOREIGN = "needs a file of another program: tests/foreign"
+LISTENS = "listens until it is stopped: tests/controller/bench/test_bus_commands.py"
 FOUND = "needs what calibrate finds on a bus: tests/controller/bench/test_chain_calibration.py"
 SEARCH = "a search takes 18 whole runs at least: tests/controller/run/test_set.py"
 EPISODES = "takes hundreds of episodes: tests/controller/learning"
 NOT_RUN = {
-    "--port": BUS,
-    "bus scan": BUS,
-    "doctor": BUS,
-    "bus calibrate": BUS,
-    "bus set": BUS,
-    "bus inventory": BUS,
-    "bus blink": BUS,
-    "bus reboot": BUS,
-    "bus backup": BUS,
-    "bus restore": BUS,
-    "bus sniff /dev/ttyUSB0": BUS,
+    "bus calibrate": HANDS,
+    "bus pendulum": PENDULUM,
+    "pose calibrate": SENDER,
+    "pose camera": SENDER,
+    "bus sniff /dev/ttyUSB0": LISTENS,
     "stop": "would stop whatever runs on this machine: tests/controller/bench/test_stop.py",
     "--live": "needs keys of a terminal: tests/controller/run/test_gait_command.py",
     "--view": "serves a page until it is closed: tests/controller/view",
@@ -84,6 +93,26 @@ NOT_RUN = {
     "gait policy learn": EPISODES,
     "gait policy run mine.toml": EPISODES,
     "trials policy": "takes whole runs: tests/controller/studies/test_policy_trials.py",
+    "animal capture dish.avi": SEVERAL,
+    "animal track fish-1.npz": SEVERAL,
+    "animal track fish.csv": SEVERAL,
+    "animal body top.npz": "needs photographs: tests/controller/animals/mesh/test_photographs.py",
+    "animal people run --mesh": "needs a person's mesh: tests/controller/animals/test_people.py",
+    "animal fish match XMUC02_Trial1_sleap-1.csv": PUBLISHED,
+    "animal body eel": PUBLISHED,
+    "--tongue": "needs a table of a tongue: tests/controller/animals/synthesis/test_tongue.py",
+    "world walkthrough": PLACES,
+    "run ravine-run.toml": PLACES,
+    "bus sniff exchange.jsonl --model": "needs an exchange with these servos: tests/sim/sniff",
+    "gait repertoire play": "needs all actions: tests/controller/repertoire/test_schedule.py",
+    "trials tasks": "makes whole runs: tests/controller/rehearsal/test_tasks.py",
+    "play angles.csv": FOREIGN,
+    "robot import snake.urdf -o snake.toml --assume": FOREIGN,
+    "animal track markers.c3d": FOREIGN,
+    "log report run/log.mcap.part": FOREIGN,
+    "world from dem.tif --spacing 0.05": FOREIGN,
+    "--console": "needs keys of a terminal: tests/sim/serve/test_bus_commands.py",
+    "--backend": "needs the extra warp: make warp",
     "--dask": "needs a cluster: tests/controller/studies/test_pool.py",
     "world stereo": "needs a calibrated pair: test_terrain_command.py",
     "--map": "looks through two cameras: tests/controller/run/test_stereo_head.py",
@@ -94,6 +123,19 @@ NOT_RUN = {
     "log judge": "needs a served run: tests/controller/rehearsal",
 }
 """Command, or option, and why no line with it is run here."""
+
+DEVICES = {"/dev/ttyUSB0", "/tmp/ttySnake", "./bus", "./tty"}
+"""Ports of the pages that are replaced by a simulated line; ``why_not`` names the others."""
+ON_A_PORT = (
+    "doctor",
+    *(
+        f"bus {verb}"
+        for verb in ("scan", "set", "inventory", "blink", "reboot", "backup", "restore")
+    ),
+)
+"""Commands that use the only adapter if ``--port`` is left out."""
+GRADED = 1
+"""Exit code of ``doctor`` if it names a fault."""
 
 LINES = [(page, line) for page in PAGES for line in printed(page)]
 
@@ -208,7 +250,7 @@ def _scene(frames: int) -> SnakeScene:
 
 def _film(to: Path) -> None:
     writer = cv2.VideoWriter(str(to), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (200, 160))
-    for frame in film(_scene(8)):
+    for frame in film(_scene(9)):
         writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
     writer.release()
 
@@ -319,6 +361,7 @@ PLACEHOLDERS = {
     "LOG": "printed.mcap",
     "FILE": "midlines.csv",
     "RUN": "flat-slalom",
+    "NAME": "yaw16",
 }
 """What a reader puts in the place of a word in capitals."""
 
@@ -337,6 +380,13 @@ STAND_INS: dict[str, Callable[[Path], object]] = {
     "heights.png": _heights,
     "my-run.toml": _initial("run.toml"),
     "my-robot.toml": _initial("robot.toml"),
+    "mine.toml": _initial("robot.toml"),
+    "my-xl430.toml": _initial("robot.toml"),
+    "my-climb.toml": _initial("run.toml"),
+    "found.toml": _initial("world.toml"),
+    "faults.toml": lambda to: to.write_text('[[fault]]\nkind = "unplug"\nbehind = 8\nat_s = 5.0\n'),
+    "long.avi": _film,
+    "docs/validation.md": lambda to: to.parent.mkdir(),
     "mine.obj": _ran("animal body worm-like -o"),
     "snake.urdf": _ran("robot export yaw16 --urdf"),
     "track-corrections.json": _corrections,
@@ -365,6 +415,12 @@ def commands_of(line: str) -> list[list[str]]:
 def why_not(words: Sequence[str]) -> str | None:
     """Why a command is not run here."""
     text = " ".join(words)
+    if "/dev/ttyUSB1" in text:
+        return PORTS
+    if "--port" in words and words[words.index("--port") + 1] not in DEVICES:
+        return PORTS
+    if "--pose" in words and "--port" in words:
+        return SENDER
     for name, reason in NOT_RUN.items():
         if name in words if name.startswith("-") else f"{text} ".startswith(f"{name} "):
             return reason
@@ -372,7 +428,7 @@ def why_not(words: Sequence[str]) -> str | None:
 
 
 def _put_what_it_reads(words: Sequence[str], page: Path) -> None:
-    given = [word for before, word in pairwise(words) if before not in {"-o", "--out"}]
+    given = [word for before, word in pairwise(words) if before not in {"-o", "--out", "--record"}]
     for word in given:
         if Path(word).exists():
             continue
@@ -382,6 +438,43 @@ def _put_what_it_reads(words: Sequence[str], page: Path) -> None:
             blocks = re.findall(r"^```toml\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
             if len(blocks) == 1:
                 Path(word).write_text(blocks[0], "utf-8")
+
+
+def line_of(words: Sequence[str], page: Path) -> OpenedLine | OpenedFeetechLine:
+    """Return a line with the servos of the robot that a command or its page names."""
+    name = "sts3215-12" if page.stem == "feetech" else "yaw16"
+    if "my-run.toml" in words:
+        name = "printed12"
+    robot = load_robot(words[words.index("--robot") + 1] if "--robot" in words else name)
+    baud = int(words[words.index("--baud") + 1]) if "--baud" in words else robot.servo.baud
+    ids, records = robot.servo_ids, robot.servo_records
+    if words[:2] == ["bus", "set"]:  # the reader has unplugged the others
+        ids, records = (int(words[words.index("--id") + 1]),), records[:1]
+    gears = [measured_gearbox(facts) for facts in records]
+    plant = BenchPlant(len(records), gear=gears)
+    if records[0].is_feetech:
+        servos = FeetechServos(ids, plant, records[0], robot.servo.supply_v)
+        for row in range(len(servos)):
+            servos["Baud Rate"][row] = baud_code(records[0], baud)
+            servos.registers.store(row, "Baud Rate")
+        return OpenedFeetechLine(servos, None, baud)
+    bank = ServoBank(ids, records, baud)
+    bank["Return Delay Time"][:] = 0
+    around = SupplyAndAmbient(supply_v=robot.servo.supply_v)
+    return OpenedLine(bank, plant, supply_and_ambient=around)
+
+
+def _run_on_a_line(words: Sequence[str], page: Path) -> str | None:
+    """Run a command on a simulated line; return what is wrong."""
+    with line_port(line_of(words, page)) as device:
+        given = [device if word in DEVICES else word for word in words]
+        if "--port" not in words:
+            given += ["--port", device]
+        if words[1] in {"set", "reboot", "restore"} and "--dry-run" not in words:
+            given.append("--yes")
+        done = snakewalk(*given)
+    most = GRADED if words[0] == "doctor" or "run" in words else 0
+    return None if done.returncode <= most else f"{shlex.join(words)}: {done.stderr}{done.stdout}"
 
 
 def _files() -> set[str]:
@@ -449,6 +542,9 @@ def test_the_commands_of_a_page_run(
             if why_not(words) is not None:
                 continue
             _put_what_it_reads(words, page)
+            if "--port" in words or shlex.join(words[:2]).startswith(ON_A_PORT):
+                wrong.append(_run_on_a_line(words, page))
+                continue
             paths = [path for word in words for path in sorted(glob(word)) or [word]]
             wrong.append(_run(paths, budget, left))
     assert [one for one in wrong if one is not None] == []
