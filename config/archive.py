@@ -220,6 +220,8 @@ def read_arrays(
         ValueError: it is not an .npz of plain arrays, or is damaged.
 
     """
+    if file.exists() and not file.is_file():  # the end of a device is searched for ever
+        raise InputError(why_no_file(file))
     try:
         with zipfile.ZipFile(file) as archive:
             members = {

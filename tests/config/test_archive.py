@@ -197,6 +197,8 @@ def test_what_would_expand_too_far_is_refused_before_it_is_unpacked(
 def test_what_has_no_end_is_not_read_to_it() -> None:
     with pytest.raises(InputError, match=r"/dev/zero: is larger than the 1 MB that are read"):
         read_bytes(Path("/dev/zero"), 1_000_000)
+    with pytest.raises(InputError, match=r"/dev/zero: is a pipe or a device"):
+        read_arrays(Path("/dev/zero"))
 
 
 @pytest.mark.parametrize(
