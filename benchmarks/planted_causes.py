@@ -83,8 +83,8 @@ def _goals(change: Callable[[Any], None], line: Any, servo: int) -> None:
     change(line)
 
 
-SEEDS, SOUND_BUSES = range(18, 24), 500
-"""Seeds 0 to 17 served the development of the rules."""
+SEEDS, SOUND_BUSES = range(24, 30), 500
+"""Seeds 0 to 23 served the development of the rules."""
 WRITES, OFF = "another program writes to it", "another program has switched it off"
 KINDS = (
     Kind("rebooted", f"{SDK}283", "it has rebooted", _of("reboot")),

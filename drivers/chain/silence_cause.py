@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from snakewalk.config.robot import RobotConfig
 from snakewalk.drivers.bus.chain_bus import ChainBus
+from snakewalk.drivers.bus.pending_replies import HORIZON_S
 from snakewalk.drivers.bus.probe import Probe
 from snakewalk.drivers.port.byte_port import BytePort, is_url
 from snakewalk.drivers.port.port_holders import holders_of
@@ -30,6 +31,8 @@ def silence_cause(bus: ChainBus, robot: RobotConfig, silent: Sequence[int]) -> s
         parts = [(bus.part_of(ids[j]), ids[j]) for j in joints[:_ASKED]]
         return [part.probe(servo_id, part.differing) for part, servo_id in parts]
 
+    for part in bus.parts:
+        part.port.drain_until_quiet(HORIZON_S)  # late replies to earlier requests
     if any(probe.damaged for probe in probes(others)):
         return "other replies are damaged too: noise on the line"
     asked = probes(silent)
@@ -39,11 +42,11 @@ def silence_cause(bus: ChainBus, robot: RobotConfig, silent: Sequence[int]) -> s
     if worst.damaged:
         return f"only replies of {name} are damaged: two servos with its ID"
     least_s = min((min(p.late_s) for p in asked if p.answered), default=None)
-    if least_s is not None and least_s > part.latency_s:
+    if least_s is not None:
+        if least_s <= part.latency_s:
+            return "it replies again: a loose contact"
         where = "network" if is_url(part.port.name) else "adapter"
         return f"each reply is at least {1e3 * least_s:.0f} ms late: high latency of the {where}"
-    if least_s is not None:
-        return "it replies again: a loose contact"
     if part.find([worst.servo_id]):
         return f"{name} answers pings, but no reads: its Status Return Level"
     if not others:
