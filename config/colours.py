@@ -52,8 +52,8 @@ FAULT = RED
 
 CENTRE = BLUE
 """Colour of the track of the body's centre."""
-HEAD = SKY
-"""Colour of the track of the head."""
+HEAD = PURPLE
+"""Colour of the head, and of its track."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
