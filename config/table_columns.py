@@ -7,6 +7,7 @@ from pydantic import Field
 
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
+from snakewalk.config.text_table import is_number
 
 _MOST_HEAD_LINES = 100
 _SHOWN_ROWS, _SHOWN_COLUMNS = 4, 30
@@ -45,7 +46,7 @@ def with_meanings(
         wrong = [name for name in stated if name not in numbers]
         if wrong:
             raise InputError([f"{file}: --columns: it has no column {wrong[0]}", *preview(rows)])
-        head = -1 if all(map(_is_number, names)) else 0
+        head = -1 if all(map(is_number, names)) else 0
         places = [numbers.index(name) for name in stated]
     else:
         places = [names.index(name) for name in stated]
@@ -67,11 +68,3 @@ def preview(rows: Sequence[list[str]], meanings: Mapping[int, str] | None = None
         shown = ", ".join(row[k].strip() for row in first if row[k:])
         lines.append(f"column {k + 1}{meaning}: {shown}")
     return lines
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return not cell
-    return True

@@ -75,6 +75,15 @@ def has_decimal_commas(file: Path, rows: Iterable[list[str]]) -> bool:
     return bool(cells)
 
 
+def is_number(cell: str, comma: bool = False) -> bool:
+    """Whether a cell is a number, also one with a decimal comma, or stands for none."""
+    try:
+        float(cell.replace(",", ".") if comma else cell)
+    except ValueError:
+        return cell.lower() in MISSING
+    return True
+
+
 def numbers_of(
     file: Path, rows: Iterable[Sequence[str]], names: Sequence[str], lines: Iterable[int]
 ) -> Floats:

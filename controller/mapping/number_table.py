@@ -9,8 +9,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.table_columns import with_meanings
 from snakewalk.config.text_table import (
     DECIMAL_COMMA,
-    MISSING,
     has_decimal_commas,
+    is_number,
     numbers_of,
     read_lines,
 )
@@ -46,7 +46,7 @@ def read_numbers(
         named = [cells[: len(chosen)] for cells in named]
         rows = list(zip([0, *(n for n, _ in rows[-len(named) + 1 :])], named, strict=True))
     comma = mark != "," and has_decimal_commas(file, [cells for _, cells in rows])
-    if not all(_is_number(cell, comma) for cell in rows[0][1]):
+    if not all(is_number(cell, comma) for cell in rows[0][1]):
         if names is not None:
             names += rows[0][1]
         rows = rows[1:]
@@ -69,7 +69,7 @@ def _separator(lines: list[str]) -> str | None:
     if any("," in line for line in first):
         words = next(line for line in reversed(first) if "," in line).split()
         decimal = len(words) > 1 and all(
-            DECIMAL_COMMA.fullmatch(word) or _is_number(word, False) for word in words
+            DECIMAL_COMMA.fullmatch(word) or is_number(word) for word in words
         )
         return None if decimal else ","
     return None
@@ -84,11 +84,3 @@ def _uneven(file: Path, rows: list[tuple[int, list[str]]], widths: set[int]) -> 
         f"{file}: line {line} holds {count} numbers, line {rows[0][0]} holds {first}; all need as "
         "many"
     )
-
-
-def _is_number(cell: str, comma: bool) -> bool:
-    try:
-        float(cell.replace(",", ".") if comma else cell)
-    except ValueError:
-        return cell.lower() in MISSING
-    return True

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.reading import texts
 from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
 from snakewalk.controller.animals.legged.views import VIEWS
 from snakewalk.controller.console import completion
@@ -86,4 +87,5 @@ def stride(
             measured.stride, picture, f"{keypoints.name}: {measured.stride.cycles:.1f} cycles"
         )
     files = {"animal": str(output), "picture": None if picture is None else str(picture)}
-    show(measured.facts() | files, as_json)
+    about = {"facts": texts(keypoints_of_film.facts), "notes": list(keypoints_of_film.notes)}
+    show(measured.facts() | files | about, as_json)

@@ -158,6 +158,7 @@ def test_from_a_tracker_s_table_to_a_walk_on_hills(tmp_path: Path) -> None:
     ]
     done = snakewalk(*words)
     assert done.returncode == 0, done.stderr
+    assert "stated by you: --rate" in " ".join(done.stdout.split())
     assert (tmp_path / "fit.png").stat().st_size > 10_000
     mine = load(tmp_path / "mine.toml", AnimalConfig)
     assert mine.speed_m_s == pytest.approx(lizard.speed_m_s, rel=0.02)
