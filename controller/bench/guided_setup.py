@@ -179,6 +179,8 @@ class GuidedSetup:
             if answer.startswith("s"):
                 self._skip(step)
                 break
+            if answer not in ("", "y"):
+                continue
             code = self._run(words)
             if code in (0, _DEAD_RECKONED):
                 break

@@ -75,13 +75,14 @@ class CompilationNotice:
             self._print_line(
                 "compiling loops for this computer, once; in advance: snakewalk tools compile"
             )
-            self._next_s = now_s + _NOTICE_S
         elif self._count == 2 and self._compile_others:
             with suppress(RuntimeError, ImportError):  # else this process compiles them
                 self._compile_others()
         elif now_s >= self._next_s:
             self._print_line(f"compiled {self._count} loops; last: {loop}")
-            self._next_s = now_s + _NOTICE_S
+        else:
+            return
+        self._next_s = now_s + _NOTICE_S
 
 
 _ENDING = tuple(

@@ -72,6 +72,12 @@ def test_it_leads_from_the_bus_to_a_motion(
     assert bench.sets_up() == []  # all of it is done
 
 
+def test_an_answer_that_is_none_of_the_letters_runs_nothing(bench: Bench) -> None:
+    with pytest.raises(SystemExit):
+        bench.sets_up("yp", "ypypyp", "1", "q")
+    assert bench.ran == []
+
+
 def test_it_stops_at_any_question_and_goes_on_there(bench: Bench) -> None:
     with pytest.raises(SystemExit) as stop:
         bench.sets_up("", "", "", "q")

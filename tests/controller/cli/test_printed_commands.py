@@ -111,6 +111,7 @@ NOT_RUN = {
     "animal track markers.c3d": FOREIGN,
     "log report run/log.mcap.part": FOREIGN,
     "world from dem.tif --spacing 0.05": FOREIGN,
+    "--virtual-time": "serves another process: tests/sim/serve/test_virtual_time.py",
     "--console": "needs keys of a terminal: tests/sim/serve/test_bus_commands.py",
     "--backend": "needs the extra warp: make warp",
     "--dask": "needs a cluster: tests/controller/studies/test_pool.py",
