@@ -334,7 +334,7 @@ def planted_table() -> str:
         own = Counter(found.values())
         counts += own
         misses += [
-            f"- {kind.name}, {make}, seed {seed}: {said[make, seed]}"
+            f"- {kind.name}, {make}, seed {seed}: {said[make, seed].rpartition(': ')[2]}"
             for (make, seed), how in found.items()
             if how == "missed"
         ]
@@ -346,13 +346,13 @@ def planted_table() -> str:
     total = counts.total()
     lines = [
         f"{total} runs, seeds {SEEDS[0]} to {SEEDS[-1]}: "
-        + ", ".join(f"{how} {counts[how]} ({counts[how] / total:.0%})" for how in VERDICTS)
+        + ", ".join(f"{how} {counts[how]} ({counts[how] / total:.0%})" for how in [*counts])
         + ".",
         "",
         f"| cause | servos | {' | '.join(VERDICTS)} |",
         "| --- | --- | ---: | ---: | ---: | ---: |",
         *rows,
-        *(["", "What the runs said that missed it:", "", *misses] if misses else []),
+        *(["", "Missed:", "", *misses] if misses else []),
     ]
     return "\n".join(lines)
 
