@@ -63,13 +63,13 @@ def compile_with_progress(*, runs: bool) -> int:
 
 
 def compile_loops(
-    on_module: Callable[[int, int, str], None], shares: tuple[tuple[str, ...], ...] = ALL
+    on_module: Callable[[int, int, str], None], shares: tuple[tuple[str, ...], ...]
 ) -> int:
     """Compile loops and return the number that was not in the cache.
 
     Args:
         on_module: called with the number of finished modules, their total, and a name.
-        shares: packages of each child process; by default those of all loops.
+        shares: packages of each child process.
 
     Raises:
         RuntimeError: a child failed; its output is above.

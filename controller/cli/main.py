@@ -76,7 +76,7 @@ class CompilationNotice:
                 "compiling loops for this computer, once; in advance: snakewalk tools compile"
             )
         elif self._count == 2 and self._compile_others:
-            with suppress(RuntimeError, ImportError):  # else this process compiles them
+            with suppress(RuntimeError):  # else this process compiles them
                 self._compile_others()
         elif now_s >= self._next_s:
             self._print_line(f"compiled {self._count} loops; last: {loop}")
@@ -99,7 +99,6 @@ _BY_SIGNAL = 128
 """Exit code of a program that a signal has ended: this, and the signal's number."""
 _STOP = "snakewalk.controller.bench.emergency_stop"
 """Name of the only command that must not wait for imports."""
-_COMPILER = "snakewalk.controller.bench.loop_compiler"
 _NO_MEMORY = "not enough memory; end other programs, or raise the limit (ulimit -v)"
 _TOO_MANY_FILES = "too many open files; raise the limit (ulimit -n 1024)"
 _INTERRUPTED = 130
@@ -202,7 +201,7 @@ def is_run(words: list[str]) -> bool:
 
 
 def _compile_loops() -> None:
-    import_module(_COMPILER).compile_with_progress(runs=True)
+    import_module("snakewalk.controller.bench.loop_compiler").compile_with_progress(runs=True)
 
 
 def _unwind(number: int, frame: FrameType | None) -> None:

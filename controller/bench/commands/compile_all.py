@@ -24,5 +24,4 @@ def compile_all(
     """Compile all loops once, after installation, so that no later command waits for it."""
     if importlib.util.find_spec("numba") is None:
         raise InputError("compile: numba is not installed, and loops run uncompiled")
-    count = compile_with_progress(runs=runs)
-    show({"compiled_loops": count}, as_json)
+    show({"compiled_loops": compile_with_progress(runs=runs)}, as_json)

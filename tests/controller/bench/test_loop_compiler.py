@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from snakewalk.controller.bench.loop_compiler import compile_loops, loop_modules
+from snakewalk.controller.bench.loop_compiler import ALL, compile_loops, loop_modules
 from snakewalk.controller.cli.main import CompilationNotice, is_run
 from snakewalk.drivers.compilation import observe_compilation, report_compiled
 
@@ -51,7 +51,7 @@ def test_a_failed_child_is_reported_and_a_note_of_both_once(
     child.chmod(0o700)
     monkeypatch.setattr(sys, "executable", str(child))
     with pytest.raises(RuntimeError, match="not compiled"):
-        compile_loops(lambda done, total, name: None)
+        compile_loops(lambda done, total, name: None, ALL)
     assert caplog.messages == ["loops are stored elsewhere"]
 
 
