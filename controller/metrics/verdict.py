@@ -10,6 +10,9 @@ from snakewalk.controller.runlog.record import RunRecord
 
 NOT_MEASURED = 3
 """Exit code of a run that ended as planned, but whose arrival nothing measured."""
+MOST_RADII = 4.0
+"""Accuracy over the radius of a waypoint beyond which no arrival is shown (ours): sound sources
+are below 3."""
 _EXIT_MISSED = 1
 """Exit code of a run that safety stopped, or that missed a waypoint."""
 _SIMULATED_BACKEND = "sim"
@@ -90,6 +93,8 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
     """
     exit_code = 0
     cause = None
+    radius_m = record.header.plan.waypoint_radius_m
+    sd_m = (numbers.is_measured and numbers.pose_position_sd_m) or 0.0
     more = ""
     fault = None
     if numbers.trip is not None or _reached_count(numbers) < numbers.waypoints:
@@ -109,6 +114,12 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
             "check the source"
         )
         more = "snakewalk pose check {pose}" + " --run {run}" * (numbers.waypoints > 0)
+    elif numbers.waypoints and sd_m > MOST_RADII * radius_m:
+        exit_code = NOT_MEASURED
+        cause = (
+            f"the pose of {numbers.pose_source} states an accuracy of {sd_m:.2g} m, and a waypoint "
+            f"has a radius of {radius_m:g} m: the arrival is not shown; improve the source"
+        )
     elif numbers.waypoints and not numbers.is_measured:
         exit_code = NOT_MEASURED
         cause = (

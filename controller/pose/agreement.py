@@ -164,6 +164,9 @@ class Agreement:
         share = float(turns @ expected / (expected @ expected))
         related = float(expected @ turns) / _size(expected, turns)
         off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(predicted_rad))
+        # a delay that is not known yet moves the heading by the rate of turning
+        rate_rad_s = np.gradient(np.unwrap(predicted_rad), times)
+        off_rad -= _fitted(off_rad, np.column_stack([line, rate_rad_s]))[2] * rate_rad_s
         means_rad = np.convolve(off_rad, np.full(STEP_ROWS, 1.0 / STEP_ROWS), "valid")
         step_rad = float(np.abs(means_rad[STEP_ROWS:] - means_rad[:-STEP_ROWS]).max())
         if self._is_level and step_rad > STEP_RAD:
@@ -256,5 +259,9 @@ def _size(a: Floats, b: Floats) -> float:
 
 def _detrended_values(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
-    fit = np.linalg.lstsq(line, values, rcond=None)[0]
-    return values - line @ fit
+    return np.asarray(values - line @ _fitted(values, line))
+
+
+def _fitted(values: Floats, columns: Floats) -> Floats:
+    """Return the coefficients (c,) of columns (n, c) that fit values (n,) best."""
+    return np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0])

@@ -93,6 +93,8 @@ def test_the_evidence(record: RunRecord, changes: dict[str, Any], evidence: str)
     ("changes", "exit_code", "next_command"),
     [
         ({}, 0, None),
+        ({"pose_source": "udp", "pose_position_sd_m": 0.9}, 0, None),
+        ({"pose_source": "udp", "pose_position_sd_m": 1.3}, NOT_MEASURED, None),
         ({"trip": "heat"}, 1, "snakewalk log report a.mcap"),
         ({"trip": "heat", "backend": "/dev/x"}, 1, "snakewalk doctor --port /dev/x"),
         (DEAD_RECKONED, NOT_MEASURED, None),

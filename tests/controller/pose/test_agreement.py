@@ -142,6 +142,19 @@ def test_a_small_error_of_scale_is_stated_as_accuracy() -> None:
     assert checked(seconds=3.0).scale_sd == 0.05, "before anything was compared"
 
 
+def test_a_delay_is_no_step_of_the_heading_and_a_step_is_one() -> None:
+    """The heading that is seen is that of 0.1 s before, while the delay is not known yet."""
+
+    def seen(time_s: float, delay_s: float, step_rad: float) -> np.ndarray:
+        phase = 2.0 * np.pi * 0.4 * (time_s - delay_s)
+        return turned(0.3 + 0.5 * np.sin(phase) + step_rad * (time_s > 6.0))
+
+    late = checked(lambda t, at_m, axes: (at_m, seen(t, 0.1, 0.0)))
+    assert late.step_rad == 0.0
+    stepped = checked(lambda t, at_m, axes: (at_m, seen(t, 0.1, 0.25)))
+    assert stepped.step_rad == pytest.approx(0.25, abs=0.08)
+
+
 def test_a_body_that_was_moved_begins_again() -> None:
     check = checked(FAULTS["identity"][0], seconds=DOUBT_S + 3.0)
     assert check.fault is not None
