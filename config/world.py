@@ -372,7 +372,7 @@ class CorridorObstacle(_StandingObstacle):
         middle_m = 0.5 * (self.width_m + WALL_M)
         across_m = np.abs(np.abs(np.subtract(y_m, self.at_m[1])) - middle_m) - 0.5 * WALL_M
         outside_m = np.hypot(np.maximum(along_m, 0.0), np.maximum(across_m, 0.0))
-        return np.asarray(outside_m + np.minimum(np.maximum(along_m, across_m), 0.0))
+        return outside_m + np.minimum(np.maximum(along_m, across_m), 0.0)
 
 
 class PlannerConfig(Strict):

@@ -215,7 +215,7 @@ class CameraPose:
 
 
 def _turned_point(point: Floats, by_rad: float) -> Floats:
-    return np.asarray(about_up(by_rad)[:2, :2] @ point[:2])
+    return about_up(by_rad)[:2, :2] @ point[:2]
 
 
 def _in_world(frame: Floats, place: Floats) -> Floats:

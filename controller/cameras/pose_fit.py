@@ -119,7 +119,7 @@ def _covariance(links: Floats, ahead: Floats, weight: Floats, error_m: float) ->
     error_m = max(error_m, 0.5 * _BLUR_M)
     turn = 12.0 * _COMMON_ERROR / float(np.square(links[-1] - links[0]).sum() + 1e-9)
     least = error_m * error_m * np.diag([_COMMON_ERROR, _COMMON_ERROR, turn])
-    return np.asarray(error_m * error_m * np.linalg.inv(matrix.T @ matrix)[:3, :3] + least)
+    return error_m * error_m * np.linalg.inv(matrix.T @ matrix)[:3, :3] + least
 
 
 def _rigid(links: Floats, line: Floats, weight: Floats) -> tuple[Floats, Floats]:

@@ -81,4 +81,4 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
 def _deviation(values: Floats, least: float) -> Floats:
     """Deviation from the median; an outlier is beyond 1 or -1."""
     off = values / np.median(values) - 1.0
-    return np.asarray(off / max(least, _SPREADS * 1.4826 * float(np.median(np.abs(off)))))
+    return off / max(least, _SPREADS * 1.4826 * float(np.median(np.abs(off))))

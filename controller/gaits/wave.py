@@ -49,7 +49,7 @@ def travelling(
 ) -> Floats:
     """(T, n) ``sin(phase + lead - 2 pi waves s)``: runs from head to tail as the phase grows."""
     phase_by_place = TURN * waves * places(robot, joints)
-    return np.asarray(np.sin(phase_rad[:, None] + lead_rad - phase_by_place))
+    return np.sin(phase_rad[:, None] + lead_rad - phase_by_place)
 
 
 def bends_rad(robot: "RobotConfig", joints: tuple[int, ...], headings_rad: Floats) -> Floats:

@@ -33,12 +33,12 @@ class Ramp:
 
     def at(self, time_s: float) -> Floats:
         """Joint angles (J,) after ``time_s``; the goal from ``duration_s`` on."""
-        return np.asarray(self._start + quintic(self._share(time_s)) * (self._goal - self._start))
+        return self._start + quintic(self._share(time_s)) * (self._goal - self._start)
 
     def velocity_rad_s(self, time_s: float) -> Floats:
         """Joint speeds (J,) after ``time_s``, of a ramp with a duration."""
         rate = quintic_slope(self._share(time_s)) / self.duration_s
-        return np.asarray(rate * (self._goal - self._start))
+        return rate * (self._goal - self._start)
 
     def peaks(self) -> tuple[Floats, Floats]:
         """Largest speeds and accelerations (J,), of a ramp with a duration."""

@@ -9,7 +9,7 @@ from snakewalk.drivers.compiling import compiled, readonly_array
 
 def wrap(angle_rad: ArrayLike) -> Floats:
     """Return angles in [-pi, pi)."""
-    return np.asarray((np.asarray(angle_rad, float) + np.pi) % (2.0 * np.pi) - np.pi)
+    return (np.asarray(angle_rad, float) + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def offset_rad(measured_rad: Floats, believed_rad: Floats) -> float:

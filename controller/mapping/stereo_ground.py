@@ -44,7 +44,7 @@ class CameraStand:
         """(3, 3) rotation from the camera's axes (right, down, forward) to (ahead, left, up)."""
         ct, st = np.cos(self.tilt_rad), np.sin(self.tilt_rad)
         upright = np.array([[0.0, -st, ct], [-1.0, 0.0, 0.0], [0.0, -ct, -st]])
-        return np.asarray(upright @ about_up(self.roll_rad))
+        return upright @ about_up(self.roll_rad)
 
     @classmethod
     def on_plane(cls, normal: Floats, height_m: float) -> "CameraStand":

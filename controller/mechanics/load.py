@@ -30,7 +30,7 @@ def friction_n(
     still = share_c * _STILL_SPEED_M_S
     ahead = -mu_along * share_a * along / np.hypot(gauge_a, still)
     left = -mu_across * share_c * across / np.hypot(gauge_c, still)
-    return np.asarray(weight_n * np.stack([cos * ahead - sin * left, sin * ahead + cos * left], 1))
+    return weight_n * np.stack([cos * ahead - sin * left, sin * ahead + cos * left], 1)
 
 
 def yaw_load_n_m(

@@ -37,7 +37,7 @@ class SpeedLaw:
     def steady_m_s(self, bend_rad: ArrayLike, turn_rad_s: ArrayLike = 0.0) -> Floats:
         """Steady speed ``(c3 K - c4 |O'| - c2) / c1``, at least 0."""
         free = self._push(bend_rad, turn_rad_s) - self.coulomb_m_s2
-        return np.asarray(np.maximum(free, 0.0) / self.viscous_1_s)
+        return np.maximum(free, 0.0) / self.viscous_1_s
 
     def step_m_s(self, speed_m_s: float, bend_rad: float, turn_rad_s: float, dt_s: float) -> float:
         """Speed after one Euler step.
@@ -54,7 +54,7 @@ class SpeedLaw:
 
     def _push(self, bend_rad: ArrayLike, turn_rad_s: ArrayLike) -> Floats:
         bend = self.bend_m_s2_rad * np.asarray(bend_rad, float)
-        return np.asarray(np.maximum(bend - self.turn_m_s * np.abs(turn_rad_s), 0.0))
+        return np.maximum(bend - self.turn_m_s * np.abs(turn_rad_s), 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -242,4 +242,4 @@ class Blend(MotionWrapper):
         before_s = self.join.source_time_s(self._t_s)
         self._t_s += dt_s
         goal = self.target.step(self.join.source_time_s(self._t_s) - before_s, view)
-        return np.asarray(goal + self.join.error_at(self._t_s)[0])
+        return goal + self.join.error_at(self._t_s)[0]

@@ -61,7 +61,7 @@ class Compliance:
         reach_rad = config.yield_rate_rad_s * dt_s
         change_rad = np.clip(wanted_rad - self._yield_rad, -reach_rad, reach_rad)
         self._yield_rad = self._yield_rad + np.where(state.valid, change_rad, 0.0)
-        return np.asarray(goal_rad + self._yield_rad)
+        return goal_rad + self._yield_rad
 
     def _remaining_share(self, dt_s: float) -> float:
         """Share of a yield that remains after ``dt_s`` without load."""
@@ -113,4 +113,4 @@ def _chosen(config: ComplianceConfig, robot: RobotConfig) -> Bools:
 
 
 def _current_beyond(current_a: Floats, deadband_a: float) -> Floats:
-    return np.asarray(np.sign(current_a) * np.maximum(np.abs(current_a) - deadband_a, 0.0))
+    return np.sign(current_a) * np.maximum(np.abs(current_a) - deadband_a, 0.0)

@@ -259,7 +259,7 @@ def _size(a: Floats, b: Floats) -> float:
 
 def _detrended_values(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
-    return np.asarray(values - line @ _fitted(values, line))
+    return values - line @ _fitted(values, line)
 
 
 def _fitted(values: Floats, columns: Floats) -> Floats:

@@ -54,4 +54,4 @@ class Mixtures:
     def _errors(self, asked: Floats) -> Floats:
         """(M, 2) differences from a request, over the tolerances."""
         tolerance = _TOLERANCE * np.maximum(np.abs(asked), self._least)
-        return np.asarray(np.abs(self._mean - asked) / tolerance)
+        return np.abs(self._mean - asked) / tolerance

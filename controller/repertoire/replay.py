@@ -67,4 +67,4 @@ def bridge(before_m: Floats, after_m: Floats, largest_m: float) -> Floats:
     """(n, L, 3) shapes linear between ``before_m`` and ``after_m`` (L, 3), both left out."""
     count = bridge_frames(tip_travel_m(before_m, after_m), largest_m)
     share = np.arange(1, count + 1) / (count + 1.0)
-    return np.asarray(before_m + share[:, None, None] * (after_m - before_m))
+    return before_m + share[:, None, None] * (after_m - before_m)

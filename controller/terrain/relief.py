@@ -87,7 +87,7 @@ class Relief:
 
     def safe(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points keep both limits and the margin."""
-        return np.asarray(self.risk(x_m, y_m) <= 1.0)
+        return self.risk(x_m, y_m) <= 1.0
 
     def is_obstructed(self, x_m: float, y_m: float) -> bool:
         """Whether an obstacle is nearer than the radius of the body."""
@@ -95,7 +95,7 @@ class Relief:
 
     def known(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether the slope window around points is fully measured."""
-        return np.asarray(self._field_at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK)
+        return self._field_at(self._unknown, x_m, y_m) <= 1.0 / _UNKNOWN_RISK
 
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field, ``edge_margin_m`` or more from its border."""
@@ -157,12 +157,12 @@ def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:
 def windowed_mean(ground: HeightField, values: Floats, radius_m: float) -> Floats:
     """(rows, columns) mean of values in a disc around each sample, cut at the border."""
     _, _, disc = _disc(ground, radius_m)
-    return np.asarray(_window_sum(values, disc) / _window_sum(np.ones_like(values), disc))
+    return _window_sum(values, disc) / _window_sum(np.ones_like(values), disc)
 
 
 def fitted_slope_rad(ground: HeightField, radius_m: float) -> Floats:
     """(rows, columns) inclination of the least-squares plane in a disc around each sample."""
-    return np.asarray(np.arctan(np.hypot(*fitted_gradient(ground, radius_m))))
+    return np.arctan(np.hypot(*fitted_gradient(ground, radius_m)))
 
 
 def fitted_gradient(ground: HeightField, radius_m: float) -> tuple[Floats, Floats]:

@@ -108,7 +108,7 @@ def _disc_m(width_m: float) -> Floats:
     k = np.arange(_DISC_POINTS) + 0.5
     turn = k * np.pi * (3.0 - np.sqrt(5.0))
     radius = width_m / 2.0 * np.sqrt(k / _DISC_POINTS)
-    return np.asarray(np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1))
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
 
 
 def _samples(path: SplinePath) -> Floats:

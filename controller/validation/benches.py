@@ -85,7 +85,7 @@ class SineWave:
         share = min(time_s / RISE_S, 1.0)
         rise = share * share * (3.0 - 2.0 * share)
         wave = np.sin(self._rate_rad_s * time_s + self._phase_rad)
-        return np.asarray(rise * self._amplitude_rad * wave)
+        return rise * self._amplitude_rad * wave
 
 
 def simulate(conditions: Conditions) -> dict[str, float]:

@@ -62,7 +62,7 @@ class Walker:
         """Tail part of a placed shape, oldest first, bent towards the aim."""
         piece_points = max(1, round(self._walk.decision_fraction * self.track.points))
         bend = self._ramp(error_rad) * np.linspace(0.0, 1.0, piece_points)
-        return np.asarray(placed_rad[::-1][:piece_points] + bend)
+        return placed_rad[::-1][:piece_points] + bend
 
     def _fits(self, piece_rad: Floats) -> bool:
         if self._accept is None:

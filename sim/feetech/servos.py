@@ -280,7 +280,7 @@ class FeetechServos(SimulatedServos):
         """(S,) sensor angles from their middle."""
         mounting = self._mounting
         shaft = mounting.sign * self.plant.position_rad + mounting.zero_rad
-        return np.asarray(self._sensor_sign() * shaft)
+        return self._sensor_sign() * shaft
 
     def _ticks(self) -> Floats:
         """(S,) positions of all turns, without offset."""
@@ -346,7 +346,7 @@ class FeetechServos(SimulatedServos):
         self._integral = np.where(
             (i_gain > 0) & self._torque_is_on(), np.clip(grown, -most, most), 0.0
         )
-        return np.asarray(output + self._integral / _FULL)
+        return output + self._integral / _FULL
 
     def _move(self, seconds: float, positions: Bools, wheels: Bools, shaft: Floats) -> None:
         """Advance the trajectories to the goals, or at the goal velocities."""

@@ -41,7 +41,7 @@ def tilted(tilt_rad: float, carrier: Floats) -> Floats:
     ``carrier`` (3, 3) has the link's axes as columns: forward, left, up.
     """
     c, s = math.cos(tilt_rad), math.sin(tilt_rad)
-    return np.asarray(carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]])
+    return carrier @ [[0.0, -s, c], [-1.0, 0.0, 0.0], [0.0, -c, -s]]
 
 
 class StereoView:

@@ -174,7 +174,7 @@ class MotorColumns:
 def p_gain_per_rad(register: int | AnyInts, motor: MotorModel | MotorColumns) -> Floats:
     """PWM fraction per radian of error for Position P Gain(84)."""
     gain = np.asarray(register, dtype=np.float64)
-    return np.asarray(gain / motor.p_gain_divisor * motor.positions_per_rad / motor.full_pwm)
+    return gain / motor.p_gain_divisor * motor.positions_per_rad / motor.full_pwm
 
 
 def make_drive(motors: Sequence[MotorModel], supply_v: ArrayLike) -> ServoDrive:

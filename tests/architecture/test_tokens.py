@@ -79,7 +79,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.runlog": (8_300, "0295-logs-in-parts.md"),
     "controller.exchange": (18_400, "0264-one-place-decides-about-units.md"),
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),
-    "controller.metrics": (6_620, "0295-logs-in-parts.md"),
+    "controller.metrics": (6_640, "0262-a-slide-is-judged-by-the-slope-under-it.md"),
     "controller.cli": (2_800, "0254-faults-of-the-system.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""

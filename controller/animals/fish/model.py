@@ -64,7 +64,7 @@ class FishModel:
 
     def tangents_rad(self, head_rad: float, angles_rad: Floats) -> Floats:
         """(STATIONS - 1,) direction of travel of each piece of the midline, head first."""
-        return np.asarray(head_rad - self._turns @ angles_rad)
+        return head_rad - self._turns @ angles_rad
 
     def midline(
         self, base_px: Floats, head_rad: float, angles_rad: Floats, pitch_rad: float = 0.0

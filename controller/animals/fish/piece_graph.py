@@ -118,7 +118,7 @@ def piece_graph(
 
 def placed(base: Floats, origin: Floats, head_rad: float) -> Floats:
     """Points (n, 2) of a piece that begins at ``origin`` (2,) with the head at ``head_rad``."""
-    return np.asarray(base @ about_up(-head_rad)[:2, :2] + origin)
+    return base @ about_up(-head_rad)[:2, :2] + origin
 
 
 def _rise(postures: Postures) -> Floats | None:

@@ -76,7 +76,7 @@ class Postures:
 
 def tangents(head_rad: Floats, angles_rad: Floats, joints_at: tuple[float, ...]) -> Floats:
     """(T, 100) tangent angles of heads (T,) and spine angles (T, J)."""
-    return np.asarray(head_rad[:, None] - angles_rad @ turn_shares(joints_at, SEGMENTS).T)
+    return head_rad[:, None] - angles_rad @ turn_shares(joints_at, SEGMENTS).T
 
 
 def skeleton(base: Floats, tangents_rad: Floats, base_at: float, length: float) -> Floats:
@@ -87,7 +87,7 @@ def skeleton(base: Floats, tangents_rad: Floats, base_at: float, length: float) 
     place = base_at * SEGMENTS
     low = int(place)
     origin = points[:, low] * (low + 1 - place) + points[:, low + 1] * (place - low)
-    return np.asarray(points + (base - origin)[:, None, :])
+    return points + (base - origin)[:, None, :]
 
 
 def fit_angles(tangents_rad: Floats, joints_at: tuple[float, ...]) -> tuple[Floats, Floats]:

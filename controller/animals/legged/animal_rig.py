@@ -156,7 +156,7 @@ def _horn(ornament: OrnamentConfig, length_m: float, thick_m: float) -> Floats:
     cone = _tube(long_m, thick_m, _POINT * thick_m, _ROWS if any(ornament.bow) else 1)
     on = np.clip(-cone[:, 0] / long_m, 0.0, 1.0)
     bow = length_m * np.array(ornament.bow) @ _ornament_rotation(ornament)
-    return np.asarray(cone + 4.0 * (on * (1.0 - on))[:, None] * bow)
+    return cone + 4.0 * (on * (1.0 - on))[:, None] * bow
 
 
 def _tube(long_m: float, thick_m: float, end_m: float, rows: int) -> Floats:

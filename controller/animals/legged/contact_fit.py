@@ -51,7 +51,7 @@ def step(phase: Floats, stride: float, duty: Floats | float, shape: tuple[float,
 
     """
     air = np.clip((phase - duty) / (1.0 - duty), 0.0, 1.0)
-    return np.asarray(stride * (betainc(*shape, air) + 0.5 * duty - phase))
+    return stride * (betainc(*shape, air) + 0.5 * duty - phase)
 
 
 def fit_contacts(

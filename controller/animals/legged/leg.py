@@ -67,7 +67,7 @@ def foot_direction(pair: LegPairConfig, air: Floats, frame: LegFrame, side: floa
     """(T, 3) from ankle or fetlock to the toe."""
     tilt = np.radians(pair.foot_deg - pair.foot_fold_deg * np.sin(np.pi * air) ** 2)[:, None]
     toe = np.cross(toe_left(pair, frame, side), frame.up)
-    return np.asarray(np.sin(tilt) * toe - np.cos(tilt) * frame.up)
+    return np.sin(tilt) * toe - np.cos(tilt) * frame.up
 
 
 def toe_left(pair: LegPairConfig, frame: LegFrame, side: float) -> Floats:

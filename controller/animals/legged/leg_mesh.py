@@ -139,7 +139,7 @@ def _tube(
 def _share_of_other_bone(away_m: Floats, own_m: float, other_m: float) -> Floats:
     """Share of the bone on the other side of a joint, by distance from the joint."""
     near = 1.0 - away_m / (_BLEND * min(own_m, other_m))
-    return np.asarray(0.5 * np.clip(near, 0.0, None) ** 1.5)
+    return 0.5 * np.clip(near, 0.0, None) ** 1.5
 
 
 def _radii(pair: LegPairConfig) -> tuple[Floats, Floats]:

@@ -130,9 +130,7 @@ class PdeSurface:
 
     def spine_m(self, u: ArrayLike) -> Floats:
         """(U, 3) the zeroth term: the spine."""
-        return np.asarray(
-            _basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0) @ self.spine_terms
-        )
+        return _basis(np.atleast_1d(np.asarray(u, float)), 0.0, self._order, 0) @ self.spine_terms
 
     def points_m(self, u: ArrayLike, v: ArrayLike, along: int = 0, around: int = 0) -> Floats:
         """(U, V, 3) at all pairs, or the derivative there; the remainder is linear between samples.
@@ -207,4 +205,4 @@ def _fading_derivatives(u: Floats, rate: float | Floats, k: int, times: int) -> 
     parts = [
         comb(times, j) * (-rate) ** (times - j) * _power(u, k, j) for j in range(min(times, k) + 1)
     ]
-    return np.asarray(sum(parts) * np.exp(-rate * u))
+    return sum(parts) * np.exp(-rate * u)

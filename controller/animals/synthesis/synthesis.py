@@ -384,7 +384,7 @@ class Targets:
     def _on_path(self, s_m: float) -> Floats:
         """Point (2,) at an arc length, beyond the end straight on."""
         beyond_m = max(s_m - self.path.length_m, 0.0)
-        return np.asarray(self.path.position(s_m) + beyond_m * self._end_direction)
+        return self.path.position(s_m) + beyond_m * self._end_direction
 
     @property
     def _end_direction(self) -> Floats:

@@ -118,7 +118,7 @@ class _Frames:
             )
             pose[:3, :3] = turn.as_matrix()
             pose[:3, 3] = values[:3]
-        return np.asarray(self.of(frame) @ pose)
+        return self.of(frame) @ pose
 
 
 def _text(element: Element, tag: str) -> str:

@@ -61,7 +61,7 @@ class Damped:
         fading = np.exp(-h * t_s)
         fallen = (1.0 - fading) / h
         ramp = (fallen - t_s * fading) / h
-        return np.asarray(self.goal * t_s + self.left * fallen + self.slope * ramp)
+        return self.goal * t_s + self.left * fallen + self.slope * ramp
 
 
 CpgState = tuple[Damped, Damped, float, float, Pattern]

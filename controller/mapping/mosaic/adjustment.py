@@ -77,7 +77,7 @@ class Sightings:
         )
         covariance = np.einsum("ni,nj->nij", along, along)
         covariance[:, [0, 1, 2], [0, 1, 2]] += size_px**2
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+        return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 @dataclass(frozen=True, slots=True)

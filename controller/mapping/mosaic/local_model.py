@@ -75,7 +75,7 @@ class LocalModel:
     def near(self, error_m: float) -> Bools:
         """(H, W) points with an expected error of at most ``error_m``."""
         with np.errstate(invalid="ignore"):
-            return np.asarray(self.error_m <= error_m)
+            return self.error_m <= error_m
 
 
 def _has_no_texture(image: Image) -> Bools:

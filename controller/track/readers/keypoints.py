@@ -173,4 +173,4 @@ def _point_beyond(last: Floats, second: Floats, third: Floats, reach: float) -> 
     heading = np.arctan2(*(last - second)[::-1])
     turn = np.angle(np.exp(1j * (heading - np.arctan2(*(second - third)[::-1]))))
     heading_rad = heading + _TURN_ON * turn
-    return np.asarray(last + reach * np.array([np.cos(heading_rad), np.sin(heading_rad)]))
+    return last + reach * np.array([np.cos(heading_rad), np.sin(heading_rad)])
