@@ -4,7 +4,7 @@ A reader returns ``Facts`` with its values. Answers to its questions may be stor
 ``FILE.reading.toml`` in the same folder, for later commands.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -58,16 +58,23 @@ def by_file(place: str, value: str | None) -> Fact | None:
     return None if value is None else Fact(value, "file", place)
 
 
-def stated(data: Path, option: str, in_file: str | None, answer: str | None) -> Fact | None:
-    """Fact that the file or an option of the user states; None if neither does.
+def by_names(value: str | None, names: Iterable[str], columns: Mapping[str, str]) -> Fact | None:
+    """Fact that names of columns state, in the file or in ``--columns``; None without it."""
+    if {*names} & {*columns}:
+        return by_user("--columns", value)
+    return by_file("the names of its columns", value)
+
+
+def stated(data: Path, option: str, before: Fact | None, answer: str | None) -> Fact | None:
+    """Fact that was stated before, or by an option of the user; None if neither is.
 
     Raises:
-        InputError: both state one, and they differ.
+        InputError: both are, and they differ.
 
     """
-    if answer not in (None, in_file) and in_file is not None:
-        raise InputError(f"{option} {answer}: {data} states {in_file}; leave the option out")
-    return by_file("the names of its columns", in_file) or by_user(option, answer)
+    if before is not None and answer not in (None, before.value):
+        raise InputError(f"{option} {answer}: {data} states {before.value}; leave the option out")
+    return before or by_user(option, answer)
 
 
 def decided(

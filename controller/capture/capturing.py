@@ -392,7 +392,6 @@ def facts_of(
     """Return the counts and sizes of a captured animal."""
     length_px = float(np.nanmedian(captured.length_px))
     finite_values = captured.expected_px[np.isfinite(captured.expected_px)]
-    error_px = float(np.median(finite_values)) if finite_values.size else float("nan")
     return CaptureFacts(
         recording=str(options.recording),
         track=str(track),
@@ -406,7 +405,7 @@ def facts_of(
         background=detector.background_source,
         animal=str(detector.polarity),
         length_px=round(length_px, 2),
-        expected_error_px=None if np.isnan(error_px) else round(error_px, 3),
+        expected_error_px=round(float(np.median(finite_values)), 3) if finite_values.size else None,
         length_m=None if m_per_px is None else round(length_px * m_per_px, 5),
         head_by=captured.head_by,
         head_sure=round(captured.head_sure, 3),
@@ -423,10 +422,6 @@ def film_facts(
     options: CaptureOptions, footage: Footage, captured: Capture, m_per_px: float | None
 ) -> Facts:
     """Return the facts about a film, each with its source."""
-    rate = f"{captured.rate_hz:g} Hz"
-    stated = Fact(rate, "file", "the film")
-    if footage.rate_assumed:
-        stated = Fact(rate, "inferred", "the default of films; --rate states another")
     scale = None if m_per_px is None else f"{m_per_px:.4g} m a pixel"
     return {
         "quantity": Fact("silhouettes of an animal", "file", "its pictures"),
@@ -434,7 +429,7 @@ def film_facts(
         or Fact("px", "inferred", "no scale is given"),
         "order": by_user("--head", options.head and "head first")
         or Fact("head first", "inferred", f"{captured.head_by}, sure by {captured.head_sure:.2f}"),
-        "time": by_user("--rate", rate if options.rate_hz else None) or stated,
+        "time": footage.time_fact(captured.rate_hz, options.rate_hz),
     }
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import read_bytes, why_no_file
 from snakewalk.config.arrays import DeepImage, Floats, Image, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.config.reading import Fact, by_user
 
 STACKS = (".tif", ".tiff")
 
@@ -112,6 +113,13 @@ class Footage:
     def missing(self) -> int:
         """Number of images that are missing in the sequence."""
         return self.numbers[-1] + 1 - len(self.numbers) if self.numbers else 0
+
+    def time_fact(self, rate_hz: float, asked_hz: float | None) -> Fact:
+        """Return the fact of the film's times, of which ``asked_hz`` is the user's rate."""
+        rate = f"{rate_hz:g} Hz"
+        if self.rate_assumed:
+            return Fact(rate, "inferred", "the default of films; --rate states another")
+        return by_user("--rate", rate if asked_hz else None) or Fact(rate, "file", "the film")
 
     def read(self) -> Iterator[DeepImage]:
         """Iterate over all frames (H, W) or (H, W, 3): 8 bit, or deeper on the same scale.

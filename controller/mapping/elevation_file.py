@@ -201,7 +201,7 @@ def _read(file: Path, options: MapOptions) -> FileMap:
         notes: list[str] = []
         names: list[str] = []
         table = read_numbers(file, notes, names, options.choice.columns)
-        if table.shape[1] == 3 or names:
+        if table.shape[1] == 3 or names or options.choice.columns:
             points_m, facts = points_in_metres(file, table, names, options.choice)
             upright_m = _upright(file, points_m, options)
             return _of_points(file, upright_m, None, options, facts, notes)

@@ -301,7 +301,9 @@ def _height_unit(file: Path, opened: Any, units: ElevationChoice, horizontal: Fa
         raise InputError(
             f"{file}: states heights in {band} (band) and in {vertical} (system): --height-unit"
         )
-    return by_file("its band", band) or height_fact(file, horizontal, None, vertical)
+    return by_file("its band", band) or height_fact(
+        file, horizontal, None, by_file(SYSTEM, vertical)
+    )
 
 
 def _band_scale(opened: Any, units: ElevationChoice) -> tuple[float, float, list[str]]:

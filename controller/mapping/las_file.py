@@ -261,7 +261,7 @@ def in_metres(
     readings = {"m": "metres", "ft": "feet", "us-ft": "US survey feet", DEGREE: "degrees"}
     fact = decided(file, "states no coordinate system, and so no unit", "--unit", readings, given)
     plane = fact.value
-    height = height_fact(file, fact, height_unit, las_points.height_unit)
+    height = height_fact(file, fact, height_unit, by_file(SYSTEM, las_points.height_unit))
     notes: list[str] = []
     up = height.value
     facts = {"unit": fact, "height_unit": height}

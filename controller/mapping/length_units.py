@@ -8,7 +8,7 @@ from typing import Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import DEGREE, unit_name
-from snakewalk.config.reading import Fact, by_file, by_user, decided
+from snakewalk.config.reading import Fact, by_user, decided
 
 UNSTATED_UNIT = "the file states no unit of lengths: metres; --unit states another"
 UNSTATED_HEIGHTS = "the file states no unit of heights: metres"
@@ -35,14 +35,14 @@ def vertical_unit(wkt: str) -> str | None:
     return None if unit is None else unit_name(float(unit[2]))
 
 
-def height_fact(file: Path, unit: Fact, answer: str | None, in_file: str | None) -> Fact:
+def height_fact(file: Path, unit: Fact, answer: str | None, in_file: Fact | None) -> Fact:
     """Unit of heights: by the user, the file, or the user's unit of lengths.
 
     Raises:
         InputError: only the unit of lengths is stated, and it is not metric (the question).
 
     """
-    fact = by_user("--height-unit", answer) or by_file(SYSTEM, in_file)
+    fact = by_user("--height-unit", answer) or in_file
     if fact is None and unit.source == "user" and unit.value != DEGREE:
         fact = unit
     elif fact is None and unit.value in (DEGREE, "m"):

@@ -10,7 +10,8 @@ from snakewalk.config.archive import ending
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import DEGREE, named_unit, unit_m
-from snakewalk.config.reading import Fact, Facts, decided, stated
+from snakewalk.config.reading import Fact, Facts, by_names, decided, stated
+from snakewalk.config.table_columns import preview
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
 from snakewalk.controller.mapping.length_units import UNSTATED_UNIT, degree_cell_m, height_fact
 
@@ -43,24 +44,28 @@ def points_in_metres(
 
     """
     layout = _layout(names)
-    if points.shape[1] < 3 or (layout is None and names and points.shape[1] > 3):
-        raise InputError(
+    if layout is None and (units.columns or points.shape[1] != 3):
+        question = (
             f"{file}: has {points.shape[1]} columns, {', '.join(names) or 'without names'}; add "
             "--columns x=COLUMN, y=COLUMN and z=COLUMN"
         )
-    order, by_names, by_format = layout or ([0, 1, 2], None, None)
+        raise InputError([question, *preview(points[:4].astype(str).tolist())])
+    order, unit_named, height_named = layout or ([0, 1, 2], None, None)
+    given, height_given = (
+        by_names(value, names, units.columns) for value in (unit_named, height_named)
+    )
     points = points[:, order]
     if units.no_data is not None:
         points = np.where(points == units.no_data, np.nan, points)
-    fact = stated(file, "--unit", by_names, units.unit)
+    fact = stated(file, "--unit", given, units.unit)
     if fact is None and ending(file) == ".glb":
         fact = Fact("m", "file", "its format")
     if fact is None:
         fact = _unstated(file, points)
     unit = fact.value
     if fact.source == "file" and unit == "m":
-        by_format = by_format or "m"
-    height = height_fact(file, fact, units.height_unit, by_format)
+        height_given = height_given or fact
+    height = height_fact(file, fact, units.height_unit, height_given)
     facts = {"unit": fact, "height_unit": height}
     rise_m = unit_m(height.value)
     if unit != DEGREE:

@@ -17,7 +17,7 @@ from snakewalk.config.archive import MOST_STORAGE_BYTES, read_arrays, read_bytes
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import LENGTHS_M, unit_m
-from snakewalk.config.reading import Fact, Facts, answered, by_user, decided, stated
+from snakewalk.config.reading import Fact, Facts, answered, by_file, by_user, decided, stated
 from snakewalk.controller.images.calibration_storage import read_storage
 from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 
@@ -104,7 +104,7 @@ def _read(file: Path, choice: CalibrationChoice) -> StereoCalibration:
         raise InputError(f"{file}: is too large for a calibration")
     ending = file.suffix.lower()
     if ending == ".txt":
-        unit = stated(file, "--unit", "mm", choice.unit)
+        unit = stated(file, "--unit", by_file("its format", "mm"), choice.unit)
         return _checked_calibration(file, _middlebury(file), unit)
     if ending in (".yml", ".yaml", ".xml", ".json"):
         storage = read_storage(file)

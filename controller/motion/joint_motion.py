@@ -88,20 +88,23 @@ def time_unit(path: Path, time: Floats, column: str, unit: Fact | None) -> Fact:
         InputError: another unit is possible.
 
     """
-    steps = np.diff(time[np.isfinite(time)])
+    if unit is not None:
+        return unit
+    finite = time[np.isfinite(time)]
+    steps = np.diff(finite)
     step = float(np.median(steps)) if len(steps) else 0.01
     least_s, most_s = _STEPS_S
     possible = [unit for unit, size in TIMES_S.items() if least_s <= step * size <= most_s]
-    if unit is None and possible in ([], ["s"]):
+    if possible in ([], ["s"]):
         return Fact("s", "inferred", "no other unit is possible")
-    length = float(np.nanmax(time) - np.nanmin(time))
+    length = np.ptp(finite)
     readings = {
         unit: f"{length * size:.4g} s at {1.0 / (step * size):.4g} Hz"
         for unit, size in TIMES_S.items()
         if unit in {"s", *possible}
     }
     question = f"column {column} states no unit of time"
-    return decided(path, question, "--time-unit", readings, unit)
+    return decided(path, question, "--time-unit", readings, None)
 
 
 def joint_motion(

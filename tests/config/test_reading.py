@@ -12,7 +12,7 @@ import pytest
 
 from snakewalk.config.archive import FREE_BYTES, read_bytes
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import Fact, stated
+from snakewalk.config.reading import Fact, by_names, stated
 from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 from snakewalk.controller.exchange.robot_import.robot_import import import_robot
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
@@ -27,10 +27,13 @@ from tests.helpers.foreign_files import ANGLES, joint_csv, massless_urdf, midlin
 def test_the_file_and_the_user_state_the_same_or_the_fault_names_both() -> None:
     file = Path("a.csv")
     assert stated(file, "--unit", None, None) is None
-    assert stated(file, "--unit", "deg", "deg") == Fact("deg", "file", "the names of its columns")
+    by_name = Fact("deg", "file", "the names of its columns")
+    assert by_names("deg", ["a_deg"], {}) == by_name
+    assert by_names("deg", ["a_deg"], {"a_deg": "A"}) == Fact("deg", "user", "--columns")
+    assert stated(file, "--unit", by_name, "deg") == by_name
     assert stated(file, "--unit", None, "deg") == Fact("deg", "user", "--unit")
     with pytest.raises(InputError, match=r"--unit rad: a\.csv states deg; leave the option out"):
-        stated(file, "--unit", "deg", "rad")
+        stated(file, "--unit", by_name, "rad")
 
 
 def test_answers_about_a_track_are_used_by_later_commands(tmp_path: Path) -> None:

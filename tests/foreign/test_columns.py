@@ -67,5 +67,46 @@ def test_columns_of_points_by_name_or_number(tmp_path: Path, ending: str) -> Non
     by_name = ground(file, columns={"x": "R", "y": "L", "z": "H"})
     for elevation in (by_number, by_name):
         np.testing.assert_array_equal(elevation.elevation.z_m, plain.elevation.z_m)
+        assert str(elevation.facts["unit"]) == "m (stated by you: --unit)"
     assert "column 2 is not chosen: 7, 7, 7, 7" in by_number.notes
     assert "column 1 is z: H, 0.0000, 0.0000, 0.0000" in by_name.notes
+
+
+def test_a_unit_in_a_chosen_meaning_is_stated_by_the_user(tmp_path: Path) -> None:
+    file = midlines(tmp_path / "a.csv")
+    assert str(load_file(file).facts["unit"]) == "m (stated by the names of its columns)"
+    file.write_text(file.read_text().replace("x_m", "X").replace("y_m", "Y"))
+    chosen = {"x_mm": "X", "y_mm": "Y"}
+    facts = load_file(file, Choice(columns=chosen)).facts
+    assert str(facts["unit"]) == "mm (stated by you: --columns)"
+    rows = points(tmp_path / "a.xyz").read_text()
+    (tmp_path / "named.xyz").write_text(f"x_mm y_mm z_cm\n{rows}")
+    (tmp_path / "a.xyz").write_text(f"A B C\n{rows}")
+    columns = {"x_mm": "A", "y_mm": "B", "z_cm": "C"}
+    by_user = read_elevation(tmp_path / "a.xyz", MapOptions(ElevationChoice(columns=columns)))
+    by_file = read_elevation(tmp_path / "named.xyz", MapOptions())
+    np.testing.assert_array_equal(by_user.elevation.z_m, by_file.elevation.z_m)
+    for name, unit in (("unit", "mm"), ("height_unit", "cm")):
+        assert str(by_user.facts[name]) == f"{unit} (stated by you: --columns)"
+        assert str(by_file.facts[name]) == f"{unit} (stated by the names of its columns)"
+    table = joint_csv(tmp_path / "j.csv")
+    table.write_text(table.read_text().replace("time_s", "Zeit"))
+    motion = foreign_joints(str(table), ROBOT, JointRequest(columns={"time_ms": "Zeit"}))
+    assert motion is not None
+    assert str(motion.facts["time"]) == "ms (stated by you: --columns)"
+    assert motion.facts["unit"].source == "file"
+
+
+@pytest.mark.parametrize("ending", ["xyz", "csv"])
+def test_a_table_whose_columns_nothing_states_is_asked_about(tmp_path: Path, ending: str) -> None:
+    rows = points(tmp_path / "a.xyz").read_text().replace("\n", " 9\n")
+    separator = " " if ending == "xyz" else ","
+    file = tmp_path / f"b.{ending}"
+    file.write_text(rows.replace(" ", separator))
+    if ending == "xyz":
+        with pytest.raises(InputError, match="4 columns, without names; add --columns") as asked:
+            ground(file)
+        assert asked.value.faults[4].startswith("column 4: 9.0, 9.0")
+    for columns in ({"1": "2"}, {"a": "1", "b": "2", "c": "3"}):
+        with pytest.raises(InputError, match="add --columns x=COLUMN"):
+            ground(file, columns=columns, cell=1.0)

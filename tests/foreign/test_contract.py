@@ -123,6 +123,21 @@ OTHERS: Final = {
 """Modules without a question to the user, each with the reason."""
 
 
+SHOWN: Final = {
+    "controller/animals/commands/stride.py": "animal stride",
+    "controller/animals/fish/fish_matching.py": "animal fish match",
+    "controller/capture/capturing.py": "animal capture",
+    "controller/capture/recording.py": "animal track",
+    "controller/exchange/commands/robot_import.py": "robot import",
+    "controller/mapping/commands/elevation.py": "world from",
+    "controller/mapping/commands/stereo.py": "world stereo",
+    "controller/mapping/commands/walkthrough.py": "world walkthrough",
+    "controller/run/commands/play.py": "play",
+    "controller/track/analysis.py": "animal analyse",
+}
+"""Modules that list the facts about a file in the results of a command."""
+
+
 def modules() -> Iterator[tuple[str, ast.Module]]:
     for path in sizes():
         yield str(path.relative_to(ROOT)), ast.parse(path.read_text(encoding="utf-8"))
@@ -165,6 +180,11 @@ def test_entries_alone_use_stored_answers_and_questions_have_one_form() -> None:
     users = {name for name, tree in modules() if called(tree) & {"answered", "with_stored"}}
     plain = {"config/reading.py", "controller/run/commands/play.py"}
     assert users - plain == set(ENTRIES)
+
+
+@pytest.mark.costs("parses every file of the library")
+def test_each_command_lists_the_facts_about_its_file() -> None:
+    assert {name for name, tree in modules() if "texts" in called(tree)} == SHOWN.keys()
 
 
 UNITS: Final = frozenset({"mm", "cm", "km", "ft", "us-ft", "deg", "ms", "us", "ns", "um"})

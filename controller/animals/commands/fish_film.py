@@ -34,10 +34,12 @@ def film(
         raise InputError(f"{folder}: is not empty; --force writes into it")
     with ProgressBar("frames", transient=True) as bar:
         truth = render(folder, options, on_progress=bar.update)
-    facts: dict[str, object] = {
-        "folder": str(folder),
-        "frames": truth.frames,
-        "rate_hz": round(truth.rate_hz, 3),
-        "length_px": options.length_px,
-    }
-    show(facts, as_json)
+    show(
+        {
+            "folder": str(folder),
+            "frames": truth.frames,
+            "rate_hz": round(truth.rate_hz, 3),
+            "length_px": options.length_px,
+        },
+        as_json,
+    )

@@ -72,8 +72,8 @@ def match(
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
     true_postures = None if truth is None else load_postures(truth)
     if footage.suffix.lower() in MIDLINES:
-        if side is not None:
-            raise InputError(f"{footage}: midlines have no side view; --side goes with images")
+        if side or length or background:
+            raise InputError(f"{footage}: --side, --length and --background go with images")
         matched = read_midlines(footage, build, rate)
     else:
         with ProgressBar("frames", transient=True) as bar:
@@ -87,12 +87,11 @@ def match(
                 length_m=length,
                 on_progress=bar.update,
             )
-    accuracy = None if true_postures is None else compare(matched.postures, true_postures)
+    facts = matched.facts
+    if true_postures is not None:
+        facts |= compare(matched.postures, true_postures).to_dict()
     with atomic_write(output) as part:
         save_postures(part, matched.postures)
     if picture is not None:
         pictures()[0].draw_match(picture, matched.postures, true_postures, matched.film, footage)
-    facts = matched.facts.to_dict()
-    if accuracy is not None:
-        facts |= accuracy.to_dict()
     show(facts | {"postures": str(output)}, as_json)

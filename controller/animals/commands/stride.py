@@ -86,6 +86,10 @@ def stride(
         draw_stride(
             measured.stride, picture, f"{keypoints.name}: {measured.stride.cycles:.1f} cycles"
         )
-    files = {"animal": str(output), "picture": None if picture is None else str(picture)}
-    about = {"facts": texts(keypoints_of_film.facts), "notes": list(keypoints_of_film.notes)}
-    show(measured.facts() | files | about, as_json)
+    about = {
+        "animal": str(output),
+        "picture": None if picture is None else str(picture),
+        "facts": texts(keypoints_of_film.facts),
+        "notes": keypoints_of_film.notes,
+    }
+    show(measured.facts() | about, as_json)

@@ -1,12 +1,13 @@
 """Postures from files: a film, two films, or midlines that were tracked already."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from snakewalk.config.loader import with_keys
+from snakewalk.config.reading import Fact, by_user, texts
 from snakewalk.controller.animals.fish.match_film import FilmMatch, match_film
 from snakewalk.controller.animals.fish.model import fish_model
 from snakewalk.controller.animals.fish.postures import Postures, postures_of_track
@@ -19,38 +20,12 @@ MIDLINES = (".csv", ".npz", ".npy", ".mat", ".wcon", ".h5", ".slp", ".json")
 
 
 @dataclass(frozen=True, slots=True)
-class MatchFacts:
-    """Counts and ranges of the postures of a recording."""
-
-    frames: int
-    matched: int
-    rate_hz: float
-    largest_angles_deg: list[float]
-    length_px: float | None = None
-    """Length in a film; None for midlines, like the next five."""
-    fins: float | None = None
-    """Length of the pectoral fins that were seen from above, body lengths; 0: none."""
-    rate_assumed: bool | None = None
-    background: str | None = None
-    """Background of the film's frames, in words."""
-    left_out: dict[str, int] | None = None
-    """Frames without a posture, by reason."""
-    value_v: float | None = None
-    left_over_deg: float | None = None
-    """Difference that the spine angles do not explain, root mean square; midlines only."""
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the facts that are known, for JSON."""
-        values = {name: getattr(self, name) for name in MatchFacts.__slots__}
-        return {name: value for name, value in values.items() if value is not None}
-
-
-@dataclass(frozen=True, slots=True)
 class MatchedRecording:
     """Postures, facts of the match, and the matched film."""
 
     postures: Postures
-    facts: MatchFacts
+    facts: dict[str, object]
+    """Counts and ranges, and the facts about the file."""
     film: FilmMatch | None
     """Result of the matching to the film; None for tracked midlines."""
 
@@ -84,36 +59,35 @@ def match_footage(
     """
     model = fish_model(build)
     above = open_film(top, background, rate_hz)
-    side_footage = None if side is None else open_film(side, side_background, rate_hz)
-    total = above.footage.count
-    done = 0
-
-    def count() -> None:
-        nonlocal done
-        done += 1
-        on_progress(done, total)
-
+    side_frames = None if side is None else open_film(side, side_background, rate_hz).frames
     film = match_film(
         above.frames,
-        total,
+        above.footage.count,
         model,
         rate_hz=above.footage.rate_hz,
-        side=None if side_footage is None else side_footage.frames,
+        side=side_frames,
         length_m=length_m,
         name=top.name,
-        on_progress=count,
+        on_progress=on_progress,
     )
     postures = film.postures
     value = None if postures.value is None else round(float(np.nanmedian(postures.value)), 3)
-    facts = replace(
-        _facts(postures),
-        length_px=round(film.model.length_px, 1),
-        fins=film.model.fin,
-        rate_assumed=above.footage.rate_assumed,
-        background=above.detector.background_source,
-        left_out=film.lost,
-        value_v=value,
-    )
+    about = {
+        "quantity": Fact("silhouettes of a fish", "file", "its pictures"),
+        "unit": by_user("--length", "m" if length_m else None)
+        or Fact("body lengths", "inferred", "no length is given"),
+        "order": Fact("head first", "inferred", "the better fit, or the displacement"),
+        "time": above.footage.time_fact(postures.rate_hz, rate_hz),
+    }
+    facts = _facts(postures) | {
+        "length_px": round(film.model.length_px, 1),
+        "fins": film.model.fin,
+        "rate_assumed": above.footage.rate_assumed,
+        "background": above.detector.background_source,
+        "left_out": film.lost,
+        "value_v": value,
+        "facts": texts(about),
+    }
     return MatchedRecording(postures, facts, film)
 
 
@@ -128,14 +102,19 @@ def read_midlines(file: Path, build: str, rate_hz: float | None) -> MatchedRecor
     postures = postures_of_track(track, fish_model(build).joints_at)
     rest = track.angles_rad - postures.tangents_rad()[postures.found]
     left_over_deg = round(float(np.degrees(np.sqrt(np.mean(rest**2)))), 2)
-    return MatchedRecording(postures, replace(_facts(postures), left_over_deg=left_over_deg), None)
+    facts = _facts(postures) | {
+        "left_over_deg": left_over_deg,
+        "facts": texts(track.facts),
+        "notes": track.notes,
+    }
+    return MatchedRecording(postures, facts, None)
 
 
-def _facts(postures: Postures) -> MatchFacts:
+def _facts(postures: Postures) -> dict[str, object]:
     size = np.degrees(np.nanmax(np.abs(postures.angles_rad), axis=0))
-    return MatchFacts(
-        frames=postures.frames,
-        matched=int(postures.found.sum()),
-        rate_hz=round(postures.rate_hz, 3),
-        largest_angles_deg=[float(angle) for angle in size.round(1)],
-    )
+    return {
+        "frames": postures.frames,
+        "matched": int(postures.found.sum()),
+        "rate_hz": round(postures.rate_hz, 3),
+        "largest_angles_deg": [float(angle) for angle in size.round(1)],
+    }

@@ -61,7 +61,7 @@ def match_film(
     side: Film | None = None,
     length_m: float | None = None,
     name: str = "fish",
-    on_progress: Callable[[], None] = lambda: None,
+    on_progress: Callable[[int, int], None] = lambda *_: None,
 ) -> FilmMatch:
     """Calibrate the model on a few frames and match all of them.
 
@@ -73,7 +73,7 @@ def match_film(
         side: the view from the side, frame by frame at the same moments.
         length_m: length of the fish; without it the unit is the body length.
         name: of the recording.
-        on_progress: called after every frame.
+        on_progress: called with the frames done, and in all.
 
     Raises:
         InputError: fewer than 2 frames, no body in the silhouettes, or views that do not fit.
@@ -111,7 +111,7 @@ def match_film(
             if frame is not None and match is not None:
                 side_match = side_view.search(frame, match.parameters)
             sides.append(no_side if side_match is None else side_match[0])
-        on_progress()
+        on_progress(len(rows), frames)
     parameters = np.array(rows)
     if int(np.isfinite(parameters[:, 2]).sum()) < 2:
         raise InputError(f"{name}: the model fits fewer than 2 of {len(rows)} frames")

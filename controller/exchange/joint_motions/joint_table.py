@@ -6,7 +6,7 @@ from pathlib import Path
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import ANGLES_RAD, DEGREE, TIMES_S
 from snakewalk.config.playback import JointRequest
-from snakewalk.config.reading import stated
+from snakewalk.config.reading import by_names, stated
 from snakewalk.config.table_columns import with_meanings
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.console.command import plugin
@@ -66,15 +66,17 @@ class JointTable:
                 f"{path}: column {cells[1 + units.index('?')]} states no unit of angles, and "
                 "others do; end its name in _rad or _deg"
             )
-        by_names = None if "?" in kinds else " and ".join(kinds)
-        unit = stated(path, "--unit", by_names, request.unit)
-        if by_names is None or unit is None:
+        joined = None if "?" in kinds else " and ".join(kinds)
+        by_name = by_names(joined, cells[1:], request.columns)
+        unit = stated(path, "--unit", by_name, request.unit)
+        if by_name is None or unit is None:
             hint = "or end the names of columns in _rad or _deg"
-            angles, unit = radians(f"{path}:", values[:, 1:], unit, hint)
+            angles, unit = radians(str(path), values[:, 1:], unit, hint)
         else:
             angles = values[:, 1:] * [ANGLES_RAD[kind] for kind in units]
         match = _TIME.fullmatch(_plain_name(cells[0]))
-        by_name = None if match is None else match[1] or match[2]
+        word = None if match is None else match[1] or match[2]
+        by_name = by_names(word, cells[:1], request.columns)
         time = stated(path, "--time-unit", by_name, request.time_unit)
         time = time_unit(path, values[:, 0], cells[0], time)
         time_s = values[:, 0] * TIMES_S[time.value]

@@ -169,7 +169,7 @@ def finish(
         with atomic_write(picture) as part:
             draw_terrain_map(world.relief, part, world.config.name)
         facts = facts | {"picture": str(picture)}
-    notes = facts.pop("notes", []) if not as_json else []
+    notes = [] if as_json else facts.pop("notes", [])
     show(world.facts() | facts, as_json)
     assert isinstance(notes, list)
     for note in notes:

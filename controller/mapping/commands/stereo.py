@@ -146,11 +146,8 @@ def stereo(
             *([f"Holes narrower than {fill:g} m were filled and count as known."] if fill else []),
         ]
     )
-    facts = _facts(terrain) | {
-        "facts": texts(calibrated.facts),
-        "notes": list(calibrated.notes),
-    }
-    finish(world, facts, picture, as_json=as_json)
+    about = {"facts": texts(calibrated.facts), "notes": list(calibrated.notes)}
+    finish(world, _facts(terrain) | about, picture, as_json=as_json)
 
 
 def _stand_faults(height: float | None, tilt: float | None, roll: float) -> list[str]:

@@ -1,5 +1,6 @@
 """``snakewalk world walkthrough``: a film along several stereo positions, and their ground."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,6 +10,7 @@ import typer
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
+from snakewalk.config.reading import texts
 from snakewalk.config.walkthrough import WalkthroughConfig
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
@@ -118,6 +120,8 @@ def walkthrough(
         "hole_share": round(facts.hole_share, 4),
         "valid_share": [round(float(model.valid.mean()), 4) for model in walk_steps.models],
         **(_step_facts(walk_steps.steps) if walk_steps.steps or as_json else {}),
+        "facts": texts(walk_steps.calibration.facts),
+        "notes": list(walk_steps.calibration.notes),
     }
     if world is None or ground is None:
         show(shown, as_json)
@@ -136,13 +140,10 @@ def walkthrough(
 
 def _size(text: str, faults: list[str]) -> tuple[int, int]:
     """Width and height of ``--size``; appends a fault if invalid."""
-    parts = text.split("x")
-    if len(parts) != 2 or not all(part.isdecimal() for part in parts):
-        faults.append(f"--size {text}: is not a size; write it as 640x480")
-        return 0, 0
-    wide, tall = (int(part) for part in parts)
+    match = re.fullmatch(r"([0-9]+)x([0-9]+)", text)
+    wide, tall = map(int, match.groups()) if match else (0, 0)
     if not (16 <= wide <= 4096 and 16 <= tall <= 4096) or wide % 2 or tall % 2:
-        faults.append(f"--size {text}: must be even numbers from 16 to 4096; write it as 640x480")
+        faults.append(f"--size {text}: must be even numbers from 16 to 4096, such as 640x480")
     return wide, tall
 
 
@@ -153,22 +154,17 @@ def _step_facts(steps: "Sequence[Step]") -> dict[str, object]:
         "inliers": [step.inliers for step in steps],
         "reprojection_px": [round(step.error_px, 2) for step in steps],
         "distance_m": [round(step.distance_m, 4) for step in steps],
-        "place_sd_mm": [round(1000.0 * step.place_sd_m, 2) for step in steps],
-        "angle_sd_mrad": [round(1000.0 * step.angle_sd_rad, 2) for step in steps],
+        "place_sd_mm": [_milli(step.place_sd_m) for step in steps],
+        "angle_sd_mrad": [_milli(step.angle_sd_rad) for step in steps],
         "common_share": [round(step.common_share, 3) for step in steps],
     }
-    places, angles = (
-        [None if error_m is None else 1000.0 * error_m for error_m in errors]
-        for errors in (
-            [step.place_error_m for step in steps],
-            [step.angle_error_rad for step in steps],
-        )
-    )
-    if any(place_error is not None for place_error in places):
-        facts["place_error_mm"] = [
-            None if place_error is None else round(place_error, 2) for place_error in places
-        ]
-        facts["angle_error_mrad"] = [
-            None if angle_error is None else round(angle_error, 2) for angle_error in angles
-        ]
+    errors_mm = [_milli(step.place_error_m) for step in steps]
+    if any(error is not None for error in errors_mm):
+        facts["place_error_mm"] = errors_mm
+        facts["angle_error_mrad"] = [_milli(step.angle_error_rad) for step in steps]
     return facts
+
+
+def _milli(value: float | None) -> float | None:
+    """Return a number in thousandths, rounded; None if it is unknown."""
+    return None if value is None else round(1000.0 * value, 2)

@@ -67,6 +67,7 @@ class StereoWalk:
     poses: Floats
     """(n, 3, 4) from each position's camera to the axes of the first one."""
     steps: tuple[Step, ...]
+    calibration: StereoCalibration
 
 
 def read_walk(
@@ -91,7 +92,7 @@ def read_walk(
             models.append(_model(file.parent, position, calibration, config.disparities))
         on_step(k + 1, total)
     if count == 1:
-        return StereoWalk(tuple(models), (), np.eye(3, 4)[None], ())
+        return StereoWalk(tuple(models), (), np.eye(3, 4)[None], (), calibration)
     motions = []
     groups = []
     for k in range(count - 1):
@@ -115,7 +116,7 @@ def read_walk(
         last = poses[-1]
         poses.append(np.column_stack([last[:, :3] @ turn, last[:, :3] @ shift + last[:, 3]]))
         on_step(2 * count + k, total)
-    return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps))
+    return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps), calibration)
 
 
 def _jointly(

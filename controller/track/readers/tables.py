@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import TIMES_S, named_unit, unit_m
-from snakewalk.config.reading import by_user
+from snakewalk.config.reading import by_names, by_user
 from snakewalk.config.table_columns import preview, with_meanings
 from snakewalk.config.text_table import numbers_of, read_rows
 from snakewalk.controller.motion.joint_motion import time_unit
@@ -63,12 +63,15 @@ def _of_rows(file: Path, every: list[list[str]], choice: Choice) -> Track | Keyp
         if not {"t", "frame", other, pair} <= column.keys():
             continue
         rows = _of_animal(file, rows, column, choice)
-        columns = [column[n] for n in ("t", "frame", other, name, pair)]
         table = (
-            _long_table(file, rows, column, place[2]) if place[3] else _numbers(file, rows, columns)
+            _long_table(file, rows, column, place[2])
+            if place[3]
+            else _numbers(file, rows, [column[n] for n in ("t", "frame", other, name, pair)])
         )
         scale_m = None if unit is None else unit_m(unit)
         track = _midline(file, table, scale_m, choice, _status_of(rows, column))
+        fact = by_names(unit, [name], choice.columns)
+        track = replace(track, facts={} if fact is None else {"unit": fact})
         return _named_track(file, track, rows, column)
     keypoints = [name[:-2] for name in column if name.endswith(".x") and f"{name[:-2]}.y" in column]
     if keypoints and "frame_idx" in column:
@@ -91,7 +94,7 @@ def _of_animal(
         choice.only(file, "a CSV of midlines", "time_unit")
         return rows
     choice.only(file, "a CSV of midlines", "individual", "time_unit")
-    names = [row[animals].strip() if animals < len(row) else "" for row in rows[1:]]
+    names = _cells(rows, animals)
     listed = list(dict.fromkeys(names))
     name_of_animal = choice.animal(file, listed, listed)
     return [
@@ -104,11 +107,8 @@ def _status_of(rows: list[list[str]], column: dict[str, int]) -> dict[float, Fra
     """Status of each frame by its number; empty if the table does not state it."""
     if "status" not in column:
         return {}
-    frame = column["frame"]
-    statuses = column["status"]
-    words = [row[statuses].strip() if statuses < len(row) else "" for row in rows[1:]]
-    numbers = [float(row[frame]) for row in rows[1:]]
-    named_statuses = statuses_named(words)
+    numbers = map(float, _cells(rows, column["frame"]))
+    named_statuses = statuses_named(_cells(rows, column["status"]))
     return dict(zip(numbers, named_statuses, strict=True)) if named_statuses else {}
 
 
@@ -133,9 +133,14 @@ def _long_table(file: Path, rows: list[list[str]], column: dict[str, int], unit:
     return np.hstack([first, point, table[:, 2:].reshape(-1, 2)])
 
 
+def _cells(rows: list[list[str]], column: int) -> list[str]:
+    """Cells of a column below its name; empty where a row is short."""
+    return [row[column].strip() if column < len(row) else "" for row in rows[1:]]
+
+
 def _numbers(file: Path, rows: list[list[str]], columns: list[int]) -> Floats:
     """Cells as numbers (rows, columns); empty ones and NA are NaN."""
-    cells = [[row[k] if k < len(row) else "" for k in columns] for row in rows[1:]]
+    cells = zip(*(_cells(rows, k) for k in columns), strict=True)
     return numbers_of(file, cells, [rows[0][k] for k in columns], range(2, len(rows) + 1))
 
 
@@ -203,10 +208,5 @@ def _sleap(
     score_columns = [column[f"{k}.score"] for k in keypoints if f"{k}.score" in column]
     scores = _numbers(file, rows, score_columns) if len(score_columns) == len(keypoints) else None
     xy = table[:, 1:].reshape(len(table), len(keypoints), 2)
-    animal_names = [""] * len(table)
-    if "track" in column:
-        tracks_column = column["track"]
-        animal_names = [
-            row[tracks_column].strip() if tracks_column < len(row) else "" for row in rows[1:]
-        ]
+    animal_names = _cells(rows, column["track"]) if "track" in column else [""] * len(table)
     return load_table(file, keypoints, animal_names, table[:, 0], xy, scores, choice)

@@ -15,6 +15,7 @@ from snakewalk.controller.animals.fish.postures import load_postures, save_postu
 from snakewalk.controller.animals.fish.rendered_fish import FilmConditions, FishScene
 from snakewalk.controller.cli.command_line import app
 from snakewalk.controller.track.readers.load import load_track
+from tests.helpers.foreign_files import midlines
 
 pytestmark = pytest.mark.usefixtures("legible_figures")
 
@@ -48,6 +49,9 @@ def test_film_match_and_picture(tmp_path: Path) -> None:
         "-o", tmp_path / "found.npz", "--picture", tmp_path / "match.png",
     )  # fmt: skip
     assert found["matched"] == 6
+    facts = found["facts"]
+    assert facts["unit"] == "m (stated by you: --length)"  # type: ignore[index]
+    assert facts["time"] == "30 Hz (stated by you: --rate)"  # type: ignore[index]
     assert found["turned_round"] == 0
     assert found["head_error_deg"][0] < 2.0  # type: ignore[index]
     assert (tmp_path / "match.png").read_bytes().startswith(PNG)
@@ -174,3 +178,12 @@ def test_a_fish_that_cannot_keep_its_distance_is_reported(tmp_path: Path) -> Non
         assert done.exit_code == 0
         assert warning in done.stderr
         assert bool(warning) == bool(done.stderr)
+
+
+def test_midlines_keep_the_facts_of_their_file(tmp_path: Path) -> None:
+    file, out = midlines(tmp_path / "m.csv"), ("-o", tmp_path / "o.npz")
+    found = snakewalk("match", file, *out)
+    assert found["facts"]["unit"] == "m (stated by the names of its columns)"  # type: ignore[index]
+    assert set(found["facts"]) == {"quantity", "unit", "order", "time"}  # type: ignore[call-overload]
+    words = ("match", file, "--length", 1, "--force", *out)
+    assert "--length and --background go with images" in refused(*words)

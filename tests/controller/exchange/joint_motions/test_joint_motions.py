@@ -239,6 +239,7 @@ def broken(change: Callable[[str], str]) -> Callable[[Path], None]:
         (broken(lambda text: text.replace("0.1000,", "0.1000,left,", 1)), "line 4: 17 cells|18"),
         (broken(lambda text: text.replace(f",{NAMES[1]},", f",{NAMES[0]},", 1)), "is there twice"),
         (broken(lambda text: "\n".join(text.splitlines()[:2])), "1 complete rows"),
+        (lambda path: path.write_text(",".join(["time_ms", *NAMES])), "0 complete rows"),
     ],
 )
 def test_faults_of_a_table(make: Callable[[Path], None], said: str, tmp_path: Path) -> None:

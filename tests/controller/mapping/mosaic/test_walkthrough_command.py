@@ -50,6 +50,7 @@ def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) ->
     assert made["place_error_mm"][0] < min(10.0, 4.0 * made["place_sd_mm"][0])
     assert made["angle_error_mrad"][0] < 5.0
     assert made["hole_share"] < 0.12
+    assert set(made["facts"]) == {"quantity", "unit", "order"}
     frames = [f.to_ndarray(format="rgb24") for f in av.open(str(film)).decode(video=0)]
     assert len(frames) == made["frames"] == 5
     one, two = (station(x) for x in PLACES_M)
@@ -87,6 +88,7 @@ def test_a_real_pair_is_a_single_position(tmp_path: Path) -> None:
     found = CliRunner().invoke(app, [*words, "--fps", "2", "--seconds", "1"])
     assert found.exit_code == 0, found.exception or found.output
     assert "valid share" in found.output
+    assert "mm (stated by its format)" in found.output
     assert "matches" not in found.output  # there is no next position
     frames = [f.to_ndarray(format="rgb24") for f in av.open(str(film)).decode(video=0)]
     assert len(frames) == 4
@@ -104,7 +106,7 @@ def test_bad_input_is_reported_with_its_place(route: Path, tmp_path: Path) -> No
     film = tmp_path / "film.mp4"
     assert "a film ends in .mp4" in refused(route, "-o", tmp_path / "film.avi")
     assert "must be even numbers" in refused(route, "-o", film, "--size", "241x180")
-    assert "--size big: is not a size" in refused(route, "-o", film, "--size", "big")
+    assert "--size big: must be even numbers" in refused(route, "-o", film, "--size", "big")
     assert "add --world" in refused(route, "-o", film, "--picture", tmp_path / "a.png")
     file = route.with_name("other.toml")
     text = route.read_text()
