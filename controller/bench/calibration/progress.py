@@ -11,7 +11,8 @@ from pydantic import Field
 from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
-from snakewalk.controller.console.result_files import read_progress, write_result
+from snakewalk.controller.console.interrupted_progress import read_progress
+from snakewalk.controller.console.result_files import write_result
 
 
 class SeenBend(Strict):

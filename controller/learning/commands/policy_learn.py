@@ -10,9 +10,10 @@ from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console.command import command
+from snakewalk.controller.console.interrupted_progress import read_progress
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, Workers, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import read_progress, write_result
+from snakewalk.controller.console.result_files import write_result
 from snakewalk.controller.learning.wave_search import (
     SearchProgress,
     search_progress,

@@ -63,6 +63,7 @@ WRITERS_OF_A_KIND = frozenset(
         "animals/fish/synthesis.py",
         "animals/mesh/skin_file.py",
         "capture/capture.py",
+        "console/separate_reader.py",
         "images/mesh_files.py",
         "mapping/las_file.py",
         "mapping/mosaic/place_mesh.py",
