@@ -115,20 +115,28 @@ def test_what_is_exported_comes_back(tmp_path: Path, robot: RobotConfig) -> None
         assert made.kinematics_error_m < 1e-9
 
 
-CHAINS = [robot for robot in map(load_robot, shipped("robots")) if not robot.limbs]
+ROBOTS = [load_robot(name) for name in shipped("robots")]
 
 
-@pytest.mark.parametrize("robot", CHAINS, ids=lambda each: each.name)
-def test_a_shipped_robot_keeps_its_limits_through_a_file(
-    tmp_path: Path, robot: RobotConfig
-) -> None:
-    """The stops of the simulator, 0.1 rad beyond the limits, were in the file."""
-    limits = robot.limit_rad
-    file = tmp_path / "model.xml"
-    for _ in range(2):
-        file.write_text(mjcf_text(robot))
-        robot = import_robot(file, robot.name, robot.servo.model).robot
-        np.testing.assert_allclose(robot.limit_rad, limits, atol=1e-6)
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda each: each.name)
+def test_a_shipped_robot_comes_back_from_its_files(tmp_path: Path, robot: RobotConfig) -> None:
+    """The stops of the simulator, 0.1 rad beyond the limits, were in the file.
+
+    Masses beside the line of a link and figures of the servos are no part of the files.
+    """
+    for write in (mjcf_text,) if robot.limbs else (mjcf_text, urdf_text):
+        file = tmp_path / "model.xml"
+        texts = []
+        made = robot
+        for _ in range(2):
+            file.write_text(write(made))
+            made = import_robot(file, robot.name, robot.servo.model).robot
+            texts.append(write(made))
+            assert (made.joint_axes, made.signs) == (robot.joint_axes, robot.signs)
+            np.testing.assert_allclose(made.limit_rad, robot.limit_rad, atol=1e-6)
+            np.testing.assert_allclose(made.link_lengths_m, robot.link_lengths_m, atol=1e-9)
+            np.testing.assert_allclose(made.link_masses_kg, robot.link_masses_kg, atol=1e-9)
+        assert texts[0] == texts[1]
 
 
 def test_anchors_beside_the_line_but_on_their_axes_make_no_difference(tmp_path: Path) -> None:
