@@ -364,9 +364,11 @@ def _decoded_page(
         return np.asarray(mats[0])
     try:
         data = np.frombuffer(read_bytes(file), dtype=np.uint8)
+        image = cv2.imdecode(data, how)
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
-    image = cv2.imdecode(data, how) if data.size else None
+    except cv2.error:  # an empty file, or a size beyond OpenCV's limits
+        image = None
     if image is None:
         raise InputError(f"{file}: is not a readable image; choose another file")
     pixels: NDArray[np.uint8 | np.uint16 | np.float32] = np.asarray(image)

@@ -1,5 +1,6 @@
 """Images of 16 bit keep their depth, and frames of a video the times that it says."""
 
+import struct
 from fractions import Fraction
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import load_capture
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.images.body_detector import make_detector
@@ -153,3 +155,16 @@ def test_missing_numbers_are_counted_and_keep_their_time(tmp_path: Path) -> None
     even = [Path(f"{number:03}.png") for number in range(0, 60, 10)]
     assert frame_numbers_of(even) is None
     assert frame_numbers_of([*even[:3], Path("other.png")]) is None
+
+
+@pytest.mark.parametrize("height", [None, 2_000_000])
+def test_an_image_that_is_empty_or_says_too_many_rows_is_one_line(
+    height: int | None, tmp_path: Path
+) -> None:
+    for k in range(2):
+        cv2.imwrite(str(tmp_path / f"{k}.bmp"), np.zeros((4, 4, 3), np.uint8))
+    whole = (tmp_path / "1.bmp").read_bytes()
+    broken = b"" if height is None else whole[:22] + struct.pack("<i", height) + whole[26:]
+    (tmp_path / "1.bmp").write_bytes(broken)
+    with pytest.raises(InputError, match=r"1\.bmp: is not a readable image"):
+        list(open_footage(tmp_path).read())
