@@ -18,6 +18,7 @@ from snakewalk.controller.bench.servo_settings import SettingChange, open_servo
 from snakewalk.controller.console.result_files import write_result
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_scan import find_feetech
+from snakewalk.drivers.chain.chain_settings import JOINT_NUMBER
 from snakewalk.drivers.errors import ChainError, ServoError
 from snakewalk.drivers.port.byte_port import BytePort
 
@@ -29,6 +30,9 @@ _IDENTITY = (
     "Baud Rate",
     "Protocol Type",
 )
+
+_JOINTS = range(1, 100)
+"""Numbers of joints that a run writes (ours); a factory's value is larger."""
 
 
 class ServoBackup(Strict):
@@ -54,7 +58,7 @@ def back_up(
     """Read every servo on the bus; writes nothing.
 
     Raises:
-        ChainError: nobody is there.
+        ChainError: nobody is there, or a Feetech servo holds settings of a run.
         ControlTableError: a servo is of a model that is not known.
         BusError: a servo stops answering.
 
@@ -196,7 +200,12 @@ class RestoreJournal:
 
 
 def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
-    """Raw values that a person or a program may have set, by address."""
+    """Raw values that a person or a program may have set, by address.
+
+    Raises:
+        ChainError: a Feetech servo has been in a run since it was switched on.
+
+    """
     registers = sorted(
         (bus.table[name] for name in bus.table), key=lambda sorted_register: sorted_register.address
     )
@@ -212,4 +221,9 @@ def _eeprom(bus: DynamixelBus, servo_id: int) -> dict[str, int]:
                 values[register.name] = bus.read(servo_id, register.name)
             except ServoError:
                 continue  # the firmware is older than the table
+    if values.get(JOINT_NUMBER) in _JOINTS:
+        raise ChainError(
+            f"ID {servo_id}: holds settings of a run that its EEPROM does not ({JOINT_NUMBER} is "
+            "the number of a joint); switch the servo power off and on"
+        )
     return values

@@ -131,12 +131,12 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
                 f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg while it "
                 f"advanced {travelled:.1f} m",
             )
-        forward_m = _forward_m(record, rows)
-        if abs(forward_m) < GRIP_SHARE * travelled:
+        forward_m = abs(_forward_m(record, rows))
+        if forward_m < GRIP_SHARE * travelled:
             return Failure(
                 "slip",
                 f"its links moved {travelled:.1f} m along themselves, and the body only "
-                f"{abs(forward_m):.1f} m",
+                f"{forward_m:.1f} m",
             )
         error = path_error_m(record)[rows]
         return Failure(
@@ -153,8 +153,8 @@ def _of_climb(record: RunRecord, text: str) -> Failure:
     pose = record.pose
     replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
     rows = np.flatnonzero((pose.pulse_m_s > 0.0) & (pose.time_s < replanned_s))
-    if len(rows) > 1 and record.paths:
-        due_m = np.arange(0.0, length_m(record.paths[0][1]), 0.25 * body_m)
+    if len(rows) > 1:
+        due_m = np.arange(0.0, length_m(record.header.plan.path_m), 0.25 * body_m)
         slid_m, fall_rad = _slide(record, rows)
         if (
             _steepest_rad(record, 0, due_m) <= max(_holds_rad(record), CLIMBED_RAD)

@@ -187,6 +187,25 @@ def test_a_backup_of_feetech_servos_suits_another_firmware(
     assert bus["Firmware Minor Version"].tolist() == [11, 11]
 
 
+def test_settings_that_a_run_left_in_a_feetech_servo_are_no_backup(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its limits and gains are volatile until it is switched off; a restore would store them."""
+    bus = ServoBus("1-2:STS3215")
+    open_as_port(bus.line, monkeypatch)
+    file = tmp_path / "servos.json"
+
+    def call(*words: object) -> int:
+        words = (*map(str, words), "--baud", "1000000", "--port", "any")
+        return CliRunner().invoke(app, ["bus", *words]).exit_code
+
+    assert call("backup", "-o", file) == 0
+    bus.set("Velocity I Gain", 2)
+    assert call("backup", "-o", tmp_path / "after.json") == 1
+    assert call("restore", file, "--dry-run") == 1
+    assert not (tmp_path / "after.json").exists()
+
+
 def test_a_reboot_clears_an_alarm_and_asks_first(line: SimLine, call: Call) -> None:
     line.bank["Hardware Error Status"][0] = 0x20
     line.bank["Torque Enable"][1] = 1
