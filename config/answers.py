@@ -18,3 +18,13 @@ LISTED = BeforeValidator(
     lambda given: [part.strip() for part in given.split(",")] if isinstance(given, str) else given
 )
 """Rule that reads a list from words: A,B,C."""
+
+
+class TableAnswers(Strict):
+    """Columns of a table with other names, or none."""
+
+    columns: dict[str, str] = Field(
+        {},
+        description="MEANING=COLUMN: name that the reader expects of a column, and that column's "
+        "name or number; may be repeated",
+    )

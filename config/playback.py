@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from snakewalk.config.table_columns import TableAnswers
+from snakewalk.config.answers import TableAnswers
 
 
 class JointRequest(TableAnswers):

@@ -3,24 +3,11 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pydantic import Field
-
-from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import is_number
 
 _MOST_HEAD_LINES = 100
 _SHOWN_ROWS, _SHOWN_COLUMNS = 4, 30
-
-
-class TableAnswers(Strict):
-    """Columns of a table with other names, or none."""
-
-    columns: dict[str, str] = Field(
-        {},
-        description="MEANING=COLUMN: name that the reader expects of a column, and that column's "
-        "name or number; may be repeated",
-    )
 
 
 def with_meanings(

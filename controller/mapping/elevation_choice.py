@@ -4,9 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from snakewalk.config.answers import LISTED, Answers
+from snakewalk.config.answers import LISTED, Answers, TableAnswers
 from snakewalk.config.key_types import LengthUnit
-from snakewalk.config.table_columns import TableAnswers
 from snakewalk.controller.console.option import Flag
 
 _Length = Literal["m", "cm", "mm", "km", "ft", "us-ft"]

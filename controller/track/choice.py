@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from snakewalk.config.answers import LISTED, Answers
+from snakewalk.config.answers import LISTED, Answers, TableAnswers
 from snakewalk.config.errors import InputError
-from snakewalk.config.table_columns import TableAnswers
 
 FEWEST = 4
 """Points for a curve."""

@@ -299,7 +299,7 @@ def cases() -> Iterator[Case]:
     lifted[::60, 2] += 300.0
     yield case("points", "outliers 300 m up", table("a.xyz", points=lifted), "--assume highest_m")
     four = table("a.xyz", points=np.c_[POINTS, POINTS[:, 2]])
-    yield case("points", "four numbers a point", four, {"relief_m": RIGHT["relief_m"]})
+    yield case("points", "four numbers a point", four, "--columns x=COLUMN|add --columns")
     y_up = POINTS[:, [0, 2, 1]] * [1.0, 1.0, -1.0]
     for name in ("a.obj", "a.stl", "a.ply"):
         yield case("points", f"mesh {name}", solid(name), spacing_m=STEP_M)
