@@ -13,6 +13,8 @@ from snakewalk.config.strict_toml import checked, read_toml
 
 FOLDER = Path(__file__).parent / "servos"
 """Folder with a file for each shipped servo model."""
+_MISTYPED = 0.8
+"""Likeness of two names from which one counts as mistyped (ours)."""
 _MOST_FILES = 5
 """Longest chain of files that are each like the next (ours)."""
 
@@ -128,7 +130,12 @@ def _shipped_data(name: str) -> tuple[dict[str, Any], str]:
 
 def _read(path: Path) -> ServoModel:
     data, text = read_toml(path)
-    return checked(ServoModel, _merged_with_like(path, data, 1), str(path), text)
+    model = checked(ServoModel, _merged_with_like(path, data, 1), str(path), text)
+    known = {row for name in shipped_models() for row in _shipped_data(name)[0]["registers"]}
+    for row in model.registers.keys() - known:
+        if near := get_close_matches(row, known - model.registers.keys(), 1, _MISTYPED):
+            raise ConfigError(f"{path}: registers: no model has {row}; did you mean {near[0]}?")
+    return model
 
 
 def _merged_with_like(path: Path, data: dict[str, Any], depth: int) -> dict[str, Any]:

@@ -83,6 +83,16 @@ def test_measurements_of_another_model_are_not_taken_over(tmp_path: Path) -> Non
         servo_model(str(written(tmp_path, without_source)))
 
 
+def test_a_mistyped_register_of_a_copied_file_is_named(tmp_path: Path) -> None:
+    """With an address it was taken for a new register."""
+    copied = (FOLDER / "STS3215.toml").read_text(encoding="utf-8")
+    file = written(tmp_path, copied.replace('"Acceleration" =', '"Accelertion" ='))
+    with pytest.raises(ConfigError, match="no model has Accelertion; did you mean Acceleration"):
+        servo_model(str(file))
+    mine = copied + '"My Own Register" = { address = 90, size = 1 }\n'
+    assert "My Own Register" in servo_model(str(written(tmp_path, mine))).registers
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
