@@ -209,7 +209,7 @@ class CommandGroup(TyperGroup):
             names = {
                 plugin.name.split()[-1]: plugin.name for plugin in reversed(_listed_commands(""))
             }
-            meant = [names[close_match] for close_match in get_close_matches(word, names, 1, 0.8)]
+            meant = [f"snakewalk {names[near]}" for near in get_close_matches(word, names, 1, 0.8)]
         return f"; did you mean {' or '.join(meant)}?" if meant else ""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

@@ -59,7 +59,7 @@ def test_wrong_input_is_said_plainly(words: list[str], said: str) -> None:
         (["nosuch"], "No such command 'nosuch' (see"),
         (["docter"], "No such command 'docter'; did you mean doctor? (see snakewalk --help)"),
         (["gait", "lst"], "No such command 'lst'; did you mean gait list? (see snakewalk gait"),
-        (["blink"], "No such command 'blink'; did you mean bus blink?"),
+        (["blink"], "No such command 'blink'; did you mean snakewalk bus blink?"),
         (["run", "--roobot", "x"], "No such option: --roobot; did you mean --robot?"),
         (["run", "flat-square", "--out", __file__], "is a file"),
     ],
