@@ -89,7 +89,7 @@ OTHERS: Final = {
             "controller/bench/guided_setup.py", "controller/bench/loop_compiler.py",
             "controller/capture/capture.py", "controller/capture/corrections.py",
             "controller/capture/part_folder.py", "controller/capture/review.py",
-            "controller/console/command.py", "controller/console/result_files.py",
+            "controller/console/command.py", "controller/console/interrupted_progress.py",
             "controller/console/table.py",
             "controller/learning/policy_trials.py",
             "controller/rehearsal/commands/rehearse.py", "controller/rehearsal/commands/tasks.py",
