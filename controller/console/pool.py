@@ -4,10 +4,10 @@ import os
 import tempfile
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from multiprocessing import active_children, parent_process
 from typing import TypeVar
@@ -82,10 +82,11 @@ def each(
     upcoming = iter(range(len(items)))
     suspects = deque[int]()
     deaths: Counter[int] = Counter()
-    while True:
-        done = yield from _on_one_pool(work, items, workers, upcoming, suspects, deaths)
-        if done:
-            return
+    is_done = False
+    while not is_done:
+        with suppress(BrokenProcessPool):
+            yield from _on_one_pool(work, items, workers, upcoming, suspects, deaths)
+            is_done = True
 
 
 def _on_one_pool(
@@ -95,11 +96,16 @@ def _on_one_pool(
     upcoming: Iterator[int],
     suspects: deque[int],
     deaths: Counter[int],
-) -> Generator[tuple[A, B], None, bool]:
-    """Yield results until all are done, or a worker dies and the pool is broken.
+) -> Iterator[tuple[A, B]]:
+    """Yield results until all are done.
 
     ``suspects`` are the items that ran or waited when a worker died. They run first, one at a time,
     so that ``deaths`` counts only the item that ends its worker.
+
+    Raises:
+        BrokenProcessPool: a worker died. The others are killed: one that starts just then would
+            never end, and the pool waits for it (Python 3.11).
+
     """
     waiting: dict[Future[B], int] = {}
     with process_pool(workers) as pool:
@@ -115,8 +121,8 @@ def _on_one_pool(
                 except BrokenProcessPool:  # a worker has died since the last result
                     suspects.append(number)
                     broken = True
-            if not waiting:
-                return not broken
+            if not waiting and not broken:
+                return
             alone = len(waiting) == 1 and not broken
             finished, _ = wait(waiting, return_when=ALL_COMPLETED if broken else FIRST_COMPLETED)
             for future in finished:
@@ -131,7 +137,7 @@ def _on_one_pool(
                 suspects.extend(sorted(waiting.values()))
                 if alone:
                     _count_death(deaths, suspects[-1], items)
-                return False
+                raise BrokenProcessPool
 
 
 def _count_death(deaths: Counter[int], number: int, items: Sequence[A]) -> None:
