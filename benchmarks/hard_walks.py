@@ -9,7 +9,7 @@ is found if a trip or an event names its joint afterwards. One line a walk is ke
 import argparse
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -199,6 +199,22 @@ def table(rows: list[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
+def kept_rows(
+    work: Callable[[int], dict[str, Any]], seeds: range, out: Path, workers: int
+) -> list[dict[str, Any]]:
+    """Return the rows of a file, after those of the seeds that it lacked were added."""
+    known = out.read_text("utf-8").splitlines() if out.exists() else []
+    rows = [json.loads(line) for line in known]
+    done = {row["seed"] for row in rows}
+    with out.open("a", encoding="utf-8") as file:
+        left = [seed for seed in seeds if seed not in done]
+        for _, row in each(work, left, workers=workers):
+            rows.append(row)
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+    return rows
+
+
 def main() -> None:
     """Walk what the file lacks, print the table; 1 after a false trip or a missed fault."""
     about = __doc__.split("\n\n")[0]
@@ -209,17 +225,9 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("-o", "--out", type=Path, default=Path("walks.jsonl"))
     given = parser.parse_args()
-    known = given.out.read_text("utf-8").splitlines() if given.out.exists() else []
-    rows = [json.loads(line) for line in known]
-    done = {row["seed"] for row in rows}
     seeds = range(given.first_seed, given.first_seed + given.walks)
     work = partial(walked, is_planted=given.planted)
-    with given.out.open("a", encoding="utf-8") as file:
-        left = [seed for seed in seeds if seed not in done]
-        for _, row in each(work, left, workers=given.workers):
-            rows.append(row)
-            file.write(json.dumps(row) + "\n")
-            file.flush()
+    rows = kept_rows(work, seeds, given.out, given.workers)
     print(table(rows))
     print(Counter(row["trip"] for row in rows if row["trip"]).most_common(40))
     bad = [row for row in rows if (not row.get("found", True) if given.planted else is_false(row))]

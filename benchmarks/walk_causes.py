@@ -5,7 +5,6 @@ right if it names that reason. A walk that arrives in spite of it counts as arri
 """
 
 import argparse
-import json
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -15,10 +14,9 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.hard_walks import fault_of, on_its_back, planted
+from benchmarks.hard_walks import fault_of, kept_rows, on_its_back, planted
 from snakewalk.config.arrays import Floats
 from snakewalk.config.faults import FaultPlan
-from snakewalk.controller.console.pool import each
 from snakewalk.controller.kinematics.rotations import offset_rad
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.run.kinds.walk_run import WalkRun
@@ -130,17 +128,8 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("-o", "--out", type=Path, default=Path("causes.jsonl"))
     given = parser.parse_args()
-    known = given.out.read_text("utf-8").splitlines() if given.out.exists() else []
-    rows = [json.loads(line) for line in known]
-    done = {row["seed"] for row in rows}
     seeds = range(given.first_seed, given.first_seed + given.walks)
-    with given.out.open("a", encoding="utf-8") as file:
-        left = [seed for seed in seeds if seed not in done]
-        for _, row in each(walked, left, workers=given.workers):
-            rows.append(row)
-            file.write(json.dumps(row) + "\n")
-            file.flush()
-    print(table(rows))
+    print(table(kept_rows(walked, seeds, given.out, given.workers)))
 
 
 if __name__ == "__main__":

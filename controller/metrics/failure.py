@@ -114,10 +114,8 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     progress = float(remaining[0] - remaining[-1])
     travelled = float(advanced * (times[-1] - times[0]))
     if progress < PROGRESS_SHARE * travelled:
-        due_m = float(np.median(pose.path_s_m[rows])) + 0.25 * header.robot.length_m * np.arange(
-            5.0
-        )
-        steep_rad = _steepest_rad(record, -1, due_m)
+        ahead_m = np.linspace(0.0, header.robot.length_m, 5)
+        steep_rad = _steepest_rad(record, -1, float(np.median(pose.path_s_m[rows])) + ahead_m)
         if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
             return _of_climb(
                 record,
@@ -169,11 +167,16 @@ def _of_climb(record: RunRecord, text: str) -> Failure:
     return Failure("climb", text)
 
 
+def _directions(links_m: Floats) -> Floats:
+    """Level unit vectors (n, 2) from tail to head of links (n, L, 3)."""
+    along = links_m[:, 0, :2] - links_m[:, -1, :2]
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
 def _forward_m(record: RunRecord, rows: np.ndarray) -> float:
     """Distance that the body moved along the line from its tail to its head."""
     pose = record.pose
-    along = pose.links_m[rows, 0, :2] - pose.links_m[rows, -1, :2]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = _directions(pose.links_m[rows])
     return float((np.diff(pose.centre_m[rows, :2], axis=0) * along[:-1]).sum())
 
 
@@ -184,8 +187,7 @@ def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
     the slide; 0 without a ground.
     """
     pose = record.pose
-    along = pose.links_m[rows, 0, :2] - pose.links_m[rows, -1, :2]
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    along = _directions(pose.links_m[rows])
     speed_m_s = pose.speed_m_s[rows, None] * along
     steps_s = np.diff(pose.time_s[rows])[:, None]
     centre_m = pose.centre_m[rows, :2]
