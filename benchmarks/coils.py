@@ -21,7 +21,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.coil_film import COILS
+from snakewalk.controller.capture.coil_fit import COILS
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.resample import body_points, equal_arc_length

@@ -63,7 +63,6 @@ def _divided(name: str, curve: Callable[[int], Floats], number: int, segments: i
         slowest = max(slowest, time.process_time() - begin)
     return [
         Row(f"{name}: divided of {number}", number - methods["rejected"], ""),
-        Row(f"{name}: by branches", methods["branches"], ""),
         Row(f"{name}: by a sample of branches", methods["sample"], ""),
         Row(f"{name}: slowest", slowest * 1e3, "ms"),
     ]

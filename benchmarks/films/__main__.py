@@ -99,14 +99,14 @@ def summary(done: list[JudgedFilm]) -> str:
             f"\n{above} of {len(good)} good frames with truth ({above / len(good):.1%}) are above "
             f"twice their expected error; median expected over median true error {ratio:.2f}."
         )
-    judged = [(one.head_sure, all(one.heads)) for one in done if one.heads]
+    judged = [(0.5 + 0.5 * one.head_sure, np.mean(one.heads) > 0.5) for one in done if one.heads]
     if judged:
-        for low, high in ((0.0, 0.5), (0.5, 0.8), (0.8, 0.95), (0.95, 1.01)):
+        for low, high in ((0.5, 0.8), (0.8, 0.9), (0.9, 0.97), (0.97, 1.01)):
             here = [right for sure, right in judged if low <= sure < high]
             if here:
                 lines.append(
-                    f"Head sure by {low:g} to {min(high, 1.0):g}: right in {sum(here)} of "
-                    f"{len(here)} films."
+                    f"Probability of the head {low:g} to {min(high, 1.0):g}: right in {sum(here)} "
+                    f"of {len(here)} films."
                 )
     return "\n".join(lines)
 

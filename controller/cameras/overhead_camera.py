@@ -33,7 +33,11 @@ from snakewalk.controller.cameras.markers.floor_markers import (
     fit_floor,
     picture_move,
 )
-from snakewalk.controller.cameras.markers.lens_residual import Distortion, marker_distortion
+from snakewalk.controller.cameras.markers.lens_residual import (
+    Distortion,
+    assumed_distortion,
+    marker_distortion,
+)
 from snakewalk.controller.cameras.pose_tracking import BodyPrior, TrackedPose, track_pose
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
 from snakewalk.controller.images.medial_axis import no_skeleton, skeleton_of
@@ -73,7 +77,8 @@ class CameraModel:
     markers: Markers = field(default_factory=dict)
     """Printed markers in the picture in which the homography was measured."""
     distortion: Distortion | None = None
-    """Distortion of an uncalibrated lens, where the markers show it; it is not undone."""
+    """Distortion of an uncalibrated lens that markers show, or that four corners do not exclude; it
+    is not undone."""
     heights: Heights | None = None
     """Heights of known ground above the floor of the homography; None: the ground is that floor."""
 
@@ -131,7 +136,10 @@ class CameraModel:
             if _least_triangle(corners) < _LEAST_AREA * area or area == 0.0:
                 raise InputError(f"camera: {name}: three of the four places lie on a line")
         found = np.asarray(cv2.getPerspectiveTransform(px, floor), dtype=float)
-        return cls(found, np.array(centre_m, dtype=float), camera.height_m, lens)
+        size_px = camera.width_px, camera.height_px
+        distortion = None if lens else assumed_distortion(px, floor, size_px)
+        foot = np.array(centre_m, dtype=float)
+        return cls(found, foot, camera.height_m, lens, distortion=distortion)
 
     @classmethod
     def from_markers(

@@ -11,25 +11,17 @@ import numpy as np
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.coil_film import COIL_LEAST, solve_coils
 from snakewalk.controller.capture.detections import Detections
-from snakewalk.controller.capture.identity import AlignedSkeletons, align_ends, head_end, margins
+from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image_file import scaled
-from snakewalk.controller.capture.outlier_frames import mark_empty, mark_outliers
-from snakewalk.controller.capture.small_body.film_fit import (
-    fit_film,
-    with_least_errors,
-    with_tip_errors,
-)
-from snakewalk.controller.capture.verification.film_check import has_faint_continuation, verified
-from snakewalk.controller.capture.verification.steady_tails import with_steady_tails
+from snakewalk.controller.capture.staged_film import StagedFilm
+from snakewalk.controller.capture.stages.pipeline import stages
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
 _OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
-_FAINT_TAIL = 0.1  # of the length: expected error if something faint goes on beyond a tip
 _STILL_BODY = 0.02  # of the length: a smaller change does not count as motion
 
 
@@ -85,11 +77,16 @@ class Capture:
     time_s: Floats
     """(T,) when the frames were taken; uneven where the film says so."""
     head_by: str
-    """How the head and the tail were distinguished: ``given``, ``travel``, ``wave``, ``taper``."""
+    """How head and tail were distinguished: ``given``, or the clearest sign of ``head.GROUPS``."""
     head_sure: float
     """Certainty of the distinction of head and tail, 0 to 1."""
     places_recorded: bool = True
     """Whether the points of all frames share one origin; images cropped to the animal have none."""
+
+    @property
+    def head_probability(self) -> float:
+        """Probability that the head is first; calibrated on films with known heads."""
+        return 0.5 * (1.0 + self.head_sure)
 
     @property
     def good(self) -> Bools:
@@ -105,6 +102,15 @@ class Capture:
     def with_distractors(self) -> Bools:
         """(T,) frames in which another object, larger than a speck, stands out: a small animal."""
         return self.distractors > _DISTRACTOR
+
+    def roughened(self, least: float) -> "Capture":
+        """Return the capture without good frames; errors are at least ``least`` of the length."""
+        rough = {FrameStatus.GOOD: FrameStatus.ROUGH}
+        return replace(
+            self,
+            expected_px=np.fmax(self.expected_px, least * self.length_px),
+            status=tuple(rough.get(frame_status, frame_status) for frame_status in self.status),
+        )
 
     @property
     def counts(self) -> dict[str, int]:
@@ -158,102 +164,51 @@ def captured_from(
 
     A ``part`` of a film may be without motion or without any body.
     """
-    marked = mark_empty(detections.skeletons, np.array(detections.contrast))
-    checked = mark_outliers(align_ends(marked).skeletons, np.array(detections.area_px))
-    if sum(skeleton.status is FrameStatus.GOOD for skeleton in checked) < 2:
-        if part:
-            return _without_body(detections, checked, rate_hz, fixed=fixed)
-        raise UnusableFilmError(name, checked)
-    aligned = align_ends(checked)
-    coils = solve_coils(aligned.skeletons, detections.outlines, np.array(detections.axis_error_px))
-    if sum(skeleton.status.has_points for skeleton in coils.skeletons) < 2:
-        if part:
-            return _without_body(detections, coils.skeletons, rate_hz, fixed=fixed)
-        raise UnusableFilmError(name, coils.skeletons)
-    aligned = AlignedSkeletons(coils.skeletons, margins(coils.skeletons))
-    points = np.stack([skeleton.points_px for skeleton in aligned.skeletons])
-    radius = np.stack([skeleton.radius_px for skeleton in aligned.skeletons])
-    if not part and _change(points) < _STILL_BODY:
+    nan = np.full(len(detections.skeletons), np.nan)
+    film = StagedFilm(
+        detections, tuple(detections.skeletons), nan, nan > 0.0, rate_hz, fixed, head_px
+    )
+    for stage in stages():
+        film = stage.run(film)
+        if sum(skeleton.status.has_points for skeleton in film.skeletons) < 2:
+            if part:
+                return _without_body(film)
+            raise UnusableFilmError(name, film.skeletons)
+    captured = _captured(film)
+    if not part and _change(captured.points_px) < _STILL_BODY:
         raise InputError(
             f"{name}: no motion: the body changes by less than {_STILL_BODY:.0%} of its length in "
-            f"{len(points)} frames"
+            f"{len(film.skeletons)} frames"
         )
-    score, by = head_end(points, radius, rate_hz, head_px, fixed=fixed)
-    skeletons, tips_px = with_steady_tails(
-        [skeleton.reversed() if score < 0.0 else skeleton for skeleton in aligned.skeletons],
-        detections.tip_error_px,
-    )
-    solved = np.isfinite(coils.expected_px)
-    expected = np.where(solved, coils.expected_px, detections.expected_px)
-    for k, tip_px in tips_px.items():
-        # blur moves the head only; the points between share the errors of both ends
-        expected[k] = 0.5 * np.hypot(expected[k], tip_px)
-    crops = detections.crops.without(set(np.flatnonzero(solved).tolist()))
-    fitted = fit_film(skeletons, crops, aligned.margin, expected, fixed=fixed)
-    fitted = with_tip_errors(fitted, detections.ends_px, solved)
-    fitted = with_least_errors(fitted, detections.least_error_px)
-    skeletons = verified(fitted.skeletons, detections.store)
-    if not part and sum(skeleton.status.has_points for skeleton in skeletons) < 2:
-        raise UnusableFilmError(name, skeletons)
-    usual = fitted.expected_px[~solved & np.isfinite(fitted.expected_px)]
-    expected = fitted.expected_px.copy()
-    least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
-    expected[solved] = np.maximum(expected[solved], least)
-    expected[[not skeleton.status.has_points for skeleton in skeletons]] = np.nan
-    goes_on = not detections.shows_tips(skeletons) and has_faint_continuation(
-        skeletons, detections.store
-    )
-    if goes_on or detections.is_unclear(skeletons):
-        skeletons, expected = _without_tail(skeletons, expected)
+    return captured
+
+
+def _captured(film: StagedFilm) -> Capture:
+    score, by = film.head
     return Capture(
-        points_px=np.stack([skeleton.points_px for skeleton in skeletons]),
-        radius_px=np.stack([skeleton.radius_px for skeleton in skeletons]),
-        length_px=np.array([skeleton.length_px for skeleton in skeletons]),
-        status=tuple(skeleton.status for skeleton in skeletons),
-        expected_px=expected,
-        distractors=np.array(detections.distractors),
-        margin=margins(skeletons),
-        rate_hz=rate_hz,
-        time_s=np.arange(len(points)) / rate_hz,
+        points_px=film.points_px,
+        radius_px=film.radius_px,
+        length_px=film.length_px,
+        status=tuple(skeleton.status for skeleton in film.skeletons),
+        expected_px=film.expected_px,
+        distractors=np.array(film.detections.distractors),
+        margin=margins(film.skeletons),
+        rate_hz=film.rate_hz,
+        time_s=np.arange(len(film.skeletons)) / film.rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
-        places_recorded=fixed,
+        places_recorded=film.fixed,
     )
 
 
-def _without_tail(bodies: Sequence[Skeleton], error_px: Floats) -> tuple[list[Skeleton], Floats]:
-    """The bodies and their expected errors (T,) if something faint goes on beyond a tip."""
-    least = _FAINT_TAIL * np.array([body.length_px for body in bodies])
-    rough = [
-        replace(body, status=FrameStatus.ROUGH) if body.status is FrameStatus.GOOD else body
-        for body in bodies
-    ]
-    return rough, np.asarray(np.fmax(error_px, least))
-
-
-def _without_body(
-    detections: Detections, checked: Sequence[Skeleton], rate_hz: float, *, fixed: bool
-) -> Capture:
+def _without_body(film: StagedFilm) -> Capture:
     """Return a part of a film in which no body is seen well."""
     bodies = [
         no_skeleton(FrameStatus.BLOB if skeleton.status.has_points else skeleton.status)
-        for skeleton in checked
+        for skeleton in film.skeletons
     ]
     nan = np.full(len(bodies), np.nan)
-    return Capture(
-        points_px=np.stack([body.points_px for body in bodies]),
-        radius_px=np.stack([body.radius_px for body in bodies]),
-        length_px=nan,
-        status=tuple(body.status for body in bodies),
-        expected_px=nan.copy(),
-        distractors=np.array(detections.distractors),
-        margin=nan.copy(),
-        rate_hz=rate_hz,
-        time_s=np.arange(len(bodies)) / rate_hz,
-        head_by="taper",
-        head_sure=0.0,
-        places_recorded=fixed,
-    )
+    return _captured(replace(film, skeletons=tuple(bodies), expected_px=nan, head=(0.0, "taper")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +241,7 @@ def save_capture(path: Path, file: CaptureFile) -> None:
     ``points_px`` (T, 101, 2) as in the image, ``radius_px`` (T, 101), ``length_px`` (T,), and
     ``head_margin`` (T,). It also has ``expected_px`` (T,), the error of a point, and ``company``
     (T,), the size of the next largest object. Once: ``m_per_px`` (NaN: no scale), ``head_by``,
-    ``head_sure``, ``places_recorded``, and if the film shows several animals
+    ``head_sure``, ``head_probability``, ``places_recorded``, and if the film shows several animals
     ``identity_uncertain_after``: frames after which it may be another animal.
     """
     captured = file.captured
@@ -315,6 +270,7 @@ def save_capture(path: Path, file: CaptureFile) -> None:
             m_per_px=np.nan if file.m_per_px is None else file.m_per_px,
             head_by=captured.head_by,
             head_sure=captured.head_sure,
+            head_probability=captured.head_probability,
             places_recorded=captured.places_recorded,
             **more,
         )

@@ -5,7 +5,7 @@ page.
 """
 
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -22,14 +22,14 @@ from snakewalk.controller.capture.capture import (
 )
 from snakewalk.controller.capture.corrections import apply_corrections, read_corrections
 from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.film.results import write_captures
 from snakewalk.controller.capture.film.scale import scale_of_length, scale_of_marker
-from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
+from snakewalk.controller.capture.film_parts import FEWEST_FRAMES, PART_FRAMES, FilmParts
 from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import check_options, settings_of
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
-from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.verification.film_check import REJECTED
 from snakewalk.controller.capture.verification.remedies import remedy
@@ -101,6 +101,8 @@ class CaptureFacts:
     length_m: float | None
     head_by: str
     head_sure: float
+    head_probability: float
+    """Calibrated: nine of ten films with 0.9 have their head first."""
     frames_with_unsure_head: int
     frames_missing: int
     """Images whose number is missing in their folder; the times of the others keep the gaps."""
@@ -307,13 +309,7 @@ def in_doubt(captured: Capture) -> Capture:
     contradicted = broken if varies < _VARIES else unsolved
     if used >= _LEAST_AGREEING * (used + contradicted):
         return captured
-    rough = {FrameStatus.GOOD: FrameStatus.ROUGH}
-    least_px = max(_DOUBTFUL, varies) * captured.length_px
-    return replace(
-        captured,
-        expected_px=np.fmax(captured.expected_px, least_px),
-        status=tuple(rough.get(frame_status, frame_status) for frame_status in captured.status),
-    )
+    return captured.roughened(max(_DOUBTFUL, varies))
 
 
 def _expected_statuses(captured: Capture) -> list[FrameStatus]:
@@ -409,6 +405,7 @@ def facts_of(
         length_m=None if m_per_px is None else round(length_px * m_per_px, 5),
         head_by=captured.head_by,
         head_sure=round(captured.head_sure, 3),
+        head_probability=round(captured.head_probability, 3),
         frames_with_unsure_head=_unsure_heads(captured),
         frames_missing=footage.missing,
         places_recorded=captured.places_recorded,
@@ -428,7 +425,11 @@ def film_facts(
         "unit": by_user("--length-m or --marker", scale)
         or Fact("px", "inferred", "no scale is given"),
         "order": by_user("--head", options.head and "head first")
-        or Fact("head first", "inferred", f"{captured.head_by}, sure by {captured.head_sure:.2f}"),
+        or Fact(
+            "head first",
+            "inferred",
+            f"{captured.head_by}, probability {captured.head_probability:.2f}",
+        ),
         "time": footage.time_fact(captured.rate_hz, options.rate_hz),
     }
 
@@ -438,8 +439,13 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
     doubts = []
     if captured.head_sure < UNSURE_HEAD:
         doubts.append(
-            f"head and tail may be exchanged (sure by {captured.head_sure:.2f}, "
-            f"from the {captured.head_by}); look at --sheet or --review, and give --head X,Y"
+            f"head and tail may be exchanged (the head is right with a probability of "
+            f"{captured.head_probability:.2f}, from the {captured.head_by}); look at --sheet or "
+            "--review, and give --head X,Y"
+        )
+    if len(captured.status) < FEWEST_FRAMES:
+        doubts.append(
+            f"fewer than {FEWEST_FRAMES} frames show no usual length to compare with; film longer"
         )
     unused = _unexplained_statuses(captured)
     if len(unused) >= _MANY_UNEXPLAINED * len(captured.status):

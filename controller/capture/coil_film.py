@@ -15,7 +15,9 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.coil_fit import (
     COIL_BENDS,
+    COILS,
     PARAMETERS,
+    UNCLEAR_STATUSES,
     CoilBody,
     Normal,
     Outline,
@@ -26,6 +28,7 @@ from snakewalk.controller.capture.coil_fit import (
     line_slopes,
     normal_of,
 )
+from snakewalk.controller.capture.staged_film import StagedFilm
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -45,14 +48,6 @@ _MOST_UNEXPLAINED = 0.015  # of the body's area, or
 _MOST_OVER_USUAL = 3.0  # times what good frames leave
 COIL_LEAST = 1.4
 """Least error, relative to the usual expected error of the other frames."""
-_UNCLEAR_STATUSES = {
-    FrameStatus.BLOB,
-    FrameStatus.LARGER,
-    FrameStatus.PART,
-    FrameStatus.GHOST,
-}  # or else
-COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *_UNCLEAR_STATUSES}
-"""Statuses that a coil may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +75,18 @@ class _Solution:
     """(K,) distance of another solution of about the same cost, working px."""
     steps: Floats
     """(K + 1,) of the steps alone."""
+
+
+class Repair:
+    """Stage that solves coils by the body of the film."""
+
+    def run(self, film: StagedFilm) -> StagedFilm:
+        """Return the film with solved coils, and the errors of all detected frames."""
+        detections = film.detections
+        coils = solve_coils(film.skeletons, detections.outlines, np.array(detections.axis_error_px))
+        solved = np.isfinite(coils.expected_px)
+        expected = np.where(solved, coils.expected_px, detections.expected_px)
+        return replace(film, skeletons=coils.skeletons, expected_px=expected, solved=solved)
 
 
 def solve_coils(
@@ -460,7 +467,7 @@ class _Film:
 
 def _unsolved_skeleton(skeleton: Skeleton, status: FrameStatus) -> Skeleton:
     """Skeleton of a frame that is not solved, with its own reason if it may not be a coil."""
-    return skeleton if skeleton.status in _UNCLEAR_STATUSES else no_skeleton(status)
+    return skeleton if skeleton.status in UNCLEAR_STATUSES else no_skeleton(status)
 
 
 def _nearest_turns(values: Floats, reference: Floats) -> Floats:

@@ -16,6 +16,7 @@ from snakewalk.controller.capture.small_body.crop import bends_of
 from snakewalk.controller.capture.small_body.ribbon import bend_basis
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
 from snakewalk.controller.images.silhouette import Silhouette
+from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.compiling import compiled
 
 COIL_BENDS = 14
@@ -38,6 +39,14 @@ _LEAST_PX = 0.25  # working px: the residual of a silhouette of pixels
 _LENGTH = 0.015  # prior standard deviation of the log of a frame's length
 _STIFF = 2.0  # rad, of second differences of the bends
 _LEAST_GAP_PX = 1.25  # working px on both sides of the boundary: the edge
+UNCLEAR_STATUSES = {
+    FrameStatus.BLOB,
+    FrameStatus.LARGER,
+    FrameStatus.PART,
+    FrameStatus.GHOST,
+}  # or else
+COILS = {FrameStatus.LOOP, FrameStatus.BRANCH, FrameStatus.SHORT, *UNCLEAR_STATUSES}
+"""Statuses that a coil may have."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
-from snakewalk.controller.capture.coil_film import COILS
-from snakewalk.controller.capture.coil_fit import Outline
+from snakewalk.controller.capture.coil_fit import COILS, Outline
 from snakewalk.controller.capture.image_file import ImageFile
 from snakewalk.controller.capture.small_body.blur_estimate import axis_error_px, edge_blur_px
 from snakewalk.controller.capture.small_body.crop import LONGEST_PX, CropStore

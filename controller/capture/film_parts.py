@@ -17,12 +17,15 @@ from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import margin_of, margins
 from snakewalk.controller.capture.image_file import large_array
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
+from snakewalk.controller.capture.staged_film import ROUGH
 from snakewalk.controller.images.body_detector import Detection
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 PART_FRAMES = 1000
 """Frames of a part (ours)."""
+FEWEST_FRAMES = 20
+"""Frames of a film; in a shorter one no frame is good, because no usual length is known."""
 _LONGEST_PART = 1500
 _CALM = 5  # good frames before the end of a part
 _GIVEN_WEIGHT = 1e9  # weight of a part whose head the user has named
@@ -105,13 +108,14 @@ class FilmParts:
 
         """
         if not self.finished:
-            return captured_from(
+            captured = captured_from(
                 self._detections,
                 self.rate_hz,
                 name=self.name,
                 head_px=self.head_px,
                 fixed=self.fixed,
             )
+            return captured if self._done >= FEWEST_FRAMES else captured.roughened(ROUGH)
         if self._detections.skeletons:
             self._finish()
         folder = None if self.folder is None else self.folder.large_files

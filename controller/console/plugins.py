@@ -56,6 +56,7 @@ KINDS = (
     "planner",
     "results",
     "backend",
+    "stage",
 )
 """Kinds of plug-ins."""
 OWN = "snakewalk"

@@ -1,21 +1,22 @@
-"""Equal chords on curves with many sharp turns, from a sample of the branches ([PT] 2.3).
+"""Equal chords on curves with sharp turns, from a sample of the branches ([PT] 2.3).
 
-At a sharp turn a place has several crossings, so a chord has too many branches to visit them all
-(``chord_branches``). Among many branches some end near B by chance: a small change of the chord
+At a given chord each place is a crossing of the curve with the circle around the place before it.
+A sharp turn has three crossings where a gentle one has one, so the last place has several branches.
+Among many branches some end near B by chance: a small change of the chord
 then moves the last place onto B, unless the branch vanishes before. At each step the search keeps
 some places that are spread evenly along the curve.
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.controller.images.chord_branches import BranchBracket, crossings_ahead
 from snakewalk.drivers.compiling import compiled, readonly_array
 
-_LIMITS = ((12.0, 48), (30.0, 192), (90.0, 192))
+_LIMITS = ((12.0, 48), (30.0, 192), (90.0, 192), (12.0, 1024))
 """Limit of a place's crossings, in chords along the curve, and number of chords tried."""
 _KEPT_PLACES = 400
 """Places of a step that are followed."""
@@ -24,6 +25,16 @@ _NEAREST_BRANCHES = 24
 _MOST_CROSSINGS = 33
 _WIDENINGS = 6
 _LINE = f"{readonly_array(dimensions=2, layout='C')}, {readonly_array(layout='C')}"
+
+
+@dataclass(frozen=True, slots=True)
+class BranchBracket:
+    """Two chords between which the last place of a branch passes B."""
+
+    low: float
+    high: float
+    crossing: Ints
+    """(N,) index of the crossing at each step."""
 
 
 def sampled_solutions(
@@ -52,7 +63,7 @@ def sampled_solutions(
     excess = np.empty(_NEAREST_BRANCHES)
     for reach, number in _LIMITS:
         # halves, quarters, ...: the chords of most solutions are in the middle
-        order = np.argsort([int(f"{k:08b}"[::-1], 2) for k in range(number)], kind="stable")
+        order = np.argsort([int(f"{k:010b}"[::-1], 2) for k in range(number)], kind="stable")
         for chord in least + (most - least) * (order + 0.5) / number:
             limits = np.array([reach * chord, length])
             place_count = follow_places(line, arc, chord, limits, steps, excess)
@@ -82,6 +93,54 @@ def _bracket(
             return BranchBracket(low, high, crossing)
         step *= 2.0
     return None
+
+
+@compiled(f"int64({_LINE}, float64, float64, float64[::1], int64[::1], float64)")
+def crossings_ahead(
+    line: Floats,
+    arc: Floats,
+    chord: float,
+    end: float,
+    along: Floats,
+    piece: Ints,
+    from_along: float,
+) -> int:
+    """Write the crossings of the circle around the place ``from_along`` up to ``end``.
+
+    Args:
+        line: (M, 2).
+        arc: (M,).
+        chord: radius of the circle.
+        end: arc length after which no piece begins.
+        along: (K,) out: arc length of the crossings, increasing.
+        piece: (K,) in: the piece of ``from_along``, as the first; out: pieces of the crossings.
+        from_along: arc length of the circle's centre.
+
+    Returns:
+        their number, which is odd: the last one leads out of the circle.
+
+    """
+    first = piece[0]
+    share = (from_along - arc[first]) / (arc[first + 1] - arc[first])
+    px = line[first, 0] + share * (line[first + 1, 0] - line[first, 0])
+    py = line[first, 1] + share * (line[first + 1, 1] - line[first, 1])
+    count = 0
+    j = first
+    while j + 1 < len(line) and count + 1 < len(along) and arc[j] <= end:
+        ax, ay, start = (px, py, from_along) if j == first else (line[j, 0], line[j, 1], arc[j])
+        dx, dy = line[j + 1, 0] - ax, line[j + 1, 1] - ay
+        a = dx * dx + dy * dy
+        if a > 0.0:
+            b = dx * (ax - px) + dy * (ay - py)
+            inside = b * b - a * ((ax - px) ** 2 + (ay - py) ** 2 - chord * chord)
+            if inside >= 0.0:
+                for root in (-np.sqrt(inside), np.sqrt(inside)):
+                    t = (root - b) / a
+                    if 0.0 < t <= 1.0:
+                        along[count], piece[count] = start + t * np.sqrt(a), j
+                        count += 1
+        j += 1
+    return count - 1 if count > 0 and count % 2 == 0 else count
 
 
 @compiled(f"int64({_LINE}, float64, float64[::1], int8[:, ::1], float64[::1])")

@@ -1,9 +1,9 @@
 """Equal chords along a curve: ``N`` consecutive points on it, first at A, last at B ([PT] 2.3).
 
 The order of methods: steepest descent on the chord ([PT] Algorithm 1, corrected in the errata);
-bisection if it does not settle. Then come chords that end at a later crossing of their circle, all
-crossings together (``chord_branches``), and the path of the existence proof (``chord_path``). If
-none finds a solution, the result is an error, never an unequal partition.
+bisection if it does not settle. Then come chords that end at a later crossing of their circle, a
+sample of all crossings together (``chord_beam``), and the path of the existence proof
+(``chord_path``). If none finds a solution, the result is an error, never an unequal partition.
 """
 
 from collections.abc import Iterator
@@ -13,8 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Ints
-from snakewalk.controller.images.chord_beam import sampled_solutions
-from snakewalk.controller.images.chord_branches import BranchBracket, BranchSearch
+from snakewalk.controller.images.chord_beam import BranchBracket, sampled_solutions
 from snakewalk.controller.images.chord_path import follow_chords
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -25,8 +24,6 @@ _DESCENTS = 12
 _BISECTIONS = 80
 _SCAN = 96  # number of chords tried between the smallest and the largest possible one
 _MOST_STEPS = 40_000  # along the path: one or two seconds for 100 chords
-_GRID = 400  # of the scan for three chords
-_NEWTON_STEPS = 40
 _BENT = 1.05  # arc over chord from which all solutions are searched
 
 
@@ -46,8 +43,7 @@ class Equipartition:
     """Distance of neighbouring points, in the curve's unit."""
     method: str
     """Method of the solution: ``descent``, ``bisection``, ``bisector`` (2 chords), ``later
-    crossing``, ``two places`` (3 chords), ``branches`` (``chord_branches``), ``sample``
-    (``chord_beam``), ``path`` (``chord_path``)."""
+    crossing``, ``sample`` (``chord_beam``), ``path`` (``chord_path``)."""
     solutions: int
     """Solutions found, of which this is the closest to the curve; 1 where no other was searched, as
     no chord leaves its arc by more than 5 %."""
@@ -194,7 +190,7 @@ def _bisect(given: _Curve, low: float, high: float, crossing: Ints | None = None
     return None
 
 
-def _closest(given: _Curve, earlier: Equipartition | None) -> Equipartition:  # noqa: C901  a compiled loop
+def _closest(given: _Curve, earlier: Equipartition | None) -> Equipartition:
     solutions = [] if earlier is None else [earlier]
     for method, crossing in _crossings(given.segments, search=earlier is None):
         for chord in _roots(given, crossing):
@@ -202,12 +198,6 @@ def _closest(given: _Curve, earlier: Equipartition | None) -> Equipartition:  # 
                 solutions.append(given.solution(chord, method, crossing))
         if method == "later crossing" and solutions and given.segments > 8:
             break
-    if given.segments == 3:
-        for third in _thirds(given):
-            if all(np.abs(third.at - other.at).max() > 1e-6 * given.length for other in solutions):
-                solutions.append(third)
-    if not solutions:
-        solutions = _by_branches(given)
     if not solutions:
         solutions = _by_sample(given)
     if not solutions:
@@ -222,19 +212,6 @@ def _closest(given: _Curve, earlier: Equipartition | None) -> Equipartition:  # 
     return Equipartition(
         best.points, best.at, best.chord, best.method, len(solutions), best.distance
     )
-
-
-def _by_branches(given: _Curve) -> list[Equipartition]:
-    """Return the first solution among the branches of all crossings: that of the longest chord."""
-
-    def root(bracket: BranchBracket) -> float | None:
-        return _bisect(given, bracket.low, bracket.high, bracket.crossing)
-
-    search = BranchSearch(given.line, given.line_arc, given.length, given.segments)
-    least = max(given.least * (1.0 - 1e-12), 1e-6 * given.most)
-    for chord, crossing in search.solutions(least, given.most, root):
-        return [given.solution(chord, "branches", crossing)]
-    return []
 
 
 def _by_sample(given: _Curve) -> list[Equipartition]:
@@ -260,63 +237,6 @@ def _at_places(given: _Curve, places: Floats) -> Equipartition:
     points = np.stack([np.interp(places, given.arc, column) for column in given.curve.T], axis=-1)
     chord = float(np.hypot(*(points[1] - points[0])))
     return Equipartition(points, places, chord, "path", 1, given.distance(points, places))
-
-
-def _thirds(given: _Curve) -> list[Equipartition]:
-    """Return all solutions of three chords: places s < t where two differences of chords are zero.
-
-    [PT] 2.3 allows any later crossing, and a circle gains or loses two at a tangency, so counting
-    crossings does not find all. The triangle of s and t is scanned for cells where both differences
-    change sign; Newton's method solves each.
-    """
-    length = given.length
-    grid = np.linspace(0.0, length, _GRID + 1)
-    ends = np.stack([np.interp(grid, given.arc, column) for column in given.curve.T], axis=-1)
-    first = ((ends - given.curve[0]) ** 2).sum(axis=1)[:, None]
-    last = ((ends - given.curve[-1]) ** 2).sum(axis=1)
-    middle = ((ends[:, None] - ends) ** 2).sum(axis=-1)
-    both = np.triu(np.ones((_GRID, _GRID), dtype=bool))
-    for gap in (first - last, first - middle):
-        corners = np.stack([gap[:-1, :-1], gap[1:, :-1], gap[:-1, 1:], gap[1:, 1:]])
-        both &= (corners.min(axis=0) <= 0.0) & (corners.max(axis=0) >= 0.0)
-    starts = np.argwhere(both)[:, None] + np.array([[0.5, 0.5], [0.1, 0.9], [0.9, 0.9], [0.1, 0.1]])
-    along = _newton(given, starts.reshape(-1, 2) * (length / _GRID))
-    solutions: list[Equipartition] = []
-    for s, t in along[np.argsort(along[:, 0])]:
-        places = np.array([0.0, s, t, length])
-        if solutions and np.abs(solutions[-1].at - places).max() < 1e-6 * length:
-            continue
-        points = np.stack([np.interp(places, given.arc, column) for column in given.curve.T], -1)
-        chord = float(np.hypot(*(points[1] - points[0])))
-        solutions.append(
-            Equipartition(points, places, chord, "two places", 1, given.distance(points, places))
-        )
-    return solutions
-
-
-def _newton(given: _Curve, along: Floats) -> Floats:
-    """Newton's method from starts (K, 2); return the solutions."""
-    length = given.length
-    ends = given.curve[[0, -1]]
-    slope = np.diff(given.curve, axis=0) / np.diff(given.arc)[:, None]
-    for _ in range(_NEWTON_STEPS):
-        piece = np.clip(np.searchsorted(given.arc, along, side="right") - 1, 0, len(slope) - 1)
-        place = given.curve[piece] + (along - given.arc[piece])[..., None] * slope[piece]
-        a, b, c = place[:, 0] - ends[0], place[:, 1] - place[:, 0], ends[1] - place[:, 1]
-        u, v = slope[piece[:, 0]], slope[piece[:, 1]]
-        f = (a * a).sum(1) - (c * c).sum(1)
-        g = (a * a).sum(1) - (b * b).sum(1)
-        fs, ft = 2.0 * (a * u).sum(1), 2.0 * (c * v).sum(1)
-        gs, gt = 2.0 * ((a + b) * u).sum(1), -2.0 * (b * v).sum(1)
-        size = fs * gt - ft * gs
-        size = np.where(np.abs(size) > 1e-300, size, 1e-300)
-        step = np.stack([ft * g - gt * f, gs * f - fs * g], axis=1) / size[:, None]
-        if np.abs(step).max(initial=0.0) < 1e-14 * length:
-            break
-        along = np.clip(along + np.clip(step, -0.02 * length, 0.02 * length), 0.0, length)
-    chord = np.stack([np.hypot(*side.T) for side in (a, b, c)])
-    equal = np.ptp(chord, axis=0) <= TOLERANCE * length
-    return np.asarray(along[equal & (along[:, 0] < along[:, 1]) & (chord[0] > TOLERANCE * length)])
 
 
 def _crossings(segments: int, *, search: bool) -> Iterator[tuple[str, Ints]]:

@@ -44,7 +44,7 @@ LIMITS: Final = {
     "controller.images": 14050,
     "controller.figures": 3350,
     "controller.run": 21750,
-    "controller.capture": 29150,
+    "controller.capture": 29250,
     "controller.animals": 46950,
     "controller.cameras": 20450,
     "controller.mapping": 19150,

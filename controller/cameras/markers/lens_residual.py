@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from scipy.optimize import least_squares
 
-from snakewalk.config.arrays import Floats
+from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.cameras.lens import projected
 from snakewalk.controller.cameras.markers.floor_markers import FEWEST, Markers, middle_of
 
@@ -23,6 +23,7 @@ _SURE_SIGMAS = 3.0  # standard deviations of the coefficient from 0 (ours)
 _STARTS = 0.0, 0.1  # of the coefficient: strong distortion has a second minimum (ours)
 _GRID = 9  # points across the picture for the error
 _SQUARE = np.array([[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]])  # as printed
+_WIDE_LENS = 0.3  # coefficient; that of a lens of 77 degrees with k1 = -0.3 is 0.27 (ours)
 _SPAN_M = 1.0  # of floor over which a distortion rotates a body (ours)
 NOTICEABLE_M = 0.005
 """A smaller error of a place on the floor is not reported."""
@@ -38,6 +39,8 @@ class Distortion:
     """Standard deviation of the coefficient."""
     error_m: float
     """Largest error on the floor between the markers, if the distortion is ignored."""
+    is_assumed: bool = False
+    """Whether nothing shows the distortion: four corners fit any lens exactly."""
 
     @property
     def is_certain(self) -> bool:
@@ -51,10 +54,14 @@ class Distortion:
 
     def __str__(self) -> str:
         """Warning with its remedy."""
+        cause = (
+            "four corners do not show whether the lens distorts: if it does,"
+            if self.is_assumed
+            else "the floor's markers show that the lens distorts:"
+        )
         return (
-            f"the floor's markers show that the lens distorts: places are up to "
-            f"{1e3 * self.error_m:.0f} mm off; calibrate it (snakewalk pose board, snakewalk "
-            "pose lens) and set [camera] lens"
+            f"{cause} places are up to {1e3 * self.error_m:.0f} mm off; calibrate it "
+            "(snakewalk pose board, snakewalk pose lens) and set [camera] lens"
         )
 
 
@@ -121,12 +128,38 @@ def marker_distortion(
     spare = max(len(fit.fun) - len(first), 1)
     sigma = float(np.sqrt(inverse[8, 8] * max(1.0, 2.0 * fit.cost / spare)))
     homography = np.append(fit.x[:8], 1.0).reshape(3, 3)
-    low, high = px.min(axis=(0, 1)), px.max(axis=(0, 1))
-    sides = (np.linspace(a, b, _GRID) for a, b in zip(low, high, strict=True))
+    coefficient = float(fit.x[8])
+    return Distortion(coefficient, sigma, _largest_error(start, homography, px, coefficient))
+
+
+def assumed_distortion(px: Singles, floor_m: Singles, size_px: tuple[int, int]) -> Distortion:
+    """Distortion that an uncalibrated wide lens may have, where four corners fix the floor.
+
+    Args:
+        px: (4, 2) corners in the picture.
+        floor_m: (4, 2) the same on the floor.
+        size_px: width and height of the picture.
+
+    """
+    points = (px - 0.5 * (np.array(size_px) - 1.0)) / (0.5 * size_px[0])
+    ignored, known = (
+        np.asarray(cv2.getPerspectiveTransform(seen.astype(np.float32), floor_m), dtype=float)
+        for seen in (points, _undistorted(points, _WIDE_LENS))
+    )
+    error_m = _largest_error(ignored, known, points, _WIDE_LENS)
+    return Distortion(_WIDE_LENS, 0.5 * _WIDE_LENS, error_m, is_assumed=True)
+
+
+def _largest_error(ignored: Floats, known: Floats, px: Floats, coefficient: float) -> float:
+    """Largest error between the places (..., 2), if the distortion is ignored."""
+    flat = px.reshape(-1, 2)
+    sides = (
+        np.linspace(low, high, _GRID)
+        for low, high in zip(flat.min(axis=0), flat.max(axis=0), strict=True)
+    )
     grid = np.stack(np.meshgrid(*sides), axis=-1)
-    ignored = projected(start, grid) - projected(homography, _undistorted(grid, float(fit.x[8])))
-    error_m = float(np.hypot(ignored[..., 0], ignored[..., 1]).max())
-    return Distortion(float(fit.x[8]), sigma, error_m)
+    off = projected(ignored, grid) - projected(known, _undistorted(grid, coefficient))
+    return float(np.hypot(off[..., 0], off[..., 1]).max())
 
 
 def _undistorted(points: Floats, coefficient: float) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bools, DeepImage, SignedInts
+from snakewalk.config.arrays import Bools, DeepImage, Floats, SignedInts
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
@@ -36,7 +36,7 @@ _INPAINT_PX = 5.0  # radius from which a ground that is never free is continued
 _FEWEST_FREE = 5  # frames without an animal at a place
 _UNSEEN_FRAME = -1
 _MERGED_FRAME = -2
-_MISSING = {_UNSEEN_FRAME: FrameStatus.NOTHING, _MERGED_FRAME: FrameStatus.MERGED}
+_JOINED_AREA = 1.25  # of the animal's own area: a silhouette contains another animal (ours)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +236,9 @@ def capture_animals(
         on_progress: called after each frame.
 
     """
-    plans = [_plan(identity, animals_found.frames) for identity in animals_found.identities]
+    identities = animals_found.identities
+    plans = [_plan(identity, animals_found.frames) for identity in identities]
+    places = [identity.tracklets[0].middles[0] for identity in identities]
     before = [animal_film.done_frames for animal_film in films]
     first = min(before)
     if on_progress is not None:
@@ -245,21 +247,48 @@ def capture_animals(
     for number, frame in enumerate(frames(first), start=first):
         ground = detector.ground_of(frame)
         blobs = blobs_of(frame, ground, detector, animals_found.usual_px)
-        for plan, film, finished in zip(plans, films, before, strict=True):
-            if number < finished:
-                continue
+        followed = {int(plan[number]) for plan in plans}
+        others = [k for k in range(len(blobs.area_px)) if k not in followed]
+        for animal, (plan, film) in enumerate(zip(plans, films, strict=True)):
             index = int(plan[number])
-            if index in _MISSING:
-                film.skip(_MISSING[index])
+            if index >= 0:
+                places[animal] = blobs.middle_px[index]
+            if number < before[animal]:
                 continue
-            shown, detection = _detected_animal(frame, ground, detector, blobs, index)
-            film.add(shown, detection)
+            if index == _UNSEEN_FRAME:
+                film.skip(FrameStatus.NOTHING)
+            elif index == _MERGED_FRAME:
+                own_px = identities[animal].tracklets[0].area_px
+                film.skip(merged_status(blobs, others, places[animal], own_px))
+            else:
+                shown, detection = _detected_animal(frame, ground, detector, blobs, index)
+                film.add(shown, detection)
         if on_progress is not None:
             on_progress()
     return [
         _captured_animal(*identity_and_film)
-        for identity_and_film in zip(animals_found.identities, films, strict=True)
+        for identity_and_film in zip(identities, films, strict=True)
     ]
+
+
+def merged_status(
+    blobs: Blobs, others: Sequence[int], place_px: Floats, own_px: float
+) -> FrameStatus:
+    """Status of a frame in which an animal is not followed: only a joined silhouette touches.
+
+    Args:
+        blobs: of the frame.
+        others: blobs other than the followed animals.
+        place_px: (2,) last place of the animal.
+        own_px: its area.
+
+    """
+    if not others:
+        return FrameStatus.NOTHING
+    away = blobs.middle_px[list(others)] - place_px
+    nearest = others[int(np.argmin(np.hypot(*away.T)))]
+    joined = blobs.area_px[nearest] > _JOINED_AREA * own_px
+    return FrameStatus.MERGED if joined else FrameStatus.PART
 
 
 def _captured_animal(identity: Identity, film: FilmParts) -> CapturedAnimal:

@@ -15,11 +15,11 @@ from snakewalk.controller.capture.capturing import (
     part_folder,
 )
 from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.film.results import write_captures
 from snakewalk.controller.capture.film.scale import scale_of_length
 from snakewalk.controller.capture.film_results import in_whole_film, write_looks
 from snakewalk.controller.capture.opened_film import OpenedFilm, open_film
 from snakewalk.controller.capture.options import AUTO, check_options, track_files
-from snakewalk.controller.capture.results import write_captures
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.several.animal_films import (
     AnimalsFound,

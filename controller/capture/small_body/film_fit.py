@@ -33,8 +33,6 @@ from snakewalk.controller.capture.small_body.tip_profile import beyond_tips_px, 
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
-ROUGH = 0.01
-"""Share of the length: a frame of larger expected error is ``ROUGH``."""
 _SAMPLE_PX = 30000.0  # working pixels in all frames of the sample
 _FEWEST_SAMPLES = 8
 _MOST_SAMPLES = 40
@@ -90,7 +88,7 @@ def fit_film(
     """
     good = [k for k in crops if skeletons[k].status is FrameStatus.GOOD]
     if len(good) < 2:
-        return _unfitted(skeletons, expected_px)
+        return FittedFilm(tuple(skeletons), expected_px, None)
     length = float(np.median([skeletons[k].length_px for k in good]))
     radius = float(np.median([np.median(skeletons[k].radius_px) for k in good]))
     space = Workspace.of([crops[k] for k in good[:: max(1, len(good) // 20)]], length)
@@ -108,7 +106,7 @@ def fit_film(
         ):
             errors_px = expected_px.copy()
             errors_px[good] = axis_error_px(_BY_BLUR * blur, length)
-            return _unfitted(skeletons, errors_px)
+            return FittedFilm(tuple(skeletons), errors_px, None)
         if len(body.values) == BODY:
             shaded = with_shadow(body, frames, [patches[k] for k in sample])
             body = body if shaded is None else shaded[0]
@@ -132,42 +130,16 @@ def fit_film(
             continue
         expected[k] = float(np.hypot(expected_error(fit, body), unlike_px)) / space.scale
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
-        out[k] = _skeleton(line, body, space, expected[k])
-    rest = [
-        skeleton if k in fits else _with_status(skeleton, expected[k], length)
-        for k, skeleton in enumerate(out)
-    ]
-    return FittedFilm(tuple(rest), expected, body)
-
-
-def _unfitted(skeletons: Sequence[Skeleton], expected_px: Floats) -> FittedFilm:
-    """Skeletons unchanged, ``ROUGH`` where their expected error is too large."""
-    good = [skeleton.status is FrameStatus.GOOD for skeleton in skeletons]
-    length = np.array([skeleton.length_px for skeleton in skeletons])
-    usual = float(np.median(length[good])) if any(good) else 1.0
-    out = [
-        _with_status(skeleton, error, usual)
-        for skeleton, error in zip(skeletons, expected_px, strict=True)
-    ]
-    return FittedFilm(tuple(out), expected_px, None)
-
-
-def _with_status(body: Skeleton, error_px: float, length_px: float) -> Skeleton:
-    """The body, ``ROUGH`` where its expected error is too large."""
-    if body.status is FrameStatus.GOOD and error_px > ROUGH * length_px:
-        return replace(body, status=FrameStatus.ROUGH)
-    return body
+        out[k] = _skeleton(line, body, space)
+    return FittedFilm(tuple(out), expected, body)
 
 
 def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> FittedFilm:
     """The film with lower bounds on the expected errors of some frames."""
     expected = film.expected_px.copy()
-    out = list(film.skeletons)
     for k, least in least_px.items():
-        if np.isfinite(expected[k]):
-            expected[k] = max(float(expected[k]), least)
-            out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
-    return replace(film, skeletons=tuple(out), expected_px=expected)
+        expected[k] = np.maximum(expected[k], least)
+    return replace(film, expected_px=expected)
 
 
 def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) -> FittedFilm:
@@ -185,7 +157,7 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
 
     """
     expected = film.expected_px.copy()
-    out = list(film.skeletons)
+    out = film.skeletons
     finite_values = [
         k
         for k, ends in enumerate(ends_px)
@@ -206,8 +178,7 @@ def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) 
         tips = tips_error_px(np.maximum(usual, 0.0))
     for k in finite_values:
         expected[k] = np.hypot(share * expected[k], tips)
-        out[k] = _with_status(out[k], float(expected[k]), out[k].length_px)
-    return replace(film, skeletons=tuple(out), expected_px=expected)
+    return replace(film, expected_px=expected)
 
 
 def expected_error(fit: Fit, body: FilmBody) -> float:
@@ -307,13 +278,11 @@ def _first_body(views: Sequence[View], length: float) -> Floats:
     return np.concatenate([[length, np.log(1.2)], np.full(len(STATIONS), np.log(half))])
 
 
-def _skeleton(line: Floats, body: FilmBody, space: Workspace, expected_px: float) -> Skeleton:
+def _skeleton(line: Floats, body: FilmBody, space: Workspace) -> Skeleton:
     place = np.linspace(0.0, 1.0, SEGMENTS + 1)
     radius = np.interp(place, STATIONS, np.exp(body.values[2:BODY])) / space.scale
     fitted = in_equal_chords(line, radius)
-    if fitted is None:
-        return no_skeleton(FrameStatus.BLOB)
-    return _with_status(fitted, expected_px, fitted.length_px)
+    return no_skeleton(FrameStatus.BLOB) if fitted is None else fitted
 
 
 @dataclass(frozen=True, slots=True)

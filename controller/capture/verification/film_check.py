@@ -2,16 +2,23 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from snakewalk.config.arrays import Bools, Floats, Ints
+from snakewalk.controller.capture.coil_film import COIL_LEAST
 from snakewalk.controller.capture.identity import margin_of
+from snakewalk.controller.capture.staged_film import StagedFilm, with_statuses
 from snakewalk.controller.capture.verification.frame_store import FrameStore
-from snakewalk.controller.capture.verification.profiles import BodyProfile, body_profile
+from snakewalk.controller.capture.verification.judge import judged_error_px
+from snakewalk.controller.capture.verification.profiles import (
+    BodyProfile,
+    body_profile,
+    direction_of,
+)
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -75,6 +82,7 @@ _FAINT_SAMPLE = 40
 _FEWEST_FAINT = 6  # frames in which faint parts beyond a tip are searched
 _FAINT_BEYOND = 0.035  # of the usual contrast: least contrast of a faint part beyond a tip
 _SAME_TIP = 0.85  # of these frames: beyond the same tip
+_FAINT_TAIL = 0.1  # of the length: expected error if something faint goes on beyond a tip
 _LENGTH = 0.08
 _SPREADS = 6.0  # of the usual length; standard deviations
 _FEWEST = 5
@@ -92,8 +100,31 @@ class _Usual:
     """(101,) along the body."""
 
 
-def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]:
-    """Return the skeletons; a contradicted one has no points, and its status gives the reason.
+class Verify:
+    """Stage that compares each finished skeleton with its own frame."""
+
+    def run(self, film: StagedFilm) -> StagedFilm:
+        """Return the film; contradicted frames have no points, unclear ones are rough."""
+        detections = film.detections
+        skeletons, judged_px = verified(film.skeletons, detections.store)
+        judged_px[[*detections.tip_error_px]] = 0.0  # their tips have errors of their own
+        expected = np.hypot(film.expected_px, np.where(film.solved, 0.0, judged_px))
+        usual = expected[~film.solved & np.isfinite(expected)]
+        least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
+        expected[film.solved] = np.maximum(expected[film.solved], least)
+        expected[[not skeleton.status.has_points for skeleton in skeletons]] = np.nan
+        goes_on = not detections.shows_tips(skeletons) and has_faint_continuation(
+            skeletons, detections.store
+        )
+        if goes_on or detections.is_unclear(skeletons):
+            expected = np.fmax(expected, _FAINT_TAIL * film.length_px)
+        return replace(film, skeletons=with_statuses(skeletons, expected), expected_px=expected)
+
+
+def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> tuple[list[Skeleton], Floats]:
+    """Return the skeletons, and the error (T,) of each that its own frame shows.
+
+    A contradicted one has no points, and its status gives the reason.
 
     Args:
         skeletons: (T) head first.
@@ -110,16 +141,18 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> list[Skeleton]
     some = used[:: max(1, len(used) // _SAMPLE)]
     shown = {k: _profile(out[k], store, k) for k in some}
     usual = _usual([shown_profile for shown_profile in shown.values() if shown_profile is not None])
+    judged_px = np.zeros(len(out))
     if usual is None:
-        return out
+        return out, judged_px
     for k in used:
         profile = shown[k] if k in shown else _profile(out[k], store, k)
         if profile is None:
             continue
+        judged_px[k] = judged_error_px(profile, out[k].length_px)
         status = _verdict(profile, usual)
         if status is not FrameStatus.GOOD:
             out[k] = no_skeleton(status)
-    return out
+    return out, judged_px
 
 
 def has_faint_continuation(skeletons: Sequence[Skeleton], store: FrameStore) -> bool:
@@ -199,8 +232,7 @@ def _usual(profiles: Sequence[BodyProfile]) -> _Usual | None:
     if not len(mean):
         return None
     strong = mean[np.argsort(np.linalg.norm(mean, axis=1))[len(mean) // 2 :]]
-    direction = np.median(strong, axis=0)
-    direction = direction / max(float(np.linalg.norm(direction)), 1e-9)
+    direction = direction_of(strong)
     with warnings.catch_warnings():  # a point may have no ground on either side
         warnings.simplefilter("ignore", RuntimeWarning)
         along = np.array([np.nanmean(profile.sides, axis=0) @ direction for profile in profiles])

@@ -18,6 +18,8 @@ _LEAST_HALF_WIDTHS_AWAY = 3.0  # half widths along the body from which a part is
 _RINGS = 6  # distances beyond a tip
 _RING_FROM, _RING_TO = (1.0, 1.5), (2.5, 3.0)  # widths and px from a tip
 _FAN = np.radians(np.linspace(-70.0, 70.0, 29))
+_INNER, _INSIDE = 6, 24  # stations from a tip: its direction, and where its contrast is looked at
+_NEAR_TIP, _BODY = slice(2, 10), slice(10, 21)
 _AT_TIP = slice(5, 16)  # stations that show a tip's width and contrast
 
 
@@ -31,6 +33,9 @@ class BodyProfile:
     """(2, rings, angles, C) ground minus picture beyond the first and the last tip."""
     noise: float
     """Standard deviation of a pixel of the ground, from neighbouring samples."""
+    beyond_px: Floats
+    """(2,) how far beyond the first and the last tip half of the contrast ends; below 0 within the
+    body, NaN if it does not end."""
 
 
 def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
@@ -63,7 +68,39 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
         _rings(image, line[::order], half[::order], -along[0] if order > 0 else along[-1])
         for order in (1, -1)
     ]
-    return BodyProfile(np.stack(grounds) - on, np.stack(rings), spread)
+    sides = np.stack(grounds) - on
+    direction = direction_of(sides.reshape(-1, image.shape[2]))
+    beyond = [_end_px(image, line[::order], half[::order], direction) for order in (1, -1)]
+    return BodyProfile(sides, np.stack(rings), spread, np.array(beyond))
+
+
+def direction_of(contrasts: Floats) -> Floats:
+    """(C,) unit weights of the channels from contrasts (N, C), NaN where unknown."""
+    known = contrasts[np.isfinite(contrasts).all(axis=1)]
+    direction = np.median(known, axis=0) if len(known) else np.zeros(contrasts.shape[1])
+    return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-9))
+
+
+def _end_px(image: Singles, line: Floats, half: Floats, direction: Floats) -> float:
+    """Where half of the contrast of a line's first part ends, px beyond its first point."""
+    wide = max(float(half[_NEAR_TIP].mean()), 1.0)
+    outward = line[0] - line[_INNER]
+    outward = outward / max(float(np.hypot(*outward)), 1e-9)
+    chord = float(np.hypot(*np.diff(line[: _INSIDE + 1], axis=0).T).mean())
+    away = np.arange(1.0, 6.0 * wide + 8.0) * 0.5
+    places = np.vstack([line[_INSIDE::-1], line[0] + away[:, None] * outward])
+    along = np.concatenate([-chord * np.arange(_INSIDE, -1.0, -1.0), away])
+    levels = _grey_values(image, places[None])[0] @ direction
+    known = np.isfinite(levels)
+    along, levels = along[known], levels[known]
+    contrast = np.median(levels[-len(away) // 3 :]) - levels
+    least = 0.5 * float(np.median(contrast[_BODY])) if len(contrast) > _INSIDE else 0.0
+    ends = np.flatnonzero((contrast[:-1] >= least) & (contrast[1:] < least))
+    if least <= 0.0 or not len(ends):
+        return float("nan")
+    k = int(ends[-1])
+    share = (contrast[k] - least) / (contrast[k] - contrast[k + 1])
+    return float(along[k] + share * (along[k + 1] - along[k]))
 
 
 def _mean(levels: Floats) -> Floats:

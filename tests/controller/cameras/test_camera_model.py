@@ -92,3 +92,22 @@ def test_corners_on_a_line_are_refused() -> None:
 def test_corners_of_one_kind_alone_are_refused() -> None:
     with pytest.raises(ValidationError, match="given together"):
         CameraConfig(corners_px=((0, 0), (1, 0), (1, 1), (0, 1)))
+
+
+def test_four_corners_without_a_lens_state_the_distortion_of_a_wide_one() -> None:
+    """Exact corners in the picture of a distorting lens: the places between them are off."""
+    config = CameraConfig(height_m=4.0, field_width_m=6.4)
+    matrix = np.array([[400.0, 0.0, 319.5], [0.0, 400.0, 239.5], [0.0, 0.0, 1.0]])
+    lens = Lens((640, 480), matrix, np.array([-0.3, 0.08, 0.0, 0.0, 0.0]))
+    bent = CameraModel.straight_down(config, (0.3, 0.1), lens)
+    corners = ((-2.0, -1.5), (2.5, -1.5), (2.5, 1.7), (-2.0, 1.7))
+    seen = tuple((float(x), float(y)) for x, y in bent.in_image(np.array(corners), 0.0))
+    given = config.model_copy(update={"corners_m": corners, "corners_px": seen})
+    model = CameraModel.from_corners(given, (0.3, 0.1))
+    places = np.stack(np.meshgrid(np.linspace(-2.0, 2.5), np.linspace(-1.5, 1.7)), axis=-1)
+    off_m = np.linalg.norm(model.on_plane(bent.in_image(places, 0.0), 0.0) - places, axis=-1).max()
+    assert off_m > 0.1
+    assert model.distortion is not None
+    assert off_m < 2.0 * np.sqrt(model.distortion.covariance[0, 0])
+    assert "four corners" in str(model.distortion)
+    assert CameraModel.from_corners(given, (0.3, 0.1), lens).distortion is None

@@ -19,6 +19,7 @@ from snakewalk.controller.capture.recording import examine
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.video import open_footage
 from snakewalk.controller.track.analysis import analyse
+from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.arrays import save_track
 from snakewalk.controller.track.readers.load import load_track
 from tests.helpers.command import snakewalk
@@ -102,7 +103,8 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     facts = json.loads(done.stdout)
     assert facts["frames"] == facts["frames_used"] == 12
-    assert facts["verdicts"] == {"good": 12}
+    assert facts["verdicts"] == {str(FrameStatus.ROUGH): 12}, "a film of 12 frames"
+    assert "fewer than 20 frames" in facts["warning"]
     assert facts["length_m"] == pytest.approx(0.35)
     loaded = load_track(str(track))
     assert loaded.rate_hz == 15.0
@@ -113,12 +115,12 @@ def test_a_film_becomes_a_track_with_sheet_and_overlay(swim: Path, tmp_path: Pat
     error = np.angle(np.exp(1j * (loaded.angles_rad - angles)))
     assert np.median(np.abs(error)) < 0.08
     with np.load(track) as held:
-        assert held["verdict"].tolist() == ["good"] * 12
+        assert held["verdict"].tolist() == [str(FrameStatus.ROUGH)] * 12
         assert held["points_px"].shape == (12, 101, 2)
         assert held["head_margin"].shape == (12,)
     sheet_px = cv2.imread(str(sheet)).shape
     assert sheet_px[1:] == (1200, 3)
-    assert sheet_px[0] <= 2 * (200 + 18)
+    assert sheet_px[0] <= 2 * (200 + 30), "two rows, with a status below each"
     assert open_footage(overlay).count == 12
     assert sorted(p.name for p in tmp_path.iterdir()) == ["o.avi", "s.png", "t.npz"]
 
@@ -323,7 +325,7 @@ def test_a_head_that_is_not_sure_is_a_warning(
     swim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(
-        "snakewalk.controller.capture.capture.head_end", lambda *_, **__: (0.19, "taper")
+        "snakewalk.controller.capture.stages.head.head_end", lambda *_, **__: (0.19, "taper")
     )
     track = tmp_path / "t.npz"
     facts = capture_recording(film_options(swim, track))

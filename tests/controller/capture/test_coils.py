@@ -11,7 +11,7 @@ from snakewalk.controller.capture.capture import Capture, capture
 from snakewalk.controller.capture.coil_film import CoilFilm, solve_coils
 from snakewalk.controller.capture.coil_fit import Outline
 from snakewalk.controller.capture.identity import align_ends
-from snakewalk.controller.capture.outlier_frames import mark_outliers
+from snakewalk.controller.capture.stages.outlier_frames import mark_outliers
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus

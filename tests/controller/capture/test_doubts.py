@@ -19,7 +19,8 @@ from snakewalk.controller.capture.capturing import (
 )
 from snakewalk.controller.capture.coil_film import CoilFilm
 from snakewalk.controller.capture.detections import Detections
-from snakewalk.controller.capture.identity import align_ends, head_end
+from snakewalk.controller.capture.identity import align_ends
+from snakewalk.controller.capture.stages.head import head_end
 from snakewalk.controller.capture.verification.film_check import has_faint_continuation
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
@@ -41,33 +42,43 @@ SCENE = SnakeScene(rows=240, columns=320, frames=10, rate_hz=3.75, wave_hz=0.6, 
 OPTIONS = film_options(Path("film.avi"), Path("track.npz"))
 
 
+NO_CONTRAST = np.zeros((0, 101))
+
+
 def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
     scene = replace(SCENE, frames=20, rate_hz=15.0)
     points = true_midlines(scene)
     radius = np.tile(half_width(scene), (20, 1))
-    score, by = head_end(points, radius, 15.0, None, fixed=True)
-    assert by == "travel"
-    assert score > 0.9
-    backwards, by = head_end(points[::-1], radius, 15.0, None, fixed=True)
-    assert by == "travel"
-    assert -0.3 < backwards < 0.0
+    score, _ = head_end(points, radius, NO_CONTRAST, 15.0, None, fixed=True)
+    assert score > 0.85
+    backwards, _ = head_end(points[::-1], radius, NO_CONTRAST, 15.0, None, fixed=True)
+    assert abs(backwards) < 0.4
     even = np.ones_like(radius)
-    assert head_end(points[::-1], even, 15.0, None, fixed=True)[0] < -0.9
+    motion, by = head_end(points[::-1], even, NO_CONTRAST, 15.0, None, fixed=True)
+    assert by in {"travel", "wave"}
+    assert motion == pytest.approx(2.0 * 0.12 - 1.0, abs=0.01), "12 % of the films move backwards"
 
 
-def test_a_weak_wave_does_not_overrule_a_clear_taper() -> None:
-    """A wave that runs to the thick end in a little more than half of the time."""
+def test_signs_of_the_form_are_one_another_s_repetition() -> None:
+    """A weak wave, a taper, and dark eyes; the same signs of the other end have the other score."""
     turn = np.concatenate([np.arange(24.0), 23.0 - np.arange(16.0)])[:, None] * 0.4
     angle = 0.8 * np.sin(2.0 * np.pi * np.linspace(0.0, 1.0, 101) + turn)
     points = np.cumsum(np.stack([np.cos(angle), np.sin(angle)], axis=2), axis=1)
     thick_first = np.tile(np.linspace(5.0, 2.5, 101), (40, 1))
-    score, by = head_end(points, thick_first, 15.0, None, fixed=False)
-    assert by == "taper"
-    assert score > 0.0
+    dark_first = np.tile(np.linspace(60.0, 20.0, 101), (8, 1))
+    values = (points, thick_first, dark_first)
+    scores = []
+    for way in (1, -1):
+        turned = [value[:, ::way] for value in values]
+        scores.append(head_end(*turned, 15.0, None, fixed=False))
+    assert scores[0][0] == pytest.approx(-scores[1][0])
+    assert scores[0][1] == scores[1][1] == "eyes"
     alike = np.ones_like(thick_first)
-    score, by = head_end(points, alike, 15.0, None, fixed=False)
+    score, by = head_end(points, alike, NO_CONTRAST, 15.0, None, fixed=False)
     assert by == "wave"
     assert -0.9 < score < 0.0
+    without_eyes, _ = head_end(points, thick_first, NO_CONTRAST, 15.0, None, fixed=False)
+    assert score < without_eyes < scores[0][0]
 
 
 @pytest.mark.slow
@@ -102,16 +113,16 @@ def captured(status: list[FrameStatus], expected_px: float = 0.5) -> Capture:
 
 def test_many_unused_frames_are_reported_with_their_usual_reason() -> None:
     good, bad = FrameStatus.GOOD, FrameStatus.EMPTY
-    assert warning_of(OPTIONS, captured([good] * 8 + [bad] * 2)) is None
-    assert warning_of(OPTIONS, captured([good] * 3 + [FrameStatus.NOTHING] * 7)) is None
-    text = warning_of(OPTIONS, captured([good] * 5 + [bad] * 4 + [FrameStatus.KNOT]))
+    assert warning_of(OPTIONS, captured([good] * 16 + [bad] * 4)) is None
+    assert warning_of(OPTIONS, captured([good] * 6 + [FrameStatus.NOTHING] * 14)) is None
+    text = warning_of(OPTIONS, captured([good] * 10 + [bad] * 8 + [FrameStatus.KNOT] * 2))
     assert text is not None
-    assert text.startswith("film.avi: 5 of 10 frames are not used")
+    assert text.startswith("film.avi: 10 of 20 frames are not used")
     assert str(bad) in text
 
 
 def test_a_large_expected_error_is_reported() -> None:
-    rough = [FrameStatus.ROUGH] * 10
+    rough = [FrameStatus.ROUGH] * 20
     assert warning_of(OPTIONS, captured(rough, 1.2)) is None
     text = warning_of(OPTIONS, captured(rough, 5.0))
     assert text is not None
@@ -245,7 +256,7 @@ def test_a_film_whose_coils_leave_no_body_is_rejected(monkeypatch: pytest.Monkey
         away = tuple(no_skeleton(FrameStatus.COIL_ALONE) for _ in skeletons)
         return CoilFilm(away, np.full(len(away), np.nan))
 
-    monkeypatch.setattr("snakewalk.controller.capture.capture.solve_coils", lost)
+    monkeypatch.setattr("snakewalk.controller.capture.coil_film.solve_coils", lost)
     frames = list(film(replace(SCENE, frames=5)))
     with pytest.raises(UnusableFilmError, match="the body is never completely visible"):
         capture(frames, BodyDetector(empty(SCENE), Polarity.DARK, "given"), SCENE.rate_hz)

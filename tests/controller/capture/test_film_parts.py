@@ -212,3 +212,19 @@ def test_an_image_file_keeps_every_bit(dtype: type, shape: tuple[int, ...]) -> N
         read = file.read(one)
         assert read.dtype == image.dtype
         assert (read == image).all()
+
+
+@pytest.mark.slow
+def test_a_film_of_fewer_than_20_frames_has_no_good_frame() -> None:
+    scene = replace(SCENE, frames=20)
+    detector = make_detector(list(film(scene)), empty(scene))
+    statuses = []
+    for count in (20, 19):
+        parts = FilmParts(30.0, count, "film")
+        for frame in list(film(scene))[:count]:
+            parts.add(frame, detector.detect(frame))
+        captured = parts.done()
+        statuses.append(set(captured.status))
+        expected = captured.expected_px / captured.length_px
+    assert statuses == [{FrameStatus.GOOD}, {FrameStatus.ROUGH}]
+    assert np.nanmin(expected) >= 0.01

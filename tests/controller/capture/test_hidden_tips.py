@@ -7,7 +7,11 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.capture.capture import Capture, capture
-from snakewalk.controller.capture.small_body.film_fit import FittedFilm, with_tip_errors
+from snakewalk.controller.capture.small_body.film_fit import (
+    FittedFilm,
+    with_tip_errors,
+)
+from snakewalk.controller.capture.staged_film import with_statuses
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
@@ -64,6 +68,6 @@ def test_a_frame_without_points_leaves_the_errors_of_the_others_known() -> None:
     film_of_two = FittedFilm((body, lost), np.array([0.5, 0.5]), None)
     seen = with_tip_errors(film_of_two, [ends, ends], np.zeros(2, dtype=bool))
     assert seen.expected_px[0] == pytest.approx(np.hypot(0.85 * 0.5, 0.5 * 0.7 * 6.0))
-    assert seen.skeletons[0].status is FrameStatus.ROUGH
+    assert with_statuses(seen.skeletons, seen.expected_px)[0].status is FrameStatus.ROUGH
     reversed_ends = with_tip_errors(film_of_two, [ends[::-1]] * 2, np.zeros(2, dtype=bool))
     assert reversed_ends.expected_px[0] == pytest.approx(seen.expected_px[0])

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from snakewalk.controller.capture.capture import capture
-from snakewalk.controller.capture.outlier_frames import mark_outliers
 from snakewalk.controller.capture.small_body.blur_estimate import (
     axis_error_px,
     edge_blur_px,
 )
+from snakewalk.controller.capture.stages.outlier_frames import mark_outliers
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus

@@ -39,7 +39,8 @@ def test_the_error_is_below_a_hundredth_of_the_body(length_px: float) -> None:
     assert seen.good.mean() > 0.95
     assert median_error(scene, seen) < 0.01 * length_px
     assert not any(swapped(seen.points_px[k], truth[k]) for k in np.flatnonzero(seen.good))
-    assert seen.head_by == "travel"
+    assert seen.head_by in {"travel", "wave"}
+    assert seen.head_probability > 0.85
 
 
 @pytest.mark.slow_cases(1, "2 cases of 1.8 s of CPU")

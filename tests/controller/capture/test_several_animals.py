@@ -16,9 +16,9 @@ from snakewalk.controller.capture import film_parts
 from snakewalk.controller.capture.capture import capture, load_capture, save_capture
 from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.commands.capture import show_several
+from snakewalk.controller.capture.film.results import write_captures
 from snakewalk.controller.capture.film_parts import FilmParts
-from snakewalk.controller.capture.results import write_captures
-from snakewalk.controller.capture.several.animal_films import find_animals
+from snakewalk.controller.capture.several.animal_films import find_animals, merged_status
 from snakewalk.controller.capture.several.blobs import blobs_of, detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
@@ -344,3 +344,25 @@ def test_a_gap_is_bridged_soon_after_it_only() -> None:
     ]
     assert len(identities_of(soon)) == 1
     assert len(identities_of(late)) == 2
+
+
+@pytest.mark.parametrize(
+    ("parts", "status"),
+    [
+        ([], FrameStatus.NOTHING),
+        ([np.s_[10:18, 5:45]], FrameStatus.PART),
+        ([np.s_[10:18, 5:45], np.s_[18:34, 24:28], np.s_[30:38, 5:45]], FrameStatus.MERGED),
+    ],
+)
+def test_an_animal_touches_another_only_in_one_silhouette(
+    parts: list[tuple[slice, slice]], status: FrameStatus
+) -> None:
+    """Animals of 320 pixels; far away, two others touch."""
+    ground = np.full((60, 300), 200, dtype=np.uint8)
+    image = ground.copy()
+    for part in [*parts, np.s_[10:26, 250:290]]:
+        image[part] = 50
+    detector = BodyDetector(ground, Polarity.DARK, "given", threshold=60.0)
+    blobs = blobs_of(image, ground, detector)
+    others = [k for k in range(len(blobs.area_px)) if parts or blobs.middle_px[k, 0] < 200.0]
+    assert merged_status(blobs, others, np.array([25.0, 14.0]), 320.0) is status

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from snakewalk.controller.images.chord_beam import follow_places
-from snakewalk.controller.images.chord_branches import BranchSearch
 from snakewalk.controller.images.chord_path import follow_chords, solve
 from snakewalk.controller.images.equipartition import (
     NoEquipartitionError,
@@ -238,18 +237,6 @@ def test_places_that_are_followed_are_those_of_the_march() -> None:
         total += found
     assert total > 100
     assert (np.abs(excess[:found]) == np.sort(np.abs(excess[:found]))).all()
-
-
-def test_the_sum_of_signs_counts_the_branches_that_pass_the_end() -> None:
-    """One sharp corner has three branches; their signs sum to 0 below and 1 above all solutions."""
-    curve = np.array([[0.0, 0.0], [3.0, 0.0], [3.0 - 4.0 * np.cos(0.5), 4.0 * np.sin(0.5)]])
-    arc = np.array([0.0, 3.0, 7.0])
-    search = BranchSearch(curve, arc, 5.0, 4)
-    sums = [search.branches(chord, 12.0) for chord in (0.2, 0.5, 0.9, 1.4, 1.75)]
-    assert [each.sign_sum for each in sums] == [0, 0, 1, 1, 1]
-    folded = search.branches(1.4, 12.0)
-    assert len(folded.excess) == 3, "the corner is passed in three ways"
-    assert folded.is_complete
 
 
 @pytest.mark.parametrize("count", [2, 5, 100])

@@ -72,7 +72,7 @@ def test_a_deep_film_is_captured_and_a_threshold_is_in_its_own_counts(
             overlay=tmp_path / "o.avi", review=tmp_path / "r.html",
         )
     )  # fmt: skip
-    assert facts.verdicts == {"good": 8}
+    assert facts.verdicts == {str(FrameStatus.ROUGH): 8}, "a film of 8 frames"
     assert cv2.imread(str(tmp_path / "s.png")).max() > 200
 
 

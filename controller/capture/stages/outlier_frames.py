@@ -5,11 +5,14 @@ body shorter, longer or locally thicker than in most frames, or changes its area
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.capture.identity import align_ends
+from snakewalk.controller.capture.staged_film import StagedFilm
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -22,6 +25,16 @@ _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
 _FAINT = 0.25  # of the usual contrast: below, compression and noise of an empty frame
 _FEWEST = 5  # least number of frames to find outliers
+
+
+class Compare:
+    """Stage that compares the frames: the same end first in all, and outliers marked."""
+
+    def run(self, film: StagedFilm) -> StagedFilm:
+        """Return the film with aligned ends; outliers have a status instead of points."""
+        marked = mark_empty(film.skeletons, np.array(film.detections.contrast))
+        checked = mark_outliers(align_ends(marked).skeletons, np.array(film.detections.area_px))
+        return replace(film, skeletons=align_ends(checked).skeletons)
 
 
 def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton]:

@@ -1,0 +1,1 @@
+"""Stages of a capture after the detector, and their order."""
