@@ -9,6 +9,7 @@ name of the operator and the end of the run (length and text each), and a descri
 JSON. A text is written before its byte.
 """
 
+import errno
 import json
 import mmap
 import os
@@ -66,6 +67,7 @@ class StopButton:
     Raises:
         InputError: the folder of buttons is not private, a file cannot be made in it, or another
             run of this user is on the same URL, which no system locks.
+        OSError: the disk is full.
 
     """
 
@@ -86,8 +88,11 @@ class StopButton:
         try:
             self._file, path = _new_file(place, kind)
             # written, not truncated to its size: on a full disk a sparse map kills the program
-            os.write(self._file, bytes(_BYTES))
+            if os.write(self._file, bytes(_BYTES)) < _BYTES:
+                raise OSError(errno.ENOSPC, "No space left on device")
         except OSError as error:
+            if error.errno in (errno.ENOSPC, errno.EFBIG):
+                raise OSError(errno.ENOSPC, error.strerror, str(place)) from None
             raise InputError(_cannot_be_made(place, error)) from None
         if _HAS_LOCKS:
             fcntl.flock(self._file, fcntl.LOCK_EX)

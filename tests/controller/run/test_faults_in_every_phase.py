@@ -67,7 +67,7 @@ CASES: Final = [
     ),
     *(
         pytest.param("RLIMIT_NOFILE", "", count, id=f"at most {count} open files")
-        for count in (*range(3, 33), 40, 64)
+        for count in (*range(4, 33), 40, 48, 64)  # with 3, Python cannot import a module
     ),
 ]
 
@@ -87,7 +87,12 @@ def test_a_fault_leaves_no_traceback_and_no_unreadable_log(
         [sys.executable, "-c", _CHILD, limit, place, str(int(number)), str(count)],
         cwd=tmp_path,
         env=os.environ
-        | {"XDG_RUNTIME_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)},
+        | {
+            "XDG_RUNTIME_DIR": str(tmp_path),
+            "PYTHONPATH": os.pathsep.join(sys.path),
+            # Python renames a cache file that it could write in part only
+            "PYTHONDONTWRITEBYTECODE": "1",
+        },
         capture_output=True,
         text=True,
         check=False,
