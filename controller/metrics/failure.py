@@ -9,6 +9,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.metrics.path_error import length_m, path_error_m, waypoint_times_s
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.terrain.climb import CLIMBED_RAD
 
@@ -56,7 +57,7 @@ def failure(record: RunRecord) -> Failure | None:
         return Failure("safety", f"stopped by safety: {trip}")
     if len(waypoint_times_s(pose, plan)) == len(plan.waypoints_m):
         return None
-    roll = np.abs(roll_rad(pose.rotation))
+    roll = np.abs(by_rows(roll_rad, pose.rotation))
     walks = pose.pulse_m_s > 0.0 if record.header.run.gait is None else np.ones(len(roll), bool)
     over = np.flatnonzero((roll > ROLL_LIMIT_RAD) & walks)  # rolling uphill does not count
     if len(over):

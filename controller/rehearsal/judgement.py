@@ -10,7 +10,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.controller.metrics.path_error import distance_m, waypoint_times_s
 from snakewalk.controller.metrics.summary import RunSummary
 from snakewalk.controller.metrics.verdict import verdict
-from snakewalk.controller.runlog.column import by_rows, release
+from snakewalk.controller.runlog.column import by_rows
 from snakewalk.controller.runlog.evidence import Kind
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.truth import Truth
@@ -98,7 +98,6 @@ def judge(
     coarse_m = truth.centre_m[:: _stride(truth), :2].copy()
     off_path_m = _off_path_m(coarse_m, record)
     head_m, heading_rad = pose_errors(truth, record)
-    release([truth.centre_m])
     return Judgement(
         waypoints=len(plan.waypoints_m),
         claimed=0 if is_unconfirmed else len(waypoint_times_s(record.pose, plan)),

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -51,14 +52,14 @@ def read_log(
     path: Path,
     *,
     is_snakewalk_log: bool = False,
-    on_progress: Callable[[float, float], None] | None = None,
+    on_progress: Callable[[float, float], None] = lambda done, total: None,
 ) -> RunRecord:
     """Read a log (``.mcap``, or the ``.mcap.part`` of a killed run).
 
     Args:
         path: the log, or a part of it; a log's further parts in its folder are read after it.
         is_snakewalk_log: whether this process wrote it, so that no limit of expansion applies.
-        on_progress: called with (bytes read, of) while it is read.
+        on_progress: called with (bytes read, of) of all parts while they are read.
 
     Raises:
         LogError: the file does not exist, is not a log of ours, or its start is missing.
@@ -84,14 +85,23 @@ def _record(
     path: Path,
     file: BinaryIO,
     is_snakewalk_log: bool,
-    on_progress: Callable[[float, float], None] | None,
+    on_progress: Callable[[float, float], None],
 ) -> RunRecord:
     """Return the record of an open log; only a chunk of it is in memory at once."""
     packer = RowPacker(storage_folder(path))
     rows: Rows = defaultdict(list)
-    read = partial(_add_rows, packer, rows, is_snakewalk_log, on_progress)
-    last_s, complete, lost, fault = read(path, file)
     parts = _next_parts(path)
+    files = (path, *parts.values())
+    ends = [*accumulate(part.stat().st_size for part in files)]
+    starts = dict(zip(files, (0, *ends), strict=False))
+    read = partial(
+        _add_rows,
+        packer,
+        rows,
+        is_snakewalk_log,
+        lambda part, position: on_progress(starts[part] + position, ends[-1]),
+    )
+    last_s, complete, lost, fault = read(path, file)
     for part in parts.values():
         if fault:
             break
@@ -152,7 +162,7 @@ def _add_rows(
     packer: RowPacker,
     rows: Rows,
     is_snakewalk_log: bool,
-    on_progress: Callable[[float, float], None] | None,
+    on_position: Callable[[Path, int], None],
     path: Path,
     file: BinaryIO,
 ) -> tuple[float, bool, int, str]:
@@ -183,8 +193,8 @@ def _add_rows(
                     rows[topic].append(row)
                     packer.pack(topic, rows)
                     last_ns = max(last_ns, record.log_time)
-            if on_progress is not None and number % ROWS == 0:
-                on_progress(file.tell(), packed)
+            if number % ROWS == 0:
+                on_position(path, file.tell())
     except _BROKEN:
         complete = False  # the end of a cut file comes as an error too; damage fails a CRC
     except OSError as error:  # a run that has ended well does not fail because of its log

@@ -97,18 +97,24 @@ def read_truth(path: Path) -> Truth:
     """
     header: dict[str, Any] = {}
     lines = _lines(path, header)
-    table = StoredColumn(storage_folder(path), np.empty((0, _NUMBERS)))
+    folder = storage_folder(path)
+    columns = [StoredColumn(folder, part) for part in _fields(np.empty((0, _NUMBERS)))]
     while some := list(islice(lines, ROWS)):
-        table.append(np.array(some))
+        for column, part in zip(columns, _fields(np.array(some)), strict=True):
+            column.append(part)
     if not header:
         raise InputError(
             f"{path}: contains no truth of a served robot; give the file of bus serve --truth"
         )
-    rows = table.mapped()
-    if not len(rows):
+    truth = Truth(header, *(column.mapped() for column in columns))
+    if not len(truth.time_s):
         raise InputError(f"{path}: the served robot was never measured")
-    return Truth(
-        header,
+    return truth
+
+
+def _fields(rows: Floats) -> list[Floats | Ints]:
+    """Fields of ``Truth`` after its header, in their order."""
+    return [
         rows[:, 0].astype(np.int64),
         rows[:, 1],
         rows[:, 2],
@@ -116,7 +122,7 @@ def read_truth(path: Path) -> Truth:
         rows[:, 6:15].reshape(-1, 3, 3),
         rows[:, 15:18],
         rows[:, 18:],
-    )
+    ]
 
 
 def _lines(path: Path, header: dict[str, Any]) -> Iterator[list[float]]:

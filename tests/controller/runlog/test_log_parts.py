@@ -52,6 +52,16 @@ def test_parts_are_read_as_one_log(write: Write, parted: Path, tmp_path: Path) -
     assert summary(joined).to_dict() == summary(expected).to_dict()
 
 
+def test_one_bar_shows_how_much_of_all_parts_is_read(parted: Path) -> None:
+    shown: list[tuple[float, float]] = []
+    read_log(parted, on_progress=lambda done, total: shown.append((done, total)))
+    sizes = [parted.with_name(name).stat().st_size for name in sorted(files(parted.parent))]
+    done = [bytes_read for bytes_read, _ in shown]
+    assert {total for _, total in shown} == {sum(sizes)}
+    assert done == sorted(done)
+    assert sum(sizes[:-1]) < done[-1] <= sum(sizes)
+
+
 def test_a_part_is_a_log_with_configuration_start_path_and_slow_values(parted: Path) -> None:
     last = read_log(parted.with_name("log.part5.mcap"))
     assert last.complete
