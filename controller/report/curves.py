@@ -12,7 +12,7 @@ import numpy as np
 from plotly.offline import get_plotlyjs
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.colours import AMBER, BLUE, COLOURS, GREEN, INK, RED, rgb
+from snakewalk.config.colours import AMBER, BLUE, COLOURS, GREEN, RED, rgb
 from snakewalk.controller.figures.style import thin
 from snakewalk.controller.metrics.path_error import ground_speed_m_s, path_error_m, waypoint_times_s
 from snakewalk.controller.report.trip import trip_of
@@ -27,9 +27,8 @@ _BLOCK = 400
 two pixels."""
 _BAND_POINTS = 100
 """Places of the band that is drawn instead."""
-_PANEL_PX = 160
-_GAP_PX = 34
-"""Gap between two panels for the title and the legend of the lower one."""
+_MOST_MARKS = 100
+"""Warnings, and errors, that the curves mark (ours)."""
 Curve = tuple[str, str, Floats, Floats]
 """Name, colour, times, values."""
 
@@ -100,7 +99,10 @@ def _panels(record: RunRecord) -> tuple[list[tuple[str, list[Curve]]], str]:
 def _figure(
     record: RunRecord, panels: Sequence[tuple[str, list[Curve]]], shown: int
 ) -> dict[str, Any]:
-    """Traces, layout, and values of every joint's two panels for Plotly; joint ``shown`` first."""
+    """Traces, titles, marks and values of every joint's two panels for the page's script.
+
+    Joint ``shown`` comes first.
+    """
     step = _step(len(record.cycle.time_s))
     joint = [(panel, panel_curves(record, panel, step)) for panel in Panel if panel.is_of_one_joint]
     traces = [
@@ -109,7 +111,6 @@ def _figure(
         for name, colour, time_s, values in curves
         for trace in _traces(name, colour, row, time_s, values)
     ]
-    first = len(traces)
     traces += [
         _trace(
             curve.curve.name, COLOURS[curve.curve.colour], row, curve.time_s, curve.values[:, shown]
@@ -121,13 +122,12 @@ def _figure(
         [_packed_values(curve.values[:, k]) for _, curves in joint for curve in curves]
         for k in range(record.cycle.asked_rad.shape[1])
     ]
-    titles = [_title(record, title) for title, _ in (*panels, *joint)]
     return {
         "traces": traces,
-        "layout": _layout(record, titles),
+        "titles": [_title(record, title) for title, _ in (*panels, *joint)],
+        "marks": _marks(record),
+        "end_s": record.end_s,
         "joints": every,
-        "first": first,
-        "height": _PANEL_PX * len(titles) + 88,
     }
 
 
@@ -139,77 +139,17 @@ def _title(record: RunRecord, title: str) -> str:
     )
 
 
-def _layout(record: RunRecord, titles: Sequence[str]) -> dict[str, Any]:
-    count = len(titles)
+def _marks(record: RunRecord) -> list[tuple[float, str, str]]:
+    """Times with colour and dash: reached waypoints, and the first warnings and errors."""
     reached = "solid" if record.header.pose_evidence.is_measured else "dash"
-    gap = _GAP_PX / (_PANEL_PX * count)
-    tall = (1.0 - gap * (count - 1)) / count
-    layout: dict[str, Any] = {
-        "margin": {"l": 46, "r": 8, "t": 50, "b": 36},
-        "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
-        "hovermode": "x",
-        "showlegend": True,
-        "dragmode": "zoom",
-        "xaxis": {
-            "range": [0.0, max(record.end_s, 1e-3)],
-            "title": {"text": "time (s)", "standoff": 4},
-            "anchor": "free",
-            "position": 0.0,
-        },
-        "annotations": [],
-        "shapes": [
-            _line(time_s, colour, dash)
-            for colour, dash, times in (
-                (GREEN, reached, list(waypoint_times_s(record.pose, record.header.plan))),
-                (AMBER, "solid", [e.time_s for e in record.events if e.level == "warning"][:100]),
-                (RED, "solid", [e.time_s for e in record.events if e.level == "error"][:100]),
-            )
-            for time_s in times
-        ],
-    }
-    for row, title in enumerate(titles, start=1):
-        top = 1.0 - (row - 1) * (tall + gap)
-        layout["yaxis" if row == 1 else f"yaxis{row}"] = {
-            "domain": [max(top - tall, 0.0), top],
-            "fixedrange": True,
-            "gridcolor": "#e9edf1",
-            "zerolinecolor": "#d9e0e6",
-            "nticks": 5,
-        }
-        layout["legend" if row == 1 else f"legend{row}"] = {
-            "orientation": "h",
-            "x": 1.0,
-            "xanchor": "right",
-            "y": top,
-            "yanchor": "bottom",
-        }
-        layout["annotations"].append(
-            {
-                "text": f"<b>{title}</b>",
-                "xref": "paper",
-                "yref": "paper",
-                "x": 0.0,
-                "y": top,
-                "xanchor": "left",
-                "yanchor": "bottom",
-                "showarrow": False,
-            }
-        )
-    return layout
-
-
-def _line(time_s: float, colour: str, dash: str) -> dict[str, Any]:
-    return {
-        "type": "line",
-        "x0": time_s,
-        "x1": time_s,
-        "yref": "paper",
-        "y0": 0.0,
-        "y1": 1.0,
-        "line": {"color": colour, "width": 1, "dash": dash},
-        "opacity": 0.6,
-        "layer": "below",
-    }
+    marks = [
+        (float(time_s), GREEN, reached)
+        for time_s in waypoint_times_s(record.pose, record.header.plan)
+    ]
+    for level, colour in (("warning", AMBER), ("error", RED)):
+        times = [event.time_s for event in record.events if event.level == level]
+        marks += [(time_s, colour, "solid") for time_s in times[:_MOST_MARKS]]
+    return marks
 
 
 def _traces(
@@ -219,7 +159,7 @@ def _traces(
     if len(finite_values) < _BLOCK or _crossings(finite_values) < _BLOCK:
         return [_trace(name, colour, row, time_s, values)]
     at_s, low, mean, high = thin(time_s, values, _BAND_POINTS)
-    edge = {"line": {"color": _pale(colour), "width": 1}, "showlegend": False}
+    edge = {"colour": _pale(colour), "showlegend": False}
     return [
         _trace(f"{name}, least", colour, row, at_s, low) | edge,
         _trace(f"{name}, largest", colour, row, at_s, high) | edge,
@@ -239,16 +179,11 @@ def _pale(colour: str) -> str:
 
 def _trace(name: str, colour: str, row: int, time_s: Floats, values: Floats) -> dict[str, Any]:
     return {
-        "type": "scatter",
-        "mode": "lines",
         "name": name,
         "x": _packed_values(time_s),
         "y": _packed_values(values),
-        "xaxis": "x",
-        "yaxis": "y" if row == 1 else f"y{row}",
-        "legend": "legend" if row == 1 else f"legend{row}",
-        "line": {"color": colour, "width": 1.3},
-        "hovertemplate": f"{name} %{{y:.4g}}<extra></extra>",
+        "colour": colour,
+        "row": row,
     }
 
 

@@ -153,12 +153,11 @@ def _headline(n: RunSummary, run_verdict: RunVerdict) -> str:
 
 
 def _facts(n: RunSummary, run_verdict: RunVerdict) -> tuple[tuple[str, object], ...]:
-    backend = "simulation" if n.backend == "sim" else n.backend
     return (
         ("robot", n.robot),
         ("ground", n.world),
         ("motion", n.motion),
-        ("bus", backend),
+        ("bus", "simulation" if n.backend == "sim" else n.backend),
         ("seed", n.seed),
         ("configuration", n.config_hash),
         ("pose", run_verdict.evidence),

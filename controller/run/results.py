@@ -175,8 +175,8 @@ def _show(
             "verdict": run_verdict.sentence,
             "cause": run_verdict.cause,
             "exit_code": run_verdict.exit_code,
+            "next_command": run_verdict.next_command,
         }
-        stated["next_command"] = run_verdict.next_command
         show({**facts, **stated, **result.summary.evidence, **files}, True)
     else:
         other_facts = {

@@ -49,7 +49,7 @@ class Dashboard:
         self._speed_m_s = np.nan
         self._names = [header.robot.joint_label(k) for k in range(header.robot.joint_count)]
         self._gui = gui = server.gui
-        self._picture: viser.GuiImageHandle | None = None
+        self._picture: viser.GuiHtmlHandle | None = None
         self._state = gui.add_html("")
         self._verdict = gui.add_html("")
         self.follow = gui.add_checkbox("follow the body", True)
@@ -74,9 +74,9 @@ class Dashboard:
             self._bars = gui.add_html("")
         with tabs.add_tab("curves"):
             self.joint = gui.add_dropdown("joint", tuple(self._names))
-            goal = colours.GOAL
-            measured = colours.MEASURED
-            self._angle = _plot(gui, "angle, rad", {"goal": goal, "measured": measured})
+            self._angle = _plot(
+                gui, "angle, rad", {"goal": colours.GOAL, "measured": colours.MEASURED}
+            )
             joints = _of_joints(self._names)
             self._current = _plot(gui, "current of all joints, A", joints, legend=False)
             self._apart = _plot(gui, "current less its shadow's, A", joints, legend=False)
@@ -89,19 +89,14 @@ class Dashboard:
             for joint_panel in self._panels.values():
                 joint_panel.visible = False
 
-    def show_picture(self, jpeg: bytes) -> None:
-        """Show the image of the run's camera; the first image makes the tab."""
-        import cv2  # noqa: PLC0415  an extra, which a run with a camera has
-
-        picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-        if picture is None:
-            return
-        shown = cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
+    def show_picture(self, jpeg: str) -> None:
+        """Show the image of the run's camera, in base64; the first image makes the tab."""
         if self._picture is None:
             with self.tabs.add_tab("camera"):
-                self._picture = self._gui.add_image(shown, format="jpeg")
-        else:
-            self._picture.image = shown
+                self._picture = self._gui.add_html("")
+        self._picture.content = (
+            f"<img alt='camera' style='width:100%' src='data:image/jpeg;base64,{jpeg}'>"
+        )
 
     def show_state(self, record: RunRecord, cycle: int, pose: int, text: str) -> None:
         """Show how the run is doing, in words."""

@@ -124,8 +124,8 @@ class Gate:
                 if path == _WORKER:
                     return _response(http.HTTPStatus.OK, _WORKER_SCRIPT, "text/javascript")
                 is_page = path in _PAGES
-                if is_page:  # the page is changed, so it must come as it is
-                    _ask_for_plain(request)
+                if is_page and "Accept-Encoding" in request.headers:
+                    del request.headers["Accept-Encoding"]  # the page is changed: uncompressed
                 passed: Response | None = process_request(connection, request)
                 if is_page and passed is not None:
                     scripts = (insert.script for insert in inserts.values())
@@ -188,12 +188,6 @@ def _single_header(request: Request, header: str) -> str:
     """Value of a header that is there once; else empty."""
     values = request.headers.get_all(header)
     return values[0] if len(values) == 1 else ""
-
-
-def _ask_for_plain(request: Request) -> None:
-    """Remove the permission to compress the response from a request."""
-    if "Accept-Encoding" in request.headers:
-        del request.headers["Accept-Encoding"]
 
 
 def _add_scripts(response: Response, scripts: Sequence[str]) -> None:

@@ -1,14 +1,15 @@
 """The process that serves a run's page: rows in, viser out, and the stop button pressed."""
 
-import base64
 import json
 import os
 import signal
 import socket
 import sys
 from collections import defaultdict, deque
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import viser
@@ -54,14 +55,15 @@ _SERVOS_S = 0.2
 _CURVES_S = 0.5
 _SILENT_S = 0.5
 """A run that sends nothing for this time may have ended."""
-_LAST_VERDICT_S = 1.5
-"""Longest time for the verdict to reach the browsers."""
+_LAST_S = 3.0
+"""Longest time for the end or the report to reach the browsers, or for a reload (ours)."""
 _ROWS = round(SPAN_S / _PERIOD_S)
 
 
 def serve(line: socket.socket, host: str, port: int) -> None:
     """Serve a page until the run closes the line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    command = os.getppid()
     sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  viser prints
     give_way()
     try:
@@ -82,8 +84,10 @@ def serve(line: socket.socket, host: str, port: int) -> None:
                 raise
             except Exception as fault:  # the E-STOP stays
                 page.report(fault)
+    is_over = Event()
+    signal.signal(signal.SIGTERM, lambda *_: is_over.set())  # when the command ends
     server.flush()
-    page.end()
+    page.end(lambda: is_over.is_set() or os.getppid() != command)
     server.stop()
 
 
@@ -119,6 +123,7 @@ class _LivePage:
         self._waypoint_panel: WaypointPanel | None = None
         self._takes_waypoints = False
         self._over = False
+        self._report: Path | None = None
         self._are_lost = False
         self._faults: set[str] = set()
         self._asked_s = self._told_s = self._servos_s = self._curves_s = -1.0
@@ -143,11 +148,20 @@ class _LivePage:
                 self._over = True
                 self._stop.ended(ended)
 
-    def end(self) -> None:
-        """Wait until the browsers were sent what they show from now on."""
-        until_s = self._clock.now_s() + _LAST_VERDICT_S
-        while not self._stop.is_shown and self._clock.now_s() < until_s:
+    def end(self, is_over: Callable[[], bool]) -> None:
+        """Serve until the browsers have the end of the run, and its report if it has one.
+
+        The report is drawn after the run, up to ``is_over``.
+        """
+        until_s = self._clock.now_s() + _LAST_S
+        is_due = self._report is not None
+        while self._clock.now_s() < until_s and (is_due or not self._stop.is_shown):
             self._clock.sleep_until_s(self._clock.now_s() + _PERIOD_S)
+            if self._report is not None:
+                self._stop.offer(self._report)
+            is_due = is_due and not is_over()
+            if is_due and self._stop.has_browsers:
+                until_s = self._clock.now_s() + _LAST_S
 
     def report(self, fault: Exception) -> None:
         text = " ".join(
@@ -215,10 +229,11 @@ class _LivePage:
         if self._dashboard is None:
             return
         if topic == PICTURE:
-            self._dashboard.show_picture(base64.b64decode(row["jpeg"]))
+            self._dashboard.show_picture(row["jpeg"])
         else:
             verdict = RunVerdict(**row)
             self._dashboard.show_verdict(verdict)
+            self._report = None if verdict.report is None else Path(verdict.report)
             report = "" if verdict.report is None else f"; report: {verdict.report}"
             self._stop.judged(f"{verdict.text} ({verdict.evidence}){report}")
 

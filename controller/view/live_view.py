@@ -46,6 +46,10 @@ class LiveView(ObserverProcess):
         self._dead_man = DeadMan()
         self._is_operator_lost = False
 
+    def __exit__(self, *raised: object) -> None:
+        """End the run's line; the page ends when the browsers have the report, or this program."""
+        self._end.close(0.5)
+
     @property
     def is_enabled(self) -> bool:
         """Whether the dead man's button of a browser's gamepad is held; True without a gamepad."""
@@ -98,7 +102,7 @@ class LiveView(ObserverProcess):
         is_encoded, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         if is_encoded:
             shown = base64.b64encode(data.tobytes()).decode()
-            self._picture = json.dumps({"time_s": time_s, "jpeg": shown}).encode()
+            self._picture = json.dumps({"jpeg": shown}).encode()
 
 
 @plugin("observer", "page")

@@ -24,17 +24,17 @@
         padding: 2px 8px; border-radius: 6px; background: #fff; color: #22303c; box-shadow: 0 1px 4px #0003;
         font: 13px system-ui, sans-serif; pointer-events: none; }
       output:empty { display: none; }
-      #verdict { pointer-events: auto; overflow-wrap: anywhere; }
+      #verdict, a { pointer-events: auto; overflow-wrap: anywhere; }
       #age { background: #b34700; color: #fff; font-weight: 700; }
       @media (prefers-color-scheme: dark) {
         output { background: #22303c; color: #f1f3f5; }
         button:focus-visible { outline-color: #fff; }
       }
     </style><button type="button" disabled>E-STOP <small>(Esc)</small></button>
-    <output id="age" role="alert"></output><output id="state" role="status">waiting for the run</output><output id="verdict"></output>`;
+    <output id="age" role="alert"></output><output id="state" role="status">waiting for the run</output><output id="verdict"></output><output id="report"></output>`;
   const button = root.querySelector("button");
   const text = root.querySelector("#state"), age = root.querySelector("#age");
-  let socket = null, isArmed = false, isPressed = false, isOver = false, newestMs = null;
+  let socket = null, isArmed = false, isPressed = false, isOver = false, newestMs = null, newest = null;
 
   const show = (line, color) => {
     text.textContent = line;
@@ -52,6 +52,7 @@
     return true;
   };
   const take = (state) => {
+    newest = state;
     newestMs = state.age_ms === null ? null : performance.now() - state.age_ms;
     isArmed = state.armed;
     isOver = state.over;
@@ -70,10 +71,24 @@
     const page = `<!doctype html><meta charset="utf-8"><title>snakewalk: the run has ended</title>`
       + `<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">`
       + `<body style="font: 16px system-ui, sans-serif; max-width: 36em; margin: 3em auto; padding: 0 1em">`
-      + text(state.text) + text(state.verdict)
+      + text(state.text) + text(state.verdict) + root.querySelector("#report").innerHTML
       + text(`Nothing is served here since ${new Date().toLocaleString()}. The newest run prints its own address.`);
     const kept = new Response(page, {headers: {"Content-Type": "text/html; charset=utf-8"}});
     await (await caches.open("snakewalk")).put("/end", kept);
+  };
+  // The report opens from the browser's own copy: the server stops when the command ends.
+  const keep_report = async (data) => {
+    const page = new Blob([data], {type: "text/html; charset=utf-8"});
+    const link = Object.assign(document.createElement("a"), {target: "_blank", textContent: "open the report"});
+    try {
+      await (await caches.open("snakewalk")).put("/report", new Response(page));
+      link.href = "/report";
+    } catch {  // not an address of this machine, or no space: as long as this tab is open
+      link.href = URL.createObjectURL(page);
+    }
+    root.querySelector("#report").replaceChildren(link);
+    if (isOver) await keep_end(newest);
+    send("kept");
   };
   const look = () => {  // also while nothing comes
     name_page();
@@ -87,7 +102,7 @@
   const open = () => {
     socket = new WebSocket(location.origin.replace(/^http/, "ws") + "/stop");
     socket.onopen = () => { send(`tab ${tab}`); if (isPressed) send("stop"); };
-    socket.onmessage = (message) => take(JSON.parse(message.data));
+    socket.onmessage = ({data}) => typeof data === "string" ? take(JSON.parse(data)) : keep_report(data);
     socket.onclose = () => {
       if (isOver) return;
       if (!isPressed) show("no connection to the run: switch the supply off", FAULT);

@@ -37,6 +37,10 @@ class _Browser:
     """Name that stays when the page is loaded again."""
     shown: dict[str, Any] | None = None
     """State that it was sent last."""
+    sent: bytes = b""
+    """Report that it was sent last."""
+    kept: bytes = b""
+    """Report that it has confirmed."""
 
 
 class StopElement:
@@ -62,6 +66,8 @@ class StopElement:
             "over": False,
             "verdict": "",
         }
+        self._report = b""
+        self._report_ns = 0
         self._late_s: deque[float] = deque(maxlen=_LATE_MAX)
         self._browsers: set[_Browser] = set()
 
@@ -81,6 +87,14 @@ class StopElement:
         """Show the verdict on the run below its end."""
         self._set(verdict=verdict, over=True)
 
+    def offer(self, report: Path) -> None:
+        """Send a report to the browsers, and send it again when it was written again."""
+        with suppress(OSError):
+            written_ns = report.stat().st_mtime_ns
+            if written_ns != self._report_ns:
+                self._report = report.read_bytes()
+                self._report_ns = written_ns
+
     def pressed(self) -> None:
         """Press the run's button, and show the result."""
         self._set(text=self.press("E-STOP of the page"), pressed=True)
@@ -91,9 +105,17 @@ class StopElement:
                 self._state = self._state | changed
 
     @property
+    def has_browsers(self) -> bool:
+        """Whether a browser is connected."""
+        return bool(self._browsers)
+
+    @property
     def is_shown(self) -> bool:
-        """Whether the newest state was sent to every browser that is connected."""
-        return all(browser.shown is self._state for browser in list(self._browsers))
+        """Whether every browser that is connected has the newest state and report."""
+        return all(
+            browser.shown is self._state and browser.kept is self._report
+            for browser in list(self._browsers)
+        )
 
     def late_s(self) -> list[float]:
         """Return when the inputs began that were dropped since the last call."""
@@ -119,6 +141,8 @@ class StopElement:
         """Process a message of the script; return whether it is one."""
         if word == "stop":
             self.pressed()
+        elif word == "kept":
+            browser.kept = browser.sent
         elif word == "input":
             self.operators.note_input(browser.tab)
         elif len(rest) > _NAME_MAX:
@@ -141,6 +165,9 @@ class StopElement:
                 if state is not browser.shown or look % _BEAT_LOOKS == 0:
                     await browser.connection.send(json.dumps(state | {"age_ms": self._age_ms}))
                     browser.shown = state
+                if browser.sent is not self._report:
+                    browser.sent = self._report
+                    await browser.connection.send(browser.sent)
                 if browser.tab:
                     self.operators.hear(browser.tab, browser.connection.heard_s)
                 await asyncio.sleep(_POLL_S)

@@ -11,7 +11,6 @@ from snakewalk.controller.view.scene import BodyScene
 from snakewalk.controller.walk.live_course import ADD, CLEAR, END, NEXT
 
 _HINT = "Shift and a click on the ground add a waypoint, too"
-_FAULT_COLOUR = colours.FAULT
 
 
 class WaypointPanel:
@@ -52,7 +51,7 @@ class WaypointPanel:
     def show(self, kind: str, text: str) -> None:
         """Show the event of the log that answers a click."""
         if kind in ("operator", "refused"):
-            self._show(text, _FAULT_COLOUR if kind == "refused" else "inherit")
+            self._show(text, colours.FAULT if kind == "refused" else "inherit")
 
     def _arming(self, word: str) -> Callable[[object], None]:
         """Callback of a button that waits for a click, or stops waiting."""
@@ -77,7 +76,7 @@ class WaypointPanel:
             return
         point_m = self._scene.ground_m(event.ray_origin, event.ray_direction)
         if point_m is None:
-            self._show("refused: you did not click on the ground", _FAULT_COLOUR)
+            self._show("refused: you did not click on the ground", colours.FAULT)
             return
         self._commands.put(f"{word}={point_m[0]:.3f},{point_m[1]:.3f}")
         self._show("requested from the run")

@@ -177,13 +177,6 @@ class MujocoPlant:
         copy: Floats = self._data.xipos[1:].copy()
         return copy
 
-    @property
-    def link_rotations(self) -> Floats:
-        """(L, 3, 3) columns: each link's forward, left and up axes in the world."""
-        self._update_kinematics()
-        copy: Floats = self._data.xmat[1:].reshape(-1, 3, 3).copy()
-        return copy
-
     def link_motion(self, link: int) -> LinkMotion:
         """Motion of a link of the spine."""
         m, d = self.mechanics.model, self._data

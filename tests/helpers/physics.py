@@ -34,6 +34,12 @@ def a_body(
     return MujocoPlant(ROBOT, world, ground, step_s, **options)  # type: ignore[arg-type]
 
 
+def link_rotations(plant: MujocoPlant) -> Floats:
+    """Columns (L, 3, 3): each link's forward, left and up axes in the world."""
+    count = len(plant.link_positions_m)
+    return np.array([plant.link_motion(link).rotation for link in range(count)])
+
+
 def a_drive(*, torque_on: bool = True) -> ServoDrive:
     """Servos of ``yaw16`` as they leave the factory, on 12 V."""
     motor = MOTORS["XM430-W350"]

@@ -103,12 +103,35 @@ document.querySelectorAll("img[src^='data:image/svg+xml;base64,']").forEach(img 
   library.textContent = await unpacked("plotly");
   document.head.append(library);
   const spec = JSON.parse(await unpacked("curves-data"));
-  const shapes = spec.layout.shapes;
-  const now = { type: "line", x0: spec.mark_s, x1: spec.mark_s, yref: "paper", y0: 0, y1: 1,
-    line: { color: "#22303c", width: 1.2 } };
-  spec.layout.height = spec.height;
-  spec.layout.shapes = [...shapes, now];
-  await Plotly.newPlot(plot, spec.traces, spec.layout, { responsive: true,
+  const upright = (time_s, line) => ({ type: "line", x0: time_s, x1: time_s, yref: "paper", y0: 0, y1: 1, line });
+  const shapes = spec.marks.map(([time_s, color, dash]) =>
+    ({ ...upright(time_s, { color, width: 1, dash }), opacity: 0.6, layer: "below" }));
+  const count = spec.titles.length, panelPx = 160;
+  const gap = 34 / (panelPx * count);  // for the title and the legend of the lower panel
+  const tall = (1 - gap * (count - 1)) / count;
+  const layout = {
+    height: panelPx * count + 88, margin: { l: 46, r: 8, t: 50, b: 36 },
+    font: { family: "system-ui, sans-serif", size: 12, color: "#22303c" },
+    hovermode: "x", showlegend: true, dragmode: "zoom",
+    xaxis: { range: [0, Math.max(spec.end_s, 1e-3)], title: { text: "time (s)", standoff: 4 },
+      anchor: "free", position: 0 },
+    shapes: [...shapes, upright(spec.mark_s, { color: "#22303c", width: 1.2 })],
+    annotations: spec.titles.map((title, row) => ({ text: `<b>${title}</b>`, xref: "paper", yref: "paper",
+      x: 0, y: 1 - row * (tall + gap), xanchor: "left", yanchor: "bottom", showarrow: false })),
+  };
+  spec.titles.forEach((_, row) => {
+    const top = 1 - row * (tall + gap), number = row ? row + 1 : "";
+    layout[`yaxis${number}`] = { domain: [Math.max(top - tall, 0), top], fixedrange: true,
+      gridcolor: "#e9edf1", zerolinecolor: "#d9e0e6", nticks: 5 };
+    layout[`legend${number}`] = { orientation: "h", x: 1, xanchor: "right", y: top, yanchor: "bottom" };
+  });
+  const traces = spec.traces.map(trace => {
+    const number = trace.row > 1 ? trace.row : "";
+    return { type: "scatter", mode: "lines", xaxis: "x", yaxis: `y${number}`, legend: `legend${number}`,
+      line: { color: trace.colour, width: 1.3 }, hovertemplate: `${trace.name} %{y:.4g}<extra></extra>`,
+      ...trace };
+  });
+  await Plotly.newPlot(plot, traces, layout, { responsive: true,
     displaylogo: false, displayModeBar: innerWidth > 640 && "hover" });
   let isDrawing = false, next = null;
   const mark = async t => {  // no more often than it can be drawn
@@ -128,6 +151,6 @@ document.querySelectorAll("img[src^='data:image/svg+xml;base64,']").forEach(img 
   plot.on("plotly_click", event => seek(event.points[0].x));
   document.getElementById("joint").addEventListener("change", change => {
     const rows = spec.joints[+change.target.value];
-    Plotly.restyle(plot, { y: rows }, rows.map((_, k) => spec.first + k));
+    Plotly.restyle(plot, { y: rows }, rows.map((_, k) => traces.length - rows.length + k));
   });
 })();

@@ -23,6 +23,7 @@ from snakewalk.controller.motion.source import MotionSource
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
 from snakewalk.controller.runtime.drive import OnEvent
+from snakewalk.controller.track.readers.generated import EMBEDDED
 from snakewalk.controller.track.recorded_joints import recorded_joints
 
 _HEAD_BYTES = 4096
@@ -40,7 +41,7 @@ def foreign_joints(track: str, robot: RobotConfig, asked: JointRequest) -> Joint
     if reader is None:
         names = ("joints", "unit", "topic", "episode", "columns")
         given = [name for name in names if getattr(asked, name) not in (None, {})]
-        if given:
+        if given and (path.exists() or track in EMBEDDED):
             option = "--joint" if given[0] == "joints" else f"--{given[0]}"
             raise InputError(f"{option}: {track} has no joint angles with names; leave it out")
         return None

@@ -9,6 +9,7 @@ from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.gaits.backbone import fit_backbone
 from snakewalk.controller.kinematics.links import body_in_world, chain_axes, chain_points_m
 from snakewalk.sim.physics.plant import MujocoPlant
+from tests.helpers.physics import link_rotations
 
 Floats = NDArray[np.float64]
 ROBOTS = ("yaw16", "alternating16", "alternating32")
@@ -127,7 +128,7 @@ def test_the_chain_is_that_of_the_physics() -> None:
     plant = MujocoPlant(robot, load_world("flat"))
     data = plant.mechanics.data
     data.qpos[7:] = q
-    links, turns = plant.link_positions_m, plant.link_rotations
+    links, turns = plant.link_positions_m, link_rotations(plant)
     body = body_in_world(robot, plant.head_pose(), q)
     points, axes = chain_points_m(robot, body), chain_axes(robot, body)
     np.testing.assert_allclose(body.rotation, turns, atol=1e-9)

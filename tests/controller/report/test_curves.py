@@ -36,13 +36,10 @@ def test_panels_of_a_dead_reckoned_pose_state_it(record: RunRecord) -> None:
     believed = dataclasses.replace(
         record, header=dataclasses.replace(record.header, pose_evidence=reckoned)
     )
-    titles = [
-        [each["text"] for each in _figure(of, _panels(of)[0], 0)["layout"]["annotations"]]
-        for of in (record, believed)
-    ]
+    titles = [_figure(of, _panels(of)[0], 0)["titles"] for of in (record, believed)]
     named = [each for each in titles[1] if "dead-reckoned" in each]
     assert named == [
-        "<b>distance from the path, m, dead-reckoned</b>",
-        "<b>speed, m/s, dead-reckoned</b>",
+        "distance from the path, m, dead-reckoned",
+        "speed, m/s, dead-reckoned",
     ]
     assert [each.replace(", dead-reckoned", "") for each in titles[1]] == titles[0]

@@ -29,6 +29,8 @@ WIDTHS: Final = ((390, 844), (768, 1024), (1400, 900))
 SIZES: Final = pytest.mark.parametrize("size", WIDTHS, ids=[str(width) for width, _ in WIDTHS])
 CONFIRMED: Final = "stop requested"
 ENDED: Final = "the run has ended: stop requested by E-STOP of the page"
+REPORT: Final = "<title>the report of the run</title>"
+REPORT_LINK: Final = "open the report"
 NO_SCENE: Final = """
     for (const name of ["Arrays", "Elements", "ArraysInstanced", "ElementsInstanced"])
         WebGL2RenderingContext.prototype["draw" + name] = () => {};
@@ -539,9 +541,27 @@ def test_a_reload_after_the_end_shows_the_end(stage: Stage) -> None:
 
 
 @during("ended")
+def test_the_end_has_a_link_that_opens_the_report(stage: Stage) -> None:
+    Path(stage.run.finished.verdict.report).write_text(REPORT, encoding="utf-8")
+    stage.run.view.page.end(lambda: True)
+    stage.tab.get_by_text(REPORT_LINK).wait_for()
+    assert opened_title(stage) == "the report of the run"
+
+
+def opened_title(stage: Stage) -> str:
+    """Title of the page that the link to the report opens."""
+    with stage.context.expect_page() as opened:
+        stage.tab.get_by_text(REPORT_LINK).click()
+    title = str(opened.value.title())
+    opened.value.close()
+    return title
+
+
+@during("ended")
 def test_end_and_verdict_stay_when_the_server_is_gone_also_after_a_reload(stage: Stage) -> None:
     stage.tab.wait_for_function(f"{ROOT}.querySelector('#verdict').textContent !== ''")
-    stage.tab.wait_for_function("caches.match('/end').then((kept) => kept !== undefined)")
+    Path(stage.run.finished.verdict.report).write_text(REPORT, encoding="utf-8")
+    stage.run.view.page.end(lambda: True)
     stage.run.view.close()
     stage.proxy.cut()
     stage.tab.wait_for_timeout(1500.0)
@@ -550,5 +570,6 @@ def test_end_and_verdict_stay_when_the_server_is_gone_also_after_a_reload(stage:
     stage.tab.get_by_text(ENDED).wait_for()
     stage.tab.get_by_text(stage.run.finished.verdict.sentence).first.wait_for()
     assert stage.tab.title() == "snakewalk: the run has ended"
+    assert opened_title(stage) == "the report of the run"
     stage.tab.emulate_media(color_scheme="dark")
     assert stage.tab.evaluate("getComputedStyle(document.documentElement).colorScheme") != ""

@@ -1,9 +1,12 @@
 """Our own element in the page: E-STOP in sight at every width, and no late input."""
 
 import json
+import os
 import re
 import threading
+import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -69,6 +72,28 @@ def test_its_socket_shows_the_state_and_presses_the_button_once_for_each_message
         assert page.stop.late_s() == [147.5]
         line.send("late x")  # nothing of our script: the line is closed
         assert list(line) == []
+
+
+def test_a_report_is_sent_again_when_it_was_written_again(page: Page, tmp_path: Path) -> None:
+    port, token = page.server.get_port(), page.url.rpartition("=")[2]
+    headers = {"Cookie": f"snakewalk-{port}={token}", "Origin": f"http://127.0.0.1:{port}"}
+    report = tmp_path / "report.html"
+    with connect(f"ws://127.0.0.1:{port}/stop", additional_headers=headers) as line:
+
+        def received() -> bytes:
+            return next(said for said in line if isinstance(said, bytes))
+
+        page.stop.offer(report)  # not drawn yet
+        for number, text in enumerate((b"without film", b"with film"), start=1):
+            report.write_bytes(text)
+            os.utime(report, (number, number))
+            page.stop.offer(report)
+            assert received() == text
+            assert not page.stop.is_shown
+            line.send("kept")
+            until_s = time.monotonic() + PATIENCE_S
+            while not page.stop.is_shown:
+                assert time.monotonic() < until_s
 
 
 def test_a_run_that_ends_while_its_button_is_pressed_is_shown_as_ended(page: Page) -> None:

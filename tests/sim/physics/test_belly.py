@@ -12,7 +12,7 @@ from snakewalk.config.robot import BellyConfig, RobotConfig
 from snakewalk.config.world import FrictionConfig
 from snakewalk.sim.physics.body import belly_points_m, straight_part_m
 from snakewalk.sim.physics.plant import MujocoPlant
-from tests.helpers.physics import FLAT, ROBOT, Floats, a_drive, serpenoid
+from tests.helpers.physics import FLAT, ROBOT, Floats, a_drive, link_rotations, serpenoid
 from tests.oracles.numpy_steps import numpy_plant
 
 BELLIES = (BellyConfig(shape="ball"), BellyConfig(), BellyConfig(shape="rails", width_m=0.1))
@@ -120,7 +120,7 @@ def test_a_body_that_curls_up_meets_itself() -> None:
     for k in range(1, 101):
         drive.goal_rad[:] = 0.25 + 0.62 * min(1.0, k / 50)
         body.advance(0.02 * k, drive)
-    axes = body.link_rotations
+    axes = link_rotations(body)
     points = body.link_positions_m[:, None] + belly_points_m(ROBOT, 1)[0] @ axes.swapaxes(1, 2)
     apart = np.linalg.norm(points[:, None, :, None] - points[None, :, None], axis=-1).min((2, 3))
     far = np.abs(np.subtract.outer(np.arange(17), np.arange(17))) >= 3
