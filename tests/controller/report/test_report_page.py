@@ -259,6 +259,52 @@ def test_in_a_browser_curves_are_read_off_and_zoomed_and_a_telephone_holds_the_p
     assert faults == []
 
 
+@pytest.fixture
+def filmed(hills: Path, tmp_path: Path) -> Path:
+    """Page of the run over hills, with a film of the same times."""
+    pytest.importorskip("av")
+    from snakewalk.sim.rendering.movie_file import MovieFile
+
+    with MovieFile(tmp_path / "film.mp4", 10, (64, 48)) as film:
+        for _ in range(120):
+            film.add(np.zeros((48, 64, 3), np.uint8))
+    source = film_on_page(tmp_path / "film.mp4", tmp_path).source
+    video = f"<video muted data-start='0' data-speed='1' src='{source}'></video><b id='clock'></b>"
+    page_path = tmp_path / "report.html"
+    html = hills.read_text(encoding="utf-8")
+    page_path.write_text(html.replace("</header>", f"</header>{video}", 1), encoding="utf-8")
+    return page_path
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_in_a_browser_film_map_curves_and_heat_maps_share_one_time(filmed: Path) -> None:
+    with chromium() as browser:
+        tab = new_tab(browser, viewport={"width": 1000, "height": 800})
+        tab.goto(filmed.as_uri())
+        tab.wait_for_selector(".js-plotly-plot .nsewdrag")
+        tab.wait_for_function("film.readyState > 1")
+        places = []
+        for seconds in (3.0, 9.0):  # the film leads
+            tab.evaluate(f"film.currentTime = {seconds}")
+            tab.wait_for_function(
+                f"Math.abs(plot.layout.shapes.at(-1).x0 - {seconds}) < 0.11"
+                f" && Math.abs(parseFloat(clock.textContent) - {seconds}) < 0.11"
+            )
+            places.append(tab.evaluate("document.querySelector('.dot').style.left"))
+        assert places[0] != places[1]
+        tab.evaluate("plot.emit('plotly_click', {points: [{x: 6}]})")  # the curves lead
+        tab.wait_for_function("Math.abs(film.currentTime - 6) < 0.11")
+        (at_s, place, cursors) = shared_cursor(tab, 0.4)  # a heat map leads
+        tab.wait_for_function(f"Math.abs(film.currentTime - {at_s}) < 0.11")
+        assert place not in places
+        assert len(cursors) >= 3
+        way = tab.locator(".picture", has=tab.locator(".dot")).first
+        way.click(position={"x": 1.0, "y": 1.0})  # the map leads: to its nearest point
+        tab.wait_for_function(f"Math.abs(film.currentTime - {at_s}) > 0.11")
+        tab.wait_for_function("Math.abs(film.currentTime - plot.layout.shapes.at(-1).x0) < 0.11")
+
+
 def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) -> None:
     level = replace(record.slow, voltage_v=np.full_like(record.slow.voltage_v, 12.0))
     html = curves_html(replace(record, slow=level))
