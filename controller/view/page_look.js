@@ -3,7 +3,7 @@
   const look_of_page = document.createElement("style");
   look_of_page.textContent = `
     html.snakewalk-old body > :not(#snakewalk-stop) { filter: grayscale(1) opacity(.6) }
-    .mantine-Notifications-root { margin-top: 120px }  /* viser's notices: below the E-STOP */
+    .mantine-Notifications-root { margin-top: 170px }  /* viser's notices: below the E-STOP */
     @media (prefers-color-scheme: dark) {  /* viser draws its panels in one scheme for all browsers */
       html { background: #000 }
       body > :not(#snakewalk-stop) { filter: invert(1) hue-rotate(180deg) }

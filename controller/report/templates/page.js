@@ -111,7 +111,7 @@ document.querySelectorAll("img[src^='data:image/svg+xml;base64,']").forEach(img 
   const tall = (1 - gap * (count - 1)) / count;
   const layout = {
     height: panelPx * count + 88, margin: { l: 46, r: 8, t: 50, b: 36 },
-    font: { family: "system-ui, sans-serif", size: 12, color: "#22303c" },
+    font: { family: "system-ui, sans-serif", size: innerWidth > 640 ? 12 : 10, color: "#22303c" },
     hovermode: "x", showlegend: true, dragmode: "zoom",
     xaxis: { range: [0, Math.max(spec.end_s, 1e-3)], title: { text: "time (s)", standoff: 4 },
       anchor: "free", position: 0 },

@@ -303,6 +303,10 @@ def test_in_a_browser_film_map_curves_and_heat_maps_share_one_time(filmed: Path)
         way.click(position={"x": 1.0, "y": 1.0})  # the map leads: to its nearest point
         tab.wait_for_function(f"Math.abs(film.currentTime - {at_s}) > 0.11")
         tab.wait_for_function("Math.abs(film.currentTime - plot.layout.shapes.at(-1).x0) < 0.11")
+        tab.set_viewport_size({"width": 390, "height": 844})  # cursors lie on wide pictures too
+        widths = "(box) => [box.clientWidth, box.firstChild.clientWidth]"
+        tab.wait_for_function(f"({widths})(document.querySelector('.wide .picture'))[1] === 860")
+        assert tab.locator(".wide .picture").first.evaluate(widths) == [860, 860]
 
 
 def test_a_supply_that_never_changes_is_told_and_not_drawn(record: RunRecord) -> None:
