@@ -2,10 +2,13 @@
 
 Each case draws axes, mount, delay and scale of a source with 5 mm and 1.5 degrees of noise. Right
 is a case within 1 degree, 2 %, 5 mm and 10 ms. ``--wrong`` calibrates with wrong bodies instead,
-which have to be rejected. ``--deviation`` gives the ground another friction and law.
+which have to be rejected. ``--deviation`` gives the ground another friction and law. A scale is
+wrong if it is written with more than 2 % of error, or if the stated interval lacks the true one.
+``--scale`` calibrates a robot whose file states the true scale.
 """
 
 import argparse
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -67,11 +70,19 @@ def drawn(seed: int) -> PoseConfig:
 
 
 def found(
-    seed: int, deviation: Deviation, change: Change, robot_name: str | None = None
+    seed: int,
+    deviation: Deviation,
+    change: Change,
+    robot_name: str | None = None,
+    *,
+    states_scale: bool = False,
 ) -> PoseConfig:
-    """Calibrate a drawn mount."""
+    """Calibrate a drawn mount; ``states_scale`` writes its scale into the robot's file."""
     config = drawn(seed)
     prepared = prepare_calibration(robot_name, None)
+    if states_scale:
+        stated = prepared.robot.model_copy(update={"pose": PoseConfig(scale=config.scale)})
+        prepared = replace(prepared, robot=stated)
     robot = prepared.robot.model_copy(update={"pose": config})
     tracker = TrackerConfig(
         noise_m=0.005, noise_deg=1.5, delay_s=config.latency_s or 0.0, clock_offset_s=1e6
@@ -95,6 +106,12 @@ def errors(config: PoseConfig, true: PoseConfig) -> tuple[float, ...]:
         1e3 * float(np.linalg.norm(off_m)),
         1e3 * abs((config.latency_s or 0.0) - (true.latency_s or 0.0)),
     )
+
+
+def contains(message: str, scale: float) -> bool:
+    """Whether a refusal states an interval that contains a scale."""
+    stated = re.search(r"the poses show (\S+) to (\S+);", message)
+    return stated is not None and float(stated[1]) <= scale <= float(stated[2])
 
 
 def wrong(seed: int) -> tuple[str, Change]:
@@ -135,29 +152,39 @@ def main() -> int:
     parser.add_argument("--wrong", action="store_true", help="wrong bodies")
     parser.add_argument("--deviation", action="store_true", help="other friction and law")
     parser.add_argument("--robot", help="yaw16 if not given")
+    parser.add_argument("--scale", action="store_true", help="the file states the true scale")
+    parser.add_argument("--first-seed", type=int, default=0)
     given = parser.parse_args()
-    right = 0
-    for seed in range(given.cases):
+    right = refused = false = 0
+    for seed in range(given.first_seed, given.first_seed + given.cases):
         rng = np.random.default_rng([seed, 0x66])
         along, across = np.exp(rng.uniform(np.log(0.5), np.log(1.4), 2)).tolist()
         deviation = Deviation(along, across, law=LAWS[seed % len(LAWS)])
         name, change = wrong(seed) if given.wrong else ("", lambda sample, time_s: sample)
         try:
             config = found(
-                seed, deviation if given.deviation else NO_DEVIATION, change, given.robot
+                seed,
+                deviation if given.deviation else NO_DEVIATION,
+                change,
+                given.robot,
+                states_scale=given.scale,
             )
         except InputError as error:
-            right += given.wrong
+            hides = contains(error.faults[0], drawn(seed).scale)
+            right += given.wrong and not hides
+            refused += 1
+            false += not given.wrong and not hides
             print(seed, name, error.faults[0])
             continue
         off = errors(config, drawn(seed))
         if not given.wrong:
             right += all(each <= most for each, most in zip(off, LIMITS, strict=True))
+            false += off[2] > LIMITS[2]
         print(
             seed, name, "axes {:.2f}, mount {:.2f} deg, {:.2f} %, {:.1f} mm, {:.1f} ms".format(*off)
         )
-    print(f"{right} of {given.cases} right")
-    return int(right < given.cases)
+    print(f"{right} of {given.cases} right, {refused} refused, {false} with a wrong scale")
+    return int(false > 0 or (given.wrong and right < given.cases))
 
 
 if __name__ == "__main__":

@@ -38,6 +38,11 @@ def rotation_by(vector: Floats) -> Floats:
     return np.asarray(np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k)
 
 
+def heading_of(rotation: Floats) -> float:
+    """Return the direction of a frame's x axis in the horizontal plane, rad, in (-pi, pi]."""
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
 def about_up(angle_rad: float) -> Floats:
     """(3, 3) rotation about the up axis."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)

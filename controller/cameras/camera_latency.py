@@ -62,7 +62,7 @@ def fit_latency(
     bodies = [body_in_world(robot, origin, joint_row).headings_rad for joint_row in joint_rad]
     headings_rad = np.unwrap(np.unwrap(np.array(bodies), axis=1), axis=0)
     headings_rad -= headings_rad.mean(axis=1, keepdims=True)
-    if float(headings_rad.std(axis=0).max()) < _LEAST_MOTION_RAD:
+    if headings_rad.std(axis=0).max() < _LEAST_MOTION_RAD:
         return replace(_NO_FIT, fault="the joints did not move: turn one to and fro, unevenly")
     frame_s = np.array([line.time_s for line in finite_lines])
     delays = np.arange(_EARLIEST_S, _LATEST_S + 1e-9, _STEP_S)

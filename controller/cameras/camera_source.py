@@ -89,7 +89,7 @@ def _camera(context: PoseContext) -> "RenderedCamera | DeviceCamera":
     if ground is not None and float(ground.z_m.max()) > 0.8 * run.camera.height_m:
         raise InputError(
             f"camera: height_m: {run.camera.height_m:g} m above height 0 of the world, whose "
-            f"ground rises to {float(ground.z_m.max()):.2f} m; raise the camera"
+            f"ground rises to {ground.z_m.max():.2f} m; raise the camera"
         )
     if backend.qpos is None:
         return DeviceCamera(run, robot, backend.clock, context.on_picture, prepared.ground)

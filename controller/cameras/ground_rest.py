@@ -8,7 +8,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import SpineLinks
-from snakewalk.drivers.attitude import about_up, rotation_by
+from snakewalk.drivers.attitude import about_up, heading_of, rotation_by
 from snakewalk.drivers.types import BodyPose
 
 Heights = Callable[[Floats], Floats]
@@ -52,7 +52,7 @@ class GroundRest:
             head_m[2] += lift_m
             rotation = rotation_by(np.array([slope[1], -slope[0], 0.0])) @ rotation
             # tilting turns the head slightly about the vertical; keep the measured heading
-            turn = place[2] - np.arctan2(rotation[1, 0], rotation[0, 0])
+            turn = place[2] - heading_of(rotation)
             rotation = about_up(turn) @ rotation
         return BodyPose(time_s, head_m, rotation)
 

@@ -12,6 +12,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
+from snakewalk.drivers.attitude import heading_of
 from snakewalk.drivers.least_squares import least_squares
 
 _ROUNDS = 5
@@ -69,7 +70,7 @@ def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
     error_m = float(np.sqrt((size * size).mean()))
     return PoseFit(
         shift,
-        float(np.arctan2(turn[1, 0], turn[0, 0])),
+        heading_of(turn),
         turned + shift,
         error_m,
         _covariance(turned, ahead, weight, error_m),

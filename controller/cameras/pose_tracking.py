@@ -280,7 +280,7 @@ def _fit_tips(
         step = least_squares(look.rows * weight[:, None], look.target * weight, _REGULAR)
         shift = shift + step[:2]
         turn = turn + float(step[2])
-        if float(np.hypot(*step[:2])) < _LEAST_STEP_M:
+        if np.hypot(*step[:2]) < _LEAST_STEP_M:
             if wide == _NARROW_SECTIONS:
                 break
             wide = _NARROW_SECTIONS
@@ -429,8 +429,8 @@ def _fault(robot: RobotConfig, look: _Comparison, error_m: float, shift: Floats)
         return f"the image lies {error_m * 1e3:.0f} mm off the measured joints"
     if not look.ends.any():
         return "neither tip of the body is seen"
-    if float(np.abs(look.along[look.ends]).max()) > _TIP_OFF * robot.body_radius_m:
+    if np.abs(look.along[look.ends]).max() > _TIP_OFF * robot.body_radius_m:
         return _NO_TIP
-    if float(np.hypot(*shift)) > 1.4 * REACH_M:
+    if np.hypot(*shift) > 1.4 * REACH_M:
         return "the image lies too far from the possible places of the body"
     return ""

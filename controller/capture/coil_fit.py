@@ -35,7 +35,6 @@ _FINE_SPOTS = (0.4, 0.2)  # of the width: largest distance outside and inside
 _ROUNDS = 12
 _LEAST_GAIN = 1e-3  # of the cost
 _COMMON_PIXELS = 9.0  # neighbouring pixels with nearly the same residual
-_LEAST_PX = 0.25  # working px: the residual of a silhouette of pixels
 _LENGTH = 0.015  # prior standard deviation of the log of a frame's length
 _STIFF = 2.0  # rad, of second differences of the bends
 _LEAST_GAP_PX = 1.25  # working px on both sides of the boundary: the edge

@@ -301,7 +301,7 @@ def _ground(record: RunRecord) -> Json:
     field = _drawn_ground(record)
     corners_m, faces = surface(field)
     height = corners_m[:, 2]
-    share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)
+    share = (height - height.min()) / max(np.ptp(height), 1e-9)
     low, high = np.array(_GROUND)
     triangles = {
         "pose": _pose([0.0, 0.0, 0.0], _UPRIGHT),

@@ -89,6 +89,16 @@ def pose_frame(header: Header) -> str:
     return ros.world_frame if header.pose_evidence.is_measured else ros.odom_frame
 
 
+def _head_frames(record: RunRecord) -> Iterator[tuple[float, str, Any, Any]]:
+    """Yield time, name, place and quaternion of the head's frame; none without poses."""
+    if len(record.pose.time_s):
+        frames = body_frames(record)
+        places = frames.translation_m[:, 0].tolist()
+        turns = frames.quaternion[:, 0].tolist()
+        for time_s, place, turn in zip(frames.time_s.tolist(), places, turns, strict=True):
+            yield time_s, frames.names[0], place, turn
+
+
 def _variance(deviation: float | None) -> float:
     if deviation is None or not np.isfinite(deviation):  # not a number: nothing was measured yet
         return UNKNOWN_VARIANCE
@@ -209,14 +219,9 @@ class RosMessages:
 
     def head_poses(self, record: RunRecord) -> Iterator[Row]:
         """Where the head was."""
-        if not len(record.pose.time_s):
-            return
-        frames = body_frames(record)
         world = pose_frame(record.header)
-        for k, time_s in enumerate(frames.time_s.tolist()):
-            place = frames.translation_m[k, 0]
-            turn = frames.quaternion[k, 0]
-            pose = self._pose(time_s, world, place.tolist(), turn.tolist())
+        for time_s, _, place, turn in _head_frames(record):
+            pose = self._pose(time_s, world, place, turn)
             yield Row(time_s, HEAD_POSE, TYPES[HEAD_POSE], pose)
 
     def odometry(
@@ -230,19 +235,14 @@ class RosMessages:
             heading_sd_rad: standard deviation of the rotations; None: unknown.
 
         """
-        if not len(record.pose.time_s):
-            return
-        frames = body_frames(record)
         world = pose_frame(record.header)
         unknown = self._floats(np.diag([UNKNOWN_VARIANCE] * 6).ravel())
         variance = [_variance(position_sd_m)] * 3 + [_variance(heading_sd_rad)] * 3
         zero_vector = self._xyz("Vector3", [0.0, 0.0, 0.0])
-        for k, time_s in enumerate(frames.time_s.tolist()):
-            place = frames.translation_m[k, 0]
-            turn = frames.quaternion[k, 0]
+        for time_s, name, place, turn in _head_frames(record):
             pose = self._new_message(
                 "geometry_msgs/msg/PoseWithCovariance",
-                pose=self._bare_pose(place.tolist(), turn.tolist()),
+                pose=self._bare_pose(place, turn),
                 covariance=self._floats(np.diag(variance).ravel()),
             )
             twist = self._new_message(
@@ -257,7 +257,7 @@ class RosMessages:
                 ODOMETRY,
                 TYPES[ODOMETRY],
                 header=self._header(time_s, world),
-                child_frame_id=frames.names[0],
+                child_frame_id=name,
                 pose=pose,
                 twist=twist,
             )

@@ -147,7 +147,7 @@ def fit_backbone(
                 break
             change[6:][beyond] = np.clip(bends, -limit, limit)[beyond] - joints[beyond]
             free[6:] &= ~beyond
-        change *= min(1.0, STEP_RAD / max(float(np.abs(change[3:]).max()), 1e-12))
+        change *= min(1.0, STEP_RAD / max(np.abs(change[3:]).max(), 1e-12))
         tip = tip + change[:3]
         rotation = rotation_by(change[3:6]) @ rotation
         joints = np.clip(joints + change[6:], -limit, limit)

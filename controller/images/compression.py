@@ -100,12 +100,12 @@ def _has_blocks(image: Image) -> bool:
     steps = np.minimum(np.abs(np.diff(grey, axis=1)), _STEP)
     steps = steps[:, : steps.shape[1] // _BLOCK_PX * _BLOCK_PX]
     mean = np.median(steps.mean(axis=0).reshape(-1, _BLOCK_PX), axis=0)  # scenes have few edges
-    if float(np.median(mean)) > 0.0:
+    if np.median(mean) > 0.0:
         return bool(mean[-1] > _BLOCKS * np.median(mean[:-1]))
     moved = (steps > 0).astype(np.float32)
     block_edges = cv2.boxFilter(moved, -1, (_BLOCK_PX - 1, 1), normalize=False)
     alone = ((moved > 0) & (block_edges < 1.5)).sum(axis=0).reshape(-1, _BLOCK_PX).sum(axis=0)
-    return bool(alone[-1] > _BLOCK_EXCESS * max(float(np.median(alone[:-1])), 1.0))
+    return bool(alone[-1] > _BLOCK_EXCESS * max(np.median(alone[:-1]), 1.0))
 
 
 def _quality(image: Image) -> int | None:

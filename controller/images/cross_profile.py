@@ -18,7 +18,7 @@ def even_line(line: Floats, arc: Floats, step: float) -> Floats:
 def end_direction(line: Floats, back: int) -> Floats:
     """Return the unit vector (2,) to the last point of a line from the point ``back`` before it."""
     ahead = line[-1] - line[-1 - back]
-    return np.asarray(ahead / max(float(np.hypot(*ahead)), 1e-9))
+    return np.asarray(ahead / max(np.hypot(*ahead), 1e-9))
 
 
 def seen_across(path: Floats, level: Singles, across: Floats) -> Singles:

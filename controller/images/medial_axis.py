@@ -280,14 +280,14 @@ def _wide_end(line: Floats, deep: Floats) -> int | None:
     if most < _WIDE_END * float(np.median(deep)):
         return None
     place = int(np.flatnonzero(near >= _AS_DEEP * most)[-1])
-    if float(np.hypot(*np.diff(line[: place + 1], axis=0).T).sum()) > _SHORT_END * most:
+    if np.hypot(*np.diff(line[: place + 1], axis=0).T).sum() > _SHORT_END * most:
         return None
     behind = min(place + max(2, round(1.5 * most)), len(line) - 1)
     ahead = line[place] - line[behind]
     every = max(1, min(place, round(0.5 * most)))
     directions = line[: place + 1 - every] - line[every : place + 1]
     straight = directions @ ahead / np.maximum(np.hypot(*directions.T) * np.hypot(*ahead), 1e-9)
-    return place if float(straight.min()) < _HOOK_COSINE else None
+    return place if straight.min() < _HOOK_COSINE else None
 
 
 def _to_the_front(end: Floats, deep: float, solid: Image) -> Floats:

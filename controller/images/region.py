@@ -87,7 +87,7 @@ def region_of(roi: str | None, mask: Path | None, frame_shape: tuple[int, ...]) 
         )
     grey = image if image.ndim == 2 else image.max(axis=2)
     inside = grey[y : y + high, x : x + wide] > 0.5 * float(grey.max())
-    if int(inside.sum()) < _LEAST_SIDE_PX**2:
+    if inside.sum() < _LEAST_SIDE_PX**2:
         raise InputError(
             f"--mask {mask}: leaves {int(inside.sum())} pixels; white is where the animal may be"
         )

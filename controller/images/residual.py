@@ -39,7 +39,7 @@ def check_residual(
         ghosts: whether the background comes from the film and may show the animal itself.
 
     """
-    wide = 2.0 * max(float(np.median(skeleton.radius_px)), 0.5)
+    wide = 2.0 * max(np.median(skeleton.radius_px), 0.5)
     around = round(_MARGIN_LENGTHS * skeleton.length_px)
     rows, columns = silhouette.level.shape
     left, top = (int(v) for v in silhouette.origin_px)

@@ -313,7 +313,7 @@ def frame_times(stated_s: Sequence[float], rate_hz: float) -> tuple[Floats, floa
         return number / rate_hz, rate_hz
     time_s -= time_s[0]
     step_s = float(time_s[-1]) / (len(time_s) - 1)
-    if float(np.abs(time_s - step_s * number).max()) > _EVEN_STEP * step_s:
+    if np.abs(time_s - step_s * number).max() > _EVEN_STEP * step_s:
         return time_s, 1.0 / float(np.median(np.diff(time_s)))
     own_hz = rate_hz if abs(step_s * rate_hz - 1.0) < _SAME_RATE else 1.0 / step_s
     return number / own_hz, own_hz

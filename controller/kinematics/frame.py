@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snakewalk.config.arrays import Floats
-from snakewalk.drivers.attitude import about_up
+from snakewalk.drivers.attitude import about_up, heading_of
 
 UP = (0.0, 0.0, 1.0)
 
@@ -28,7 +28,7 @@ class Frame:
     @property
     def heading_rad(self) -> float:
         """Direction of x in the horizontal plane, in (-pi, pi]."""
-        return float(np.arctan2(self.rotation[1, 0], self.rotation[0, 0]))
+        return heading_of(self.rotation)
 
     def to_world_m(self, points_m: Floats) -> Floats:
         """Transform points (..., 3) of this frame to the world."""

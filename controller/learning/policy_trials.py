@@ -119,7 +119,7 @@ def _measured_trial(result: RunResult, seconds: float) -> PolicyTrialResult:
     first, last = np.searchsorted(pose.time_s, ends_s)
     way_m = (pose.centre_m[last] - pose.centre_m[first])[:2]
     from_s, to_s = float(pose.time_s[first]), float(pose.time_s[last])
-    distance_m = float(np.hypot(*way_m))
+    distance_m = math.hypot(*way_m)
     speed_m_s = distance_m / (to_s - from_s)
     frequency_hz = source.cycles / (seconds + 0.5 * STOP_S)
     electrical_j, _ = energy_track(record).between(from_s, to_s)

@@ -164,7 +164,7 @@ def _complete(motion: JointMotion, joint_rad: Floats, where: str) -> JointMotion
     if missing:
         lines.append(
             f"{missing} rows are missing in {int((step_s > 1.5 * usual_s).sum())} gaps of up to "
-            f"{float(step_s.max()):.3g} s"
+            f"{step_s.max():.3g} s"
         )
     return replace(
         motion,

@@ -12,6 +12,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.pose.motion_history import Moment
 from snakewalk.controller.pose.tracked_body import HeadMeasurement
+from snakewalk.drivers.attitude import heading_of
 
 WINDOW_S = 4.0
 """Duration of a comparison, one to two waves of a walk (ours)."""
@@ -31,6 +32,8 @@ LEAST_UP = 0.7
 LEAST_TURN_RAD = 0.12
 LEAST_SWING_M = 0.025
 """Root mean square turning and swing below which a window shows nothing (ours)."""
+QUIET_SHARE = 0.5
+"""Share of the time that counts as doubt while turns agree, and the swing is too small (ours)."""
 SHARE = 0.8
 """Least correlation of turns that agree (ours)."""
 TURNS = (0.6, 1.5)
@@ -144,7 +147,7 @@ class Agreement:
             rows.clear()
         self._begun_s = time_s if self._begun_s is None else self._begun_s
         self._seconds = time_s - self._begun_s
-        seen_rad = float(np.arctan2(measured.rotation[1, 0], measured.rotation[0, 0]))
+        seen_rad = heading_of(measured.rotation)
         place_m, predicted_m = complex(*measured.position_m[:2]), complex(*then.place[:2])
         rows.append(_Row(time_s, place_m, seen_rad, predicted_m, float(then.place[2])))
         while time_s - rows[0].time_s > WINDOW_S:
@@ -159,7 +162,7 @@ class Agreement:
         line = np.column_stack([np.ones(len(times)), times - times.mean()])
         expected = _detrended_values(np.unwrap(predicted_rad), line)
         turns = _detrended_values(np.unwrap(measured_rad), line)
-        if float(np.sqrt(np.mean(expected**2))) < LEAST_TURN_RAD:
+        if np.sqrt(np.mean(expected**2)) < LEAST_TURN_RAD:
             return
         share = float(turns @ expected / (expected @ expected))
         related = float(expected @ turns) / _size(expected, turns)
@@ -168,7 +171,7 @@ class Agreement:
         rate_rad_s = np.gradient(np.unwrap(predicted_rad), times)
         off_rad -= _fitted(off_rad, np.column_stack([line, rate_rad_s]))[2] * rate_rad_s
         means_rad = np.convolve(off_rad, np.full(STEP_ROWS, 1.0 / STEP_ROWS), "valid")
-        step_rad = float(np.abs(means_rad[STEP_ROWS:] - means_rad[:-STEP_ROWS]).max())
+        step_rad = float(np.abs(means_rad[STEP_ROWS:] - means_rad[:-STEP_ROWS]).max(initial=0.0))
         if self._is_level and step_rad > STEP_RAD:
             self.step_rad = max(self.step_rad, step_rad)
         slow_rad = off_rad - _detrended_values(off_rad, line)
@@ -182,18 +185,19 @@ class Agreement:
             self._aside_m += 1j * off.imag * ahead_m
         shape = _detrended_values(measured_m, line)
         named = _mirrored_swing(related, shape, swing)
-        swings = related > SHARE and float(np.sqrt(np.mean(np.abs(swing) ** 2))) >= LEAST_SWING_M
+        swings = related > SHARE and np.sqrt(np.mean(np.abs(swing) ** 2)) >= LEAST_SWING_M
         if swings and named is None:
             named = self._swing_fault(shape, swing, times[-1])
         is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
         agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
+        doubt_s = JUDGE_S if swings or not agrees else QUIET_SHARE * JUDGE_S
         if named is None and not is_alike and (self._named or not self.has_agreed):
             if agrees and self._named is None and self.is_cautious and not self._is_level:
                 return  # hills may hide the swing for a while
             named = self._named  # a window without a swing clears nothing
             agrees = False
         self._named = named
-        self._doubt_s = 0.0 if agrees else self._doubt_s + JUDGE_S
+        self._doubt_s = 0.0 if agrees else self._doubt_s + doubt_s
         self.has_agreed |= agrees
 
     def _swing_fault(self, shape: Floats, swing: Floats, time_s: float) -> str | None:
@@ -201,7 +205,7 @@ class Agreement:
         if abs(np.vdot(swing, shape)) < SHARE * _size(swing, shape):
             return None
         same = np.vdot(swing, shape) / np.vdot(swing, swing).real
-        angle_deg = float(np.degrees(np.angle(same)))
+        angle_deg = np.degrees(np.angle(same))
         if abs(angle_deg) > TURNED_DEG:
             return (
                 f"wrong frame: the head moves {angle_deg:+.0f} degrees off the direction "

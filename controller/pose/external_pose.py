@@ -23,6 +23,7 @@ from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, 
 from snakewalk.controller.pose.sender_clock import MOST_DRIFT, SenderClock
 from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import HeadMeasurement, TrackedBody
+from snakewalk.drivers.attitude import heading_of
 from snakewalk.drivers.types import BodyPose, JointState
 
 LONGEST_S = 0.5
@@ -208,7 +209,7 @@ class ExternalPose:
         if self._start_m is None:
             return self._filter.position_sd_m
         check = self._check
-        away_m = float(np.hypot(*(self._filter.head_m - self._start_m)[:2]))
+        away_m = math.hypot(*(self._filter.head_m - self._start_m)[:2])
         off_m, turned_rad = self._start_off
         parts = (
             self._filter.position_sd_m,
@@ -297,8 +298,7 @@ class ExternalPose:
     def _use(self, sample: PoseSample, stamped_s: float, measured_s: float) -> None:
         then = self._history.at(measured_s)
         measured = self._body.head(sample, then.joint_rad)
-        heading = float(np.arctan2(measured.rotation[1, 0], measured.rotation[0, 0]))
-        self._latency.add(stamped_s, heading, self._history)
+        self._latency.add(stamped_s, heading_of(measured.rotation), self._history)
         if self._is_frozen(sample, then):
             self._reject("frozen", "stale: the same pose is sent while the head moves")
             return
@@ -339,9 +339,9 @@ class ExternalPose:
         """
         config = self._config
         self._start_m = placed.position_m.copy()
-        away_m = float(np.hypot(*(placed.position_m[:2] - placed.odometry_m)))
+        away_m = math.hypot(*(placed.position_m[:2] - placed.odometry_m))
         self._start_off = away_m, placed.turn_rad
-        turned_deg = float(np.degrees(placed.turn_rad))
+        turned_deg = math.degrees(placed.turn_rad)
         if away_m <= config.start_m and abs(turned_deg) <= config.start_deg:
             return
         raise InputError(
@@ -379,7 +379,7 @@ class ExternalPose:
             self._equal = (1, values, then.place[:2].copy())
             return False
         self._equal = (count + 1, last, place)
-        moved_m = float(np.hypot(*(then.place[:2] - place)))
+        moved_m = math.hypot(*(then.place[:2] - place))
         return count + 1 >= FROZEN and moved_m > FROZEN_M
 
     def _reject(self, kind: str, text: str, *, counts_as_reason: bool = True) -> None:
@@ -397,6 +397,6 @@ def _placed_pose(measured: HeadMeasurement, then: Moment, turn_rad: float) -> Pl
         measured.position_m,
         then.place[:2],
         turn_rad,
-        float(np.sqrt(measured.position_covariance.trace() / 3.0)),
-        float(np.sqrt(measured.rotation_covariance[2, 2])),
+        math.sqrt(measured.position_covariance.trace() / 3.0),
+        math.sqrt(measured.rotation_covariance[2, 2]),
     )

@@ -1,5 +1,6 @@
 """Statistics of the poses that arrive: rate, delay, noise, frame and senders."""
 
+import math
 from collections import deque
 from typing import Any
 
@@ -11,6 +12,7 @@ from snakewalk.controller.pose.sample import ArrivedPose, PoseSample, UnusablePo
 from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.pose.senders import Senders
 from snakewalk.controller.pose.tracked_body import tracked_link
+from snakewalk.drivers.attitude import heading_of
 
 MOST = 2000
 """Newest poses that count."""
@@ -95,7 +97,7 @@ class FeedStatistics:
             "noise_m": self._noise_m(),
             "noise_deg": self._noise_deg(),
             "position_m": [_rounded_value(value) for value in position_m],
-            "heading_deg": round(float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))), 1),
+            "heading_deg": round(math.degrees(heading_of(axes)), 1),
             "up": [round(float(value), 3) for value in axes[:, 2]],
         }
 
@@ -112,7 +114,7 @@ class FeedStatistics:
             return None
         turns = Rotation.from_matrix([sample.rotation for sample in self.samples])
         steps = (turns[1:] * turns[:-1].inv()).as_rotvec()
-        return round(float(np.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0))), 2)
+        return round(math.degrees(np.sqrt(np.mean(np.diff(steps, axis=0) ** 2) / 6.0)), 2)
 
 
 def _rounded_value(value: float) -> float:

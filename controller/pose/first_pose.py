@@ -1,6 +1,6 @@
 """The first pose of an external source, before torque, compared with the start of the run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -23,6 +23,8 @@ WAIT_S = 5.0
 LOOK_S = 0.02
 WATCH_S = 2.0
 """Time for which the poses of a robot at rest are watched (ours)."""
+WATCHES = 3
+"""Times that they are watched: a limp body settles on rough ground, a source drifts on (ours)."""
 BLOCKS = 8
 DRIFT_M_S = 0.01
 DRIFT_SD = 5.0
@@ -87,14 +89,16 @@ def _watched_poses(
         InputError: the poses move.
 
     """
-    until_s = clock.now_s() + WATCH_S
-    while clock.now_s() < until_s:
-        clock.sleep_until_s(clock.now_s() + LOOK_S)
-        arrived += _of_source(feed, clock, senders)
-    fault = drift_fault([m.sample for m in arrived if isinstance(m.sample, PoseSample)])
-    if fault is not None:
-        raise InputError(f"pose {source}: {fault}")
-    return arrived[-1:]
+    for _ in range(WATCHES):
+        until_s = clock.now_s() + WATCH_S
+        arrived = arrived[-1:]
+        while clock.now_s() < until_s:
+            clock.sleep_until_s(clock.now_s() + LOOK_S)
+            arrived += _of_source(feed, clock, senders)
+        fault = drift_fault([m.sample for m in arrived if isinstance(m.sample, PoseSample)])
+        if fault is None:
+            return arrived[-1:]
+    raise InputError(f"pose {source}: {fault}")
 
 
 def drift_fault(samples: list[PoseSample]) -> str | None:
@@ -109,8 +113,8 @@ def drift_fault(samples: list[PoseSample]) -> str | None:
         return None  # the stamps are equal
     mean_m = np.array([place_m[rows].mean(axis=0) for rows in blocks])
     lines, covariance = np.polyfit(at_s - at_s.mean(), mean_m, 1, cov=True)
-    sd_m_s = float(np.sqrt(covariance[0, 0].mean()))
-    speed_m_s = float(np.linalg.norm(lines[0]))
+    sd_m_s = np.sqrt(covariance[0, 0].mean())
+    speed_m_s = np.linalg.norm(lines[0])
     if not speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
         return None
     return (
@@ -144,9 +148,8 @@ def start_fault(
     link_m, link = tracked_link(sample, config)
     reach_m = config.start_m + (robot.length_m if config.link else 0.0)
     away_m = float(np.hypot(*(link_m[:2] - start_m)))
-    start = f"({start_m[0]:.2f}, {start_m[1]:.2f})"
     small_m = link_m + (1e-3 - 1.0) * config.scale * (turned(config.world_deg) @ sample.position_m)
-    if away_m > UNIT_M and float(np.hypot(*(small_m[:2] - start_m))) <= reach_m:
+    if away_m > UNIT_M and np.hypot(*(small_m[:2] - start_m)) <= reach_m:
         return (
             f"wrong unit: position {_places(sample.position_m)} looks like millimetres; send metres"
         )
@@ -170,10 +173,10 @@ def start_fault(
         )
     if away_m > reach_m or abs(turned_deg) > config.start_deg:
         return (
-            f"the robot is {where}, {away_m:.2f} m from the start of the run at {start}; put it "
-            "there, or correct pose.world_m and pose.world_deg"
+            f"the robot is {where}, {away_m:.2f} m from the start of the run at "
+            f"{_places(start_m)}; put it there, or correct pose.world_m and pose.world_deg"
         )
-    over_m = float(link_m[2]) - ground_m(float(link_m[0]), float(link_m[1]))
+    over_m = link_m[2] - ground_m(float(link_m[0]), float(link_m[1]))
     if abs(over_m) > HEIGHT_M:
         return (
             f"wrong frame: the link is {over_m:+.2f} m above the ground; correct pose.world_m or "
@@ -182,5 +185,5 @@ def start_fault(
     return None
 
 
-def _places(values: np.ndarray) -> str:
+def _places(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{value:.2f}" for value in values) + ")"

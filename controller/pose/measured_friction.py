@@ -26,7 +26,7 @@ from snakewalk.controller.mechanics.slide_window import HeadReadings, SlideWindo
 from snakewalk.controller.mechanics.slope_load import slope_load
 from snakewalk.controller.pose.external_pose import MeasuredHeads, TimedHead
 from snakewalk.controller.runtime.friction_estimator import FrictionEstimator
-from snakewalk.drivers.attitude import about_up
+from snakewalk.drivers.attitude import about_up, heading_of
 
 WINDOW_S = 4.0
 """Duration of motion that is compared at once (ours): the noise of slow sources averages out."""
@@ -164,7 +164,7 @@ def _readings(heads: list[TimedHead]) -> HeadReadings:
     place = []
     variance = []
     for _, head in heads:
-        heading = np.arctan2(head.rotation[1, 0], head.rotation[0, 0])
+        heading = heading_of(head.rotation)
         place.append([*head.position_m[:2], heading])
         (xx, yy), turn = np.diag(head.position_covariance)[:2], head.rotation_covariance[2, 2]
         variance.append([xx, yy, turn])

@@ -2,10 +2,11 @@
 
 The link of the tracked body turns and moves in the plane of the ground. Its turning shows delay and
 vertical axis; its way shows heading, scale and mount. Dead reckoning under several frictions
-predicts the way, and the best of them counts.
+predicts the way, and the best of them counts. The scale depends on the friction: it is known only
+if the friction of the file predicts the way clearly better than any other.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -27,8 +28,16 @@ SHARE = 0.8
 """Least share of the turning that the joints explain (ours)."""
 TURN = (0.8, 1.25)
 """Measured turning over that of the joints (ours)."""
-FRICTION = (0.5, 1.0, 2.0)
+FRICTION = (1.0, 0.5, 0.7, 1.4, 2.0)
 """Factors on the friction along the body that are tried (ours)."""
+CLEAR = 1.03
+"""Residual of any other friction over that of the file's, from which on the file's is the true one
+(ours)."""
+LIKELY = 1.25
+"""Residual of a friction over the least, up to which it is possible (ours)."""
+SCALE_OFF = 0.08
+"""Error of the scale under the best friction, since links press unevenly on the ground (measured:
+``benchmarks.pose_mounts``)."""
 MIRRORED = 0.8
 """Residual of a mirrored frame over that of a right-handed one, below which it is one (ours)."""
 
@@ -47,9 +56,9 @@ def predicted_ways(
 ) -> Iterator[Floats]:
     """Yield x, y and heading (n, 3) of a link under each law and several sizes of the friction.
 
-    The head begins at 0, 0, and the body points along x.
+    The head begins at 0, 0, and the body points along x. The friction of the file comes first.
     """
-    for law, factor in product(LAWS, FRICTION):
+    for law, factor in product(dict.fromkeys((file.law, *LAWS)), FRICTION):
         friction = file.model_copy(update={"law": law, "along": factor * file.along})
         reckoning = DeadReckoning(robot, friction, (0.0, 0.0), 0.0)
         way = []
@@ -59,12 +68,27 @@ def predicted_ways(
         yield np.array(way)
 
 
+def scale_interval(mounts: Sequence[Mount]) -> tuple[float, float] | None:
+    """Return the least and largest scale of ``predicted_ways``; None if the scale is known."""
+    off_m = [mount.residual_m for mount in mounts]
+    if off_m[0] * CLEAR < min(off_m[1:]):
+        return None
+    scales = [mount.config.scale for mount in mounts if mount.residual_m < LIKELY * min(off_m)]
+    return min(scales) * (1.0 - SCALE_OFF), max(scales) * (1.0 + SCALE_OFF)
+
+
 def fit_mount(
-    time_s: Floats, way: Floats, stamp_s: Floats, place_m: Floats, rotation: Floats
+    time_s: Floats,
+    way: Floats,
+    stamp_s: Floats,
+    place_m: Floats,
+    rotation: Floats,
+    known_scale: float | None = None,
 ) -> Mount:
     """Fit poses (m, 3), (m, 3, 3) with stamps (m,) of the run's clock to a motion.
 
-    ``way`` (n, 3) has x, y and heading of the link at ``time_s`` (n,).
+    ``way`` (n, 3) has x, y and heading of the link at ``time_s`` (n,). A ``known_scale`` is not
+    fitted.
 
     Raises:
         InputError: another body moves, or the frame is left-handed.
@@ -87,7 +111,7 @@ def fit_mount(
     square, line, _ = np.polyfit(DELAYS_S[near], offs[near], 2)
     delay_s = max(-0.5 * line / square, 0.0)
     off, parts, heading_rad = turned(delay_s)
-    turn = float(np.linalg.norm(parts[0]))
+    turn = np.linalg.norm(parts[0])
     explained = 1.0 - off**2 / (float(np.sum(turns.var(axis=0))) or 1.0)
     if not (explained > SHARE and TURN[0] < turn < TURN[1]):
         raise InputError(
@@ -97,13 +121,16 @@ def fit_mount(
         )
     upright = Rotation.align_vectors([0.0, 0.0, 1.0], parts[0])[0]
     level_m = upright.apply(place_m)
-    drift_rad = float(upright.apply(parts[2])[2] / turn) * slow[:, 1]
+    drift_rad = upright.apply(parts[2])[2] / turn * slow[:, 1]
     heading_rad += drift_rad
     link_m = np.interp(stamp_s - delay_s, time_s, way_m)
     link_m = link_m[0] + np.cumsum(np.diff(link_m, prepend=link_m[:1]) * np.exp(1j * drift_rad))
     columns = np.column_stack([link_m, np.exp(1j * heading_rad), slow])
     seen_m = level_m[:, 0] + 1j * level_m[:, 1]
     (scale, lever, origin, _), off_m = _solved(columns, seen_m)
+    if known_scale is not None:
+        scale /= abs(scale) * known_scale
+        (lever, origin, _), off_m = _solved(columns[:, 1:], seen_m - scale * link_m)
     world = Rotation.from_euler("z", -np.angle(scale)) * upright
     offset = (Rotation.from_euler("z", -heading_rad[:, None]) * world * body).mean()
     size = float(abs(scale))

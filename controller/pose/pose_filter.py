@@ -16,7 +16,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.kinematics.links import SpineLinks
 from snakewalk.controller.pose.motion_history import Moment
 from snakewalk.controller.pose.tracked_body import HeadMeasurement
-from snakewalk.drivers.attitude import about_up, rotation_by, rotations
+from snakewalk.drivers.attitude import about_up, heading_of, rotation_by, rotations
 from snakewalk.drivers.types import BodyPose
 
 SLIP_SHARE = 0.15
@@ -96,12 +96,12 @@ class PoseFilter:
     @property
     def position_sd_m(self) -> float:
         """Standard deviation of the horizontal position of the head."""
-        return float(np.sqrt(0.5 * self.position_covariance[:2, :2].trace()))
+        return math.sqrt(0.5 * self.position_covariance[:2, :2].trace())
 
     @property
     def heading_sd_rad(self) -> float:
         """Standard deviation of the heading."""
-        return float(np.sqrt(self.turn_covariance[2, 2]))
+        return math.sqrt(self.turn_covariance[2, 2])
 
     def pose(self, time_s: float) -> BodyPose:
         """Return the head's pose at the newest moment."""
@@ -160,8 +160,7 @@ class PoseFilter:
 
     def turn_rad(self, measured: HeadMeasurement, then: Moment) -> float:
         """Return the turn from the frame of dead reckoning to the world by a measurement alone."""
-        measured_frame = measured.rotation @ self._mean_frame(then)
-        heading_rad = np.arctan2(measured_frame[1, 0], measured_frame[0, 0])
+        heading_rad = heading_of(measured.rotation @ self._mean_frame(then))
         return math.remainder(heading_rad - self._body_heading(then), math.tau)
 
     def place_again(self, measured: HeadMeasurement, then: Moment) -> None:
@@ -198,12 +197,11 @@ class PoseFilter:
     def _align(self) -> None:
         """Turn the frame of dead reckoning so that the body has its heading."""
         assert self._last is not None
-        heading = float(np.arctan2(self._body[1, 0], self._body[0, 0]))
-        self._frame_rad = math.remainder(heading - self._body_heading(self._last), math.tau)
+        turn_rad = heading_of(self._body) - self._body_heading(self._last)
+        self._frame_rad = math.remainder(turn_rad, math.tau)
 
     def _body_heading(self, moment: Moment) -> float:
-        frame = self._mean_frame(moment)
-        return float(moment.place[2] + np.arctan2(frame[1, 0], frame[0, 0]))
+        return float(moment.place[2] + heading_of(self._mean_frame(moment)))
 
     def _mean_frame(self, moment: Moment) -> Floats:
         """Return the mean axes (3, 3) of the links, in those of the head link."""

@@ -108,7 +108,7 @@ class Relocation:
 def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
     """Whether a body may have moved from one pose to the next, in at most ``most_s``."""
     gap_s = min(pose.time_s - last.time_s, most_s)
-    off_m = float(np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad)))
+    off_m = np.linalg.norm(pose.position_m - last.moved_to(pose, last.turn_rad))
     off_rad = abs(math.remainder(pose.turn_rad - last.turn_rad, math.tau))
     noise_m = STEP_SD * np.hypot(last.position_sd_m, pose.position_sd_m)
     noise_rad = STEP_SD * np.hypot(last.turn_sd_rad, pose.turn_sd_rad)

@@ -220,7 +220,7 @@ def _balance(r: Floats, most: float) -> None:
     makes_arrays=False,
     fastmath=True,
 )
-def _step(  # noqa: C901  a compiled loop
+def _step(
     turn: Floats,
     move: Floats,
     shape: Singles,
@@ -310,18 +310,13 @@ def _step(  # noqa: C901  a compiled loop
         f00, f01, f02 = np.float32(s * r00), np.float32(s * r01), np.float32(s * r02)
         f10, f11, f12 = np.float32(s * r10), np.float32(s * r11), np.float32(s * r12)
         f20, f21, f22 = np.float32(s * r20), np.float32(s * r21), np.float32(s * r22)
-        if share == 0.0:
-            for k in range(lanes):
-                dx, dy, dz = shape[a, 0, k], shape[a, 1, k], shape[a, 2, k]
-                points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
-                points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
-                points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz
-        else:
-            p, q = np.float32(1.0 - share), np.float32(share)
-            for k in range(lanes):
-                dx = p * shape[a, 0, k] + q * shape[last_move, 0, k]
-                dy = p * shape[a, 1, k] + q * shape[last_move, 1, k]
-                dz = p * shape[a, 2, k] + q * shape[last_move, 2, k]
-                points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
-                points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
-                points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz
+        p, q = np.float32(1.0 - share), np.float32(share)
+        for k in range(lanes):
+            dx, dy, dz = shape[a, 0, k], shape[a, 1, k], shape[a, 2, k]
+            if share != 0.0:
+                dx = p * dx + q * shape[last_move, 0, k]
+                dy = p * dy + q * shape[last_move, 1, k]
+                dz = p * dz + q * shape[last_move, 2, k]
+            points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
+            points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
+            points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz

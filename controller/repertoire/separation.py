@@ -64,7 +64,7 @@ class SeparatedCrowd:
         place = crowd.points_m[body, :2, round(self.met[body] * (links - 1))]
         other = crowd.points_m[self.blocker[body], :2, :links]
         away = place - other[:, np.linalg.norm(other.T - place, axis=1).argmin()]
-        away = away.astype(float) / max(float(np.linalg.norm(away)), 1e-9)
+        away = away.astype(float) / max(np.linalg.norm(away), 1e-9)
         move = YIELDING_LENGTHS * crowd.scale[body] * self._length_m * away
         before = crowd.origin_m[body].copy(), crowd.points_m[body].copy()
         crowd.shift(body, move)

@@ -43,7 +43,6 @@ _JSON_TYPES = {
     "text": "string",
 }
 REQUIRED = object()
-_NAN = float("nan")
 
 
 class Panel(StrEnum):

@@ -210,7 +210,7 @@ def run_trial(case: Case, seed: int, spread_m: float, changes: Mapping[str, obje
         )
         if isinstance(prepared, WalkRun):
             slope_rad = path_relief(prepared.planner, prepared.path).median_footprint_slope_rad
-            trial = replace(trial, slope_median_deg=float(np.degrees(slope_rad)))
+            trial = replace(trial, slope_median_deg=math.degrees(slope_rad))
         return _measured_trial(trial, prepared)
     except InputError as error:
         return replace(trial, cause="refused", why=f"refused: {error.faults[0]}")
@@ -240,7 +240,7 @@ def _measured_trial(trial: Trial, prepared: PreparedRun) -> Trial:
         cost_of_transport=_number(numbers.electrical_cost_of_transport),
         lead_max_rad=_number(numbers.tracking_max_rad),
         current_max_a=_number(numbers.peak_current_a),
-        roll_max_deg=float(np.degrees(contact.roll_max_rad)),
+        roll_max_deg=math.degrees(contact.roll_max_rad),
         in_air=contact.in_air,
         truly_reached=math.nan if off is None else float(off.waypoints_reached),
         head_error_m=math.nan if off is None else off.head_rms_m,

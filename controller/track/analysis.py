@@ -201,7 +201,7 @@ def analyse(track: Track) -> Analysis:
     """
     if track.frames < 4:
         raise InputError(f"{track.name}: an analysis needs 4 or more frames, not {track.frames}")
-    if float(np.ptp(track.angles_rad, axis=0).max()) < 1e-6:
+    if np.ptp(track.angles_rad, axis=0).max() < 1e-6:
         raise InputError(f"{track.name}: no motion: the shape is the same in all frames")
     wave = measure_wave(track)
     number = np.rint(track.time_s * track.rate_hz).astype(np.int64)

@@ -22,7 +22,7 @@ def equal_arc_length(points: Floats, segments: int = SEGMENTS) -> Floats:
     """
     chord = np.hypot(*np.diff(points, axis=0).T)
     distinct = np.concatenate([[True], chord > 1e-9 * chord.sum()])
-    if int(distinct.sum()) < 4:
+    if distinct.sum() < 4:
         raise ValueError("a body needs 4 distinct points")
     kept = points[distinct]
     arc_px = arc_lengths(kept)

@@ -147,7 +147,7 @@ def track_from_points(
         )
         status = [status[k] for k in nearest.tolist()] if status else ()
         is_complete = np.ones(len(points), dtype=bool)
-    if int(is_complete.sum()) < 2:
+    if is_complete.sum() < 2:
         raise InputError(
             f"{name}: only {int(is_complete.sum())} of {len(points)} frames hold a midline"
         )

@@ -153,7 +153,7 @@ def _fitted_speed(time_s: Floats, place_m: Floats) -> float:
     """Slope of a place (T, 2) over time, by least squares."""
     moved_s = time_s - time_s.mean()
     slope = (moved_s[:, None] * (place_m - place_m.mean(axis=0))).sum(axis=0) / (moved_s**2).sum()
-    return float(np.hypot(*slope))
+    return math.hypot(*slope)
 
 
 def _pendulum(robot: RobotConfig, motion: PendulumMotion) -> dict[str, float]:

@@ -44,9 +44,7 @@ def aim_rad(path: SplinePath, from_m: Floats, along_m: float, carrot_m: float) -
     if carrot_along_m > path.length_m:
         before = path.position(path.length_m - 0.05)
         step = carrot - before
-        carrot = carrot + step / max(float(np.hypot(*step)), 1e-9) * (
-            carrot_along_m - path.length_m
-        )
+        carrot = carrot + step / max(np.hypot(*step), 1e-9) * (carrot_along_m - path.length_m)
     return float(np.arctan2(carrot[1] - from_m[1], carrot[0] - from_m[0]))
 
 

@@ -174,8 +174,7 @@ class MujocoPlant:
     def link_positions_m(self) -> Floats:
         """(L, 3) centres of the links."""
         self._update_kinematics()
-        copy: Floats = self._data.xipos[1:].copy()
-        return copy
+        return np.array(self._data.xipos[1:])
 
     def link_motion(self, link: int) -> LinkMotion:
         """Motion of a link of the spine."""

@@ -1,5 +1,6 @@
 """From postures to a new motion: cut, ordered, composed, and retargeted to a robot."""
 
+import math
 from collections import Counter
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -130,7 +131,7 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
             "reached_within": [
                 round(float(off) / source.length, 4) for off in steered_motion.distance
             ],
-            "steered_deg": round(float(np.degrees(steered_motion.turn_rad)), 1),
+            "steered_deg": round(math.degrees(steered_motion.turn_rad), 1),
         }
         composed = steered_motion.motion
     else:
@@ -170,14 +171,14 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         after = np.abs(np.diff(joints, axis=0))[junctions(pieces, sequence)]
         facts = replace(
             facts,
-            join_step_deg=round(float(np.degrees(steps.max())), 2),
-            join_step_blended_deg=round(float(np.degrees(after.max())), 2),
+            join_step_deg=round(math.degrees(steps.max()), 2),
+            join_step_blended_deg=round(math.degrees(after.max()), 2),
         )
     return SynthesisedMotion(source, segments, pieces, sequence, motion, joints, facts)
 
 
 def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment]:
-    within = float(np.radians(options.within_deg))
+    within = math.radians(options.within_deg)
     reference = None
     if options.reference == "commonest":
         if not source.found.any():
@@ -187,7 +188,7 @@ def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment
             raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
     elif options.reference != "straight":
         raise InputError(f"--reference {options.reference}: straight or commonest")
-    segmentation = Segmentation(within_rad=within, merge_rad=float(np.radians(options.merge_deg)))
+    segmentation = Segmentation(within_rad=within, merge_rad=math.radians(options.merge_deg))
     return segment_motion(source, segmentation, reference)
 
 
@@ -218,7 +219,7 @@ def _surroundings(source: Postures, options: SynthesisOptions) -> Surroundings:
         even = np.arange(0.0, time_s[-1] + 1e-9, 1.0 / source.rate_hz)
         others.append(np.column_stack([np.interp(even, time_s, base[:, k]) for k in (0, 1)]))
     x, y, head_deg = options.start
-    start = x, y, float(np.radians(head_deg))
+    start = x, y, math.radians(head_deg)
     return Surroundings(tank, tuple(others), options.apart * source.length, start)
 
 

@@ -113,7 +113,7 @@ def match_film(
             sides.append(no_side if side_match is None else side_match[0])
         on_progress(len(rows), frames)
     parameters = np.array(rows)
-    if int(np.isfinite(parameters[:, 2]).sum()) < 2:
+    if np.isfinite(parameters[:, 2]).sum() < 2:
         raise InputError(f"{name}: the model fits fewer than 2 of {len(rows)} frames")
     unit = (1.0 if length_m is None else length_m) / model.length_px
     side_found = np.array(sides) if sides else None

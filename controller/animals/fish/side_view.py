@@ -44,7 +44,7 @@ def align(
         raise InputError(f"{name}: the fish is not seen in both views at the same time")
     scale, offset = np.polyfit(np.array(top_ends, dtype=float), np.array(there, dtype=float), 1)
     left = np.array(there, dtype=float) - (scale * np.array(top_ends, dtype=float) + offset)
-    if not 0.05 < scale < 20.0 or float(np.std(left)) > 0.2 * float(np.ptp(there)):
+    if not 0.05 < scale < 20.0 or np.std(left) > 0.2 * np.ptp(there):
         raise InputError(
             f"{name}: the two views do not show the same motion along x; are they of one moment, "
             "and is the side camera upright?"

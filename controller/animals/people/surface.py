@@ -120,7 +120,7 @@ def _row_weights(part: BodyPart, rows: int) -> tuple[Ints, Floats]:
 def _outwards(faces: Ints, points: Floats) -> Ints:
     """Turn the faces so that their normals point away from the inside."""
     a, b, c = (points[faces[:, k]] - points.mean(axis=0) for k in range(3))
-    return faces if float(np.einsum("fi,fi->", a, np.cross(b, c))) > 0.0 else faces[:, ::-1]
+    return faces if np.einsum("fi,fi->", a, np.cross(b, c)) > 0.0 else faces[:, ::-1]
 
 
 def texture() -> Image:

@@ -36,7 +36,7 @@ class FilmStates:
     def __post_init__(self) -> None:
         if not (np.diff(self.frame) == 1).any():
             raise ValueError("a film needs two consecutive frames")
-        if not float(np.median(self.pulse_points)) > 0.0:
+        if not np.median(self.pulse_points) > 0.0:
             raise ValueError("the pattern of the film does not run to the tail")
 
     @property

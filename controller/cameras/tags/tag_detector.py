@@ -76,7 +76,7 @@ class TagDetector:
                 or np.hypot(*(corners_px - np.roll(corners_px, 1, 0)).T).min() < _LEAST_SIDE_PX
             ):
                 continue
-            if int(number) in corners_by_id:
+            if number in corners_by_id:
                 twice.add(int(number))
             corners_by_id[int(number)] = corners_px
         return {

@@ -165,7 +165,7 @@ class TrackletBuilder:
             away: Floats = np.where(free, distance_px, np.inf)
             for lost_row in np.flatnonzero(free.any(axis=1)).tolist():
                 nearest = int(np.argmin(away[lost_row]))
-                if int(np.argmin(away[:, nearest])) == lost_row:
+                if np.argmin(away[:, nearest]) == lost_row:
                     links[lost_row, nearest] = True
         return links
 

@@ -232,7 +232,7 @@ def _reverse_wrong_stretches(
             other = fit_frame(patches[k], reversed_body(fits[k].frame), body)
             squares = float((other.residual**2).sum() - (fits[k].residual ** 2).sum())
             worse.append(squares / max(fits[k].noise, 1e-9) ** 2)
-        if float(np.sum(worse)) < -_EVIDENCE:
+        if np.sum(worse) < -_EVIDENCE:
             for k in stretch:
                 fits[k] = fit_frame(patches[k], reversed_body(fits[k].frame), body)
 

@@ -140,7 +140,7 @@ def head_signs(
         usual_px = usual_travel(points, step)
         if usual_px > 0.0:
             signs["travel"] = travel_score(points, step), _JITTER_PX / usual_px
-    if int(good.sum()) >= _WAVE_FRAMES:
+    if good.sum() >= _WAVE_FRAMES:
         wave = measure_wave(track_from_points("", points, rate_hz))
         signs["wave"] = 1.0 - 2.0 * wave.headward, 0.0
     signs["taper"] = difference(radius[good], _FRONT)

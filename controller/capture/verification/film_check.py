@@ -40,7 +40,7 @@ def possible_form(body: Skeleton) -> bool:
     lag = max(1, round(wide / chord))
     if lag < len(angle):
         turn = np.abs(angle[lag:] - angle[:-lag])
-        if float(turn.max()) > _TIGHTEST * max(1.0, lag * chord / wide):
+        if turn.max() > _TIGHTEST * max(1.0, lag * chord / wide):
             return False
     loops = crossings(points)
     if not len(loops):
@@ -254,7 +254,7 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
             continue
         standard_error = profile.noise / np.sqrt(max(1.0, 0.25 * is_known.sum()))
         least = max(_LEAST_LEVELS, _SHARE * expected, _NOISE * standard_error)
-        if float(side[is_known].mean()) < least:
+        if side[is_known].mean() < least:
             return FrameStatus.EMPTY
     is_visible = np.maximum(usual.contrast, 0.0) > max(_LEAST_LEVELS, 3.0 * profile.noise)
     faint = [_averaged_stations(side) < _FAINT * usual.contrast for side in sides]
@@ -265,9 +265,7 @@ def _verdict(profile: BodyProfile, usual: _Usual) -> FrameStatus:
     for tip, rings in enumerate(profile.rings @ usual.direction):
         near = usual.contrast[5:16] if tip == 0 else usual.contrast[-16:-5]
         strongest = np.nan_to_num(np.nanmax(np.nan_to_num(rings, nan=-np.inf), axis=1), neginf=0.0)
-        if float(strongest.min()) > max(
-            _LEVEL_BEYOND_TIP * float(near.mean()), 4.0 * profile.noise
-        ):
+        if strongest.min() > max(_LEVEL_BEYOND_TIP * near.mean(), 4.0 * profile.noise):
             return FrameStatus.PART
     return FrameStatus.GOOD
 

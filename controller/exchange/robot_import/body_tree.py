@@ -138,7 +138,7 @@ def _welded_bodies(model: mujoco.MjModel, body: int) -> list[int]:
 def _hinges_behind(model: mujoco.MjModel, root: int) -> bool:
     behind = {root}
     for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in behind:
+        if model.body_parentid[body] in behind:
             behind.add(body)
     hinges = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE]
     return any(int(body) in behind - {root} for body in hinges)

@@ -89,7 +89,7 @@ class ChainFigures:
             {
                 float(self._model.geom_friction[g, 0])
                 for g in range(self._model.ngeom)
-                if int(self._model.geom_bodyid[g]) in bodies
+                if self._model.geom_bodyid[g] in bodies
             }
         )
 

@@ -58,4 +58,4 @@ def joints_figure(record: RunRecord) -> Figure | None:
 
 def _largest_value(values: Floats) -> float:
     finite_values = np.abs(values[np.isfinite(values)])
-    return max(float(np.quantile(finite_values, 0.999)), 1e-3) if finite_values.size else 1e-3
+    return max(np.quantile(finite_values, 0.999), 1e-3) if finite_values.size else 1e-3

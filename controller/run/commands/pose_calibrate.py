@@ -18,7 +18,7 @@ from snakewalk.controller.console.options import Force, Json, Robot, RunPort, Wo
 from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 from snakewalk.controller.kinematics.smoothstep import cubic
 from snakewalk.controller.motion.parted_recording import recording
-from snakewalk.controller.pose.mount_fit import fit_mount, predicted_ways
+from snakewalk.controller.pose.mount_fit import fit_mount, predicted_ways, scale_interval
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, turned
 from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.run.backend import RehearsedPort
@@ -138,15 +138,24 @@ def calibrated(
     nodded_s = cycle.time_s[(cycle.sent_rad[:, robot.pitch_joints[:2]] > 0.9 * NOD_RAD).any(axis=1)]
     swung_s = nodded_s[0] - REST_S if len(nodded_s) else np.inf
     swings, poses = cycle.time_s < swung_s, stamps_s < swung_s
-    ways = predicted_ways(
-        robot,
-        prepared.world.friction,
-        cycle.time_s[swings],
-        cycle.measured_rad[swings],
-        before.link,
+    time_s = cycle.time_s[swings]
+    ways = list(
+        predicted_ways(
+            robot, prepared.world.friction, time_s, cycle.measured_rad[swings], before.link
+        )
     )
     seen = stamps_s[poses], places_m[poses], rotations[poses]
-    fits = (fit_mount(cycle.time_s[swings], way, *seen) for way in ways)
+    fits = [fit_mount(time_s, way, *seen) for way in ways]
+    interval = scale_interval(fits)
+    if interval is not None:
+        low, high = interval
+        if "scale" not in before.model_fields_set or not low <= before.scale <= high:
+            raise InputError(
+                f"pose calibrate: friction hides the scale: the poses show {low:.3g} to "
+                f"{high:.3g}; measure it, and state pose.scale in the robot file (1 if it is in "
+                "exact metres)"
+            )
+        fits = [fit_mount(time_s, way, *seen, before.scale) for way in ways]
     mount = min(fits, key=lambda fit: fit.residual_m)
     if len(nodded_s):
         late_s = nodded_s[[0, -1]] + (mount.config.latency_s or 0.0)

@@ -29,6 +29,8 @@ def checked(
     swing_rad: float = 0.5,
     is_level: bool = True,
     check: Agreement | None = None,
+    step_s: float = 0.02,
+    side: float = 0.2,
 ) -> Agreement:
     """Check of a head that swings at 0.4 Hz while its body goes on at 0.2 m/s.
 
@@ -36,16 +38,18 @@ def checked(
         change: makes the source's position and axes of the true ones.
         seconds: duration.
         slip: the body goes on so much of the way that dead reckoning says.
-        swing_rad: amplitude of the turns; the head swings to the side by 0.1 m times it.
+        swing_rad: amplitude of the turns; see ``side``, too.
         is_level: whether the ground is a floor.
         check: goes on after an earlier call.
+        step_s: time between two poses.
+        side: metres that the head swings to the side, for each radian.
 
     """
     check = Agreement(is_level=is_level) if check is None else check
     rng = np.random.default_rng(3)
-    for time_s in np.arange(0.0, seconds, 0.02):
+    for time_s in np.arange(0.0, seconds, step_s):
         phase = 2.0 * np.pi * 0.4 * time_s
-        side_m, heading = 0.2 * swing_rad * np.cos(phase), 0.3 + swing_rad * np.sin(phase)
+        side_m, heading = side * swing_rad * np.cos(phase), 0.3 + swing_rad * np.sin(phase)
         frame = turned(0.3)
         known = frame @ [0.2 * time_s, side_m, 0.0]
         true = frame @ [0.2 * slip * time_s, side_m, 0.0]
@@ -73,6 +77,16 @@ def test_a_head_that_does_not_turn_shows_nothing() -> None:
     assert not check.is_confirmed
     assert not check.is_cautious, "such a gait does not stay slow for ever"
     assert checked(swing_rad=0.05, seconds=5.0).is_cautious
+
+
+def test_turns_that_agree_without_a_swing_are_doubted_for_longer() -> None:
+    """A slow start hardly swings, and its turns are those of the joints."""
+    assert checked(side=0.03, seconds=7.0).fault is None
+    assert "not confirmed" in str(checked(side=0.03, seconds=12.0).fault)
+
+
+def test_few_poses_a_second_are_enough() -> None:
+    assert checked(step_s=0.24).is_confirmed
 
 
 FAULTS: dict[str, tuple[Change, str]] = {

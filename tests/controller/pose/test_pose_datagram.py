@@ -1,6 +1,7 @@
 """Datagrams, clocks and the first pose."""
 
 import json
+import math
 import re
 
 import numpy as np
@@ -153,10 +154,11 @@ def test_millimetres_are_suggested_only_far_away() -> None:
 
 
 class AtRest:
-    """A sender of 50 poses a second with noise of 1 cm and a drift."""
+    """A sender of 50 poses a second with noise of 1 cm and a drift, which may end."""
 
-    def __init__(self, drift_m_s: float) -> None:
+    def __init__(self, drift_m_s: float, until_s: float = math.inf) -> None:
         self.drift_m_s = drift_m_s
+        self.until_s = until_s
         self.rng = np.random.default_rng(2)
         self.sent = 0
 
@@ -164,7 +166,11 @@ class AtRest:
         found = []
         while self.sent <= 50.0 * now_s:
             time_s = self.sent / 50.0
-            place_m = [self.drift_m_s * time_s, 0.0, 0.0] + 0.01 * self.rng.standard_normal(3)
+            place_m = [
+                self.drift_m_s * min(time_s, self.until_s),
+                0.0,
+                0.0,
+            ] + 0.01 * self.rng.standard_normal(3)
             sample = PoseSample(self.sent, time_s, place_m, np.eye(3), "lab")
             found.append(ArrivedPose(time_s, "10.0.0.1:5000", sample))
             self.sent += 1
@@ -177,6 +183,12 @@ def test_poses_of_a_robot_at_rest_do_not_drift() -> None:
     assert newest.arrival_s == pytest.approx(2.0, abs=0.1)
     with pytest.raises(InputError, match=r"the robot rests, and its pose moves by (1\.[89]|2\.)"):
         await_first_pose("udp:9870", AtRest(0.02), SimClock(), lambda sample: None)
+
+
+def test_a_limp_body_may_settle_on_rough_ground() -> None:
+    settling = AtRest(0.02, until_s=1.9)
+    (newest,) = await_first_pose("udp:9870", settling, SimClock(), lambda sample: None)
+    assert newest.arrival_s == pytest.approx(4.0, abs=0.1)
 
 
 class Silence:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks.pose_mounts import LIMITS, drawn, errors, found, wrong
+from benchmarks.pose_mounts import LIMITS, contains, drawn, errors, found, wrong
 from snakewalk.config.errors import InputError
 from snakewalk.controller.run.deviation import NO_DEVIATION
 from tests.helpers.command import snakewalk
@@ -12,6 +12,22 @@ from tests.helpers.command import snakewalk
 def test_a_drawn_mount_is_found() -> None:
     off = errors(found(4, NO_DEVIATION, lambda sample, time_s: sample), drawn(4))
     assert all(each <= most for each, most in zip(off, LIMITS, strict=True)), off
+
+
+@pytest.mark.slow
+def test_a_scale_that_friction_hides_is_not_written() -> None:
+    """Stiff pitch joints: each friction explains the poses by another scale."""
+    with pytest.raises(InputError, match="friction hides the scale") as refused:
+        found(2, NO_DEVIATION, lambda sample, time_s: sample, "alternating16")
+    assert contains(str(refused.value), drawn(2).scale)
+
+
+@pytest.mark.slow
+def test_a_stated_scale_is_kept() -> None:
+    config = found(
+        2, NO_DEVIATION, lambda sample, time_s: sample, "alternating16", states_scale=True
+    )
+    assert config.scale == pytest.approx(drawn(2).scale, abs=1e-4)
 
 
 @pytest.mark.slow
@@ -33,4 +49,4 @@ def test_a_lifted_head_shows_a_mirrored_vertical() -> None:
     name, change = wrong(4)
     assert name == "mirrored"
     with pytest.raises(InputError, match="the head was lifted"):
-        found(4, NO_DEVIATION, change, "alternating16")
+        found(4, NO_DEVIATION, change, "alternating16", states_scale=True)
