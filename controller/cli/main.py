@@ -68,7 +68,7 @@ class CompilationNotice:
         self._next_s = 0.0
 
     def __call__(self, loop: str) -> None:
-        """Count ``loop``, a dotted name."""
+        """Count ``loop``, a dotted name that is not printed."""
         self._count += 1
         now_s = self._clock.now_s()
         if self._count == 1:
@@ -79,7 +79,7 @@ class CompilationNotice:
             with suppress(RuntimeError):  # else this process compiles them
                 self._compile_others()
         elif now_s >= self._next_s:
-            self._print_line(f"compiled {self._count} loops; last: {loop}")
+            self._print_line(f"compiled {self._count} loops")
         else:
             return
         self._next_s = now_s + _NOTICE_S

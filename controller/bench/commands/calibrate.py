@@ -98,7 +98,7 @@ def calibrate(
             backup is not None and not keeps_backup
         ):  # before anything is written: a start writes EEPROM, too
             chain_calibration.find_servos(line, line.latency_s, feetech=like.is_feetech)
-            _write(backup, backup_text(back_up(line, line.latency_s)))
+            write_result(backup, backup_text(back_up(line, line.latency_s)))
         outcome = chain_calibration.calibrate(
             line,
             like,
@@ -110,7 +110,7 @@ def calibrate(
             journal=journal,
         )
         described = outcome.robot if baud is None else _at_baud(outcome.robot, baud)
-        _write(out, plain_toml(described, heading))
+        write_result(out, plain_toml(described, heading))
         if backup is not None:
             bus = servo_bus(line, described.models_by_id, latency_s=line.latency_s)
             described, homing = _with_homing(bus, described, out, heading, backup, yes)
@@ -161,7 +161,7 @@ def _with_homing(
         described = without_zeros(described)
         there = "The zeros are in the servos, in Homing Offset."
         with homing_written(bus, offsets):
-            _write(out, plain_toml(described, f"{heading}\n{there}"))
+            write_result(out, plain_toml(described, f"{heading}\n{there}"))
     after = {str(offset.servo_id): offset.after for offset in offsets}
     return described, {
         "backup": str(backup),
@@ -183,10 +183,6 @@ def _answers_kept(answers: ProgressFile) -> Iterator[None]:
                 err=True,
             )
         raise
-
-
-def _write(out: Path, text: str) -> None:
-    write_result(out, text)
 
 
 def _confirm_registers(offsets: "Sequence[HomingOffset]", backup: Path) -> bool:
@@ -224,7 +220,9 @@ class _Person:
         """Ask for the joint; None: the servo has to move again."""
         count = len(self._axes)
         while True:
-            answer = _ask(f"ID {servo_id}: which joint moved? 1 is next to the head, a = again: ")
+            answer = _ask(
+                f"ID {servo_id}: which joint moved? 1 is next to the head, a = again, q = stop: "
+            )
             if answer.lower() == "a":
                 return None
             if not answer.isdecimal() or not 1 <= int(answer) <= count:
@@ -271,9 +269,12 @@ class _Person:
 def _ask(question: str) -> str:
     typer.echo(question, nl=False, err=True)
     try:
-        return input().strip()
+        answer = input().strip()
     except EOFError:
         raise InputError("calibrate: the input ended before the last question") from None
+    if answer.lower() == "q":
+        raise KeyboardInterrupt
+    return answer
 
 
 def _show(

@@ -160,3 +160,12 @@ def test_no_answer_is_lost_on_a_busy_machine(seed: int) -> None:
     result = calibrated(seed, sweep=False)
     assert (result.lost, result.is_right) == (0, True)
     assert result.repeated > 0  # the machine was busy
+
+
+@pytest.mark.slow
+def test_a_calibration_stops_at_any_question(trio: Trio) -> None:
+    result = trio(answers="3\nl\nq\n")
+    assert result.exit_code == 130
+    assert "which joint moved? 1 is next to the head, a = again, q = stop: " in result.output
+    assert "--resume" in result.output
+    assert trio.out.with_name(trio.out.name + ".part").exists()

@@ -84,7 +84,7 @@ def test_the_notice_is_one_line_and_then_progress(monkeypatch: pytest.MonkeyPatc
     remove()
     report_compiled("f")
     assert "snakewalk tools compile" in lines[0]
-    assert lines[1:] == ["compiled 3 loops; last: c", "compiled 5 loops; last: e"]
+    assert lines[1:] == ["compiled 3 loops", "compiled 5 loops"]
 
 
 def test_the_second_loop_of_a_run_has_the_others_compiled_in_children() -> None:
