@@ -1,5 +1,6 @@
 """Stop file and stop output against faults of folder, file, program and other runs."""
 
+import errno
 import os
 import shutil
 import signal
@@ -21,7 +22,7 @@ from snakewalk.drivers.chain.servo_chain import ServoChain
 from snakewalk.drivers.errors import PortError, SafetyTrippedError
 from snakewalk.drivers.safety.limits import SafetyLimits
 from snakewalk.drivers.safety.safe_link import SafeLink
-from snakewalk.drivers.safety.stop_button import StopButton, stoppable_runs
+from snakewalk.drivers.safety.stop_button import StopButton, button_folder, stoppable_runs
 from snakewalk.drivers.safety.stop_output import StopCommand, parse_stop_output
 from snakewalk.drivers.types import JointCommand
 from snakewalk.sim.line.sim_line import SimLine
@@ -102,10 +103,14 @@ def test_a_run_that_lost_its_stop_file_stops(change: Callable[[Path], None], sai
         assert not line.bank["Torque Enable"].any()
 
 
-def test_a_full_disk_is_rejected_before_the_run(mocker: MockerFixture) -> None:
-    mocker.patch("os.write", side_effect=OSError(28, "No space left on device"))
-    with pytest.raises(InputError, match="No space left on device; name another folder by"):
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EFBIG])
+def test_a_full_disk_is_reported_before_the_run(mocker: MockerFixture, code: int) -> None:
+    """Not as bad input; the error names the folder."""
+    mocker.patch("os.write", side_effect=OSError(code, os.strerror(code)))
+    with pytest.raises(OSError, match=os.strerror(code)) as full:
         StopButton("walk")
+    assert full.value.errno == errno.ENOSPC
+    assert full.value.filename == str(button_folder())
 
 
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder", "zeros", "empty"])
