@@ -197,8 +197,9 @@ def test_a_person_flips_drops_drags_and_saves(
         page.on("request", lambda asked: wrong.append(asked.url) if "http" in asked.url[:5] else 0)
         page.goto((folder / "review.html").as_uri())
         page.get_by_text("frame 0 of 0 to 15").wait_for()
-        page.get_by_role("button", name="next doubtful frame").click()
-        page.get_by_text(f"frame {LOST} of").wait_for()
+        for number in range(1, LOST + 1):  # a film below 20 frames has no good one
+            page.get_by_role("button", name="next doubtful frame").click()
+            page.get_by_text(f"frame {number} of").wait_for()
         page.keyboard.press("c")  # the neighbour's skeleton, then its head pulled
         where = "JSON.stringify((() => { const p = place().to(points(at)[0]);"
         where += "const r = film.getBoundingClientRect(); return [p[0] + r.x, p[1] + r.y,"
