@@ -5,7 +5,6 @@ thickness along the body decides as well. ``head`` finds which end is the head.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,16 +14,6 @@ from snakewalk.controller.track.frame_status import FrameStatus
 
 _SURE_MARGIN = 0.2  # margin from which one frame is enough to distinguish the ends
 _GAP = 3  # frames without a skeleton after which the place alone is not enough
-
-
-@dataclass(frozen=True, slots=True)
-class AlignedSkeletons:
-    """Skeletons of one animal, the same end first in all."""
-
-    skeletons: tuple[Skeleton, ...]
-    margin: Floats
-    """(T,) how much better the frame fits as it is than reversed, -1 to 1; NaN for a frame without
-    a skeleton, 1 at the first one. Below 0 where thickness overruled the place."""
 
 
 def margin_of(body: Skeleton, before: Skeleton) -> float:
@@ -39,7 +28,7 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
     return (other - same_order_px) / max(other + same_order_px, 1e-9)
 
 
-def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
+def align_ends(skeletons: Sequence[Skeleton]) -> tuple[Skeleton, ...]:
     """Put the same end first in every frame; the end of the first skeleton is kept."""
     out = list(skeletons)
     good = [k for k, skeleton in enumerate(out) if skeleton.status is FrameStatus.GOOD]
@@ -56,11 +45,15 @@ def align_ends(skeletons: Sequence[Skeleton]) -> AlignedSkeletons:
         if margin < 0.0:
             out[k] = out[k].reversed()
         profile = profile + (_asymmetry(out[k]) - profile) / min(number + 1, 200)
-    return AlignedSkeletons(tuple(out), margins(out))
+    return tuple(out)
 
 
 def margins(skeletons: Iterable[Skeleton]) -> Floats:
-    """(T,) how much better each fits the one before as it is than reversed: ``align_ends``."""
+    """(T,) how much better each fits the one before as it is than reversed, -1 to 1.
+
+    NaN for a frame without a skeleton, 1 at the first one. Below 0 where thickness overruled the
+    place in ``align_ends``.
+    """
     return np.fromiter(_margins(skeletons), dtype=float)
 
 

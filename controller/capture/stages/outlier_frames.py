@@ -33,8 +33,8 @@ class Compare:
     def run(self, film: StagedFilm) -> StagedFilm:
         """Return the film with aligned ends; outliers have a status instead of points."""
         marked = mark_empty(film.skeletons, np.array(film.detections.contrast))
-        checked = mark_outliers(align_ends(marked).skeletons, np.array(film.detections.area_px))
-        return replace(film, skeletons=align_ends(checked).skeletons)
+        checked = mark_outliers(align_ends(marked), np.array(film.detections.area_px))
+        return replace(film, skeletons=align_ends(checked))
 
 
 def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton]:

@@ -6,7 +6,7 @@ of its contrast. Bends and loops are judged by ``film_check.possible_form``.
 
 import numpy as np
 
-from snakewalk.controller.capture.verification.profiles import BodyProfile, direction_of
+from snakewalk.controller.capture.verification.profiles import BodyProfile
 
 _SURE_PX = 1.0  # a smaller distance of a tip from the end of its contrast is its form
 _UNSEEN_PX = 2.0  # distance of an end of the contrast that is not found
@@ -21,8 +21,7 @@ def judged_error_px(profile: BodyProfile, length_px: float) -> float:
     """Mean error of the points of a body that its frame shows; added to that of its fit."""
     away = np.abs(np.nan_to_num(profile.beyond_px, nan=_UNSEEN_PX))
     tips = _SHARE * float(np.linalg.norm(np.maximum(away - _SURE_PX, 0.0)))
-    sides = profile.sides
-    contrast = sides @ direction_of(sides.reshape(-1, sides.shape[2]))
+    contrast = profile.sides @ profile.direction
     parts = [contrast[:, part][np.isfinite(contrast[:, part])] for part in (_FRONT, _REAR)]
     faded = 0.0
     if all(map(len, parts)):

@@ -33,6 +33,8 @@ class BodyProfile:
     """(2, rings, angles, C) ground minus picture beyond the first and the last tip."""
     noise: float
     """Standard deviation of a pixel of the ground, from neighbouring samples."""
+    direction: Floats
+    """(C,) unit weights of the channels, from ``sides``."""
     beyond_px: Floats
     """(2,) how far beyond the first and the last tip half of the contrast ends; below 0 within the
     body, NaN if it does not end."""
@@ -71,7 +73,7 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
     sides = np.stack(grounds) - on
     direction = direction_of(sides.reshape(-1, image.shape[2]))
     beyond = [_end_px(image, line[::order], half[::order], direction) for order in (1, -1)]
-    return BodyProfile(sides, np.stack(rings), spread, np.array(beyond))
+    return BodyProfile(sides, np.stack(rings), spread, direction, np.array(beyond))
 
 
 def direction_of(contrasts: Floats) -> Floats:

@@ -48,8 +48,8 @@ def detected(images: Sequence[Image]) -> tuple[list[Skeleton], dict[int, Outline
     found = [detector.detect(one) for one in images]
     outlines = {k: Outline.of(one.silhouette, 0.0) for k, one in enumerate(found)}
     areas = np.array([one.silhouette.area_px for one in found])
-    aligned = align_ends([one.skeleton for one in found]).skeletons
-    return list(align_ends(mark_outliers(aligned, areas)).skeletons), outlines
+    aligned = align_ends([one.skeleton for one in found])
+    return list(align_ends(mark_outliers(aligned, areas))), outlines
 
 
 def solved(skeletons: list[Skeleton], outlines: dict[int, Outline]) -> CoilFilm:

@@ -190,7 +190,7 @@ def test_a_tail_that_was_not_found_is_noticed_over_the_film(kind: str) -> None:
         assert body.status is FrameStatus.GOOD
         store.put(number, frame, body.points_px, body.length_px)
         found.append(body)
-    assert has_faint_continuation(align_ends(found).skeletons, store) is expected
+    assert has_faint_continuation(align_ends(found), store) is expected
 
 
 @pytest.mark.nightly("a further film: 6 s of CPU")
