@@ -35,10 +35,20 @@ def test_the_median_distance_is_below_a_pixel_and_every_frame_is_used(
     worm: tuple[Capture, np.ndarray],
 ) -> None:
     seen, published = worm
-    assert seen.good.all()
+    assert seen.used.all()
     away = [distance(*pair) for pair in zip(seen.points_px, published, strict=True)]
     assert np.median(away) < 0.5
     assert np.max(away) < 1.0
+
+
+def test_nine_frames_of_ten_are_good_and_state_their_error(
+    worm: tuple[Capture, np.ndarray],
+) -> None:
+    """The rest are rough for a tip that lies more than a pixel from the end of its contrast."""
+    seen, published = worm
+    assert np.mean(seen.good) > 0.9
+    away = np.array([distance(*pair) for pair in zip(seen.points_px, published, strict=True)])
+    assert np.mean(away[seen.good] > 2.0 * seen.expected_px[seen.good]) <= 0.05
 
 
 def test_head_and_tail_are_those_of_the_published_skeletons_in_every_frame(
