@@ -18,6 +18,8 @@ _GENTLE = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
 """Options of the first motion: slow, and with little torque (ours)."""
 _DEAD_RECKONED = 3
 """Exit code of a successful run without a measured pose."""
+_INTERRUPTED = 130
+"""Exit code of a command that the person left at its own question."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +186,8 @@ class GuidedSetup:
             code = self._run(words)
             if code in (0, _DEAD_RECKONED):
                 break
-            typer.echo(f"  exit code {code}: correct the faults above, then try again")
+            if code != _INTERRUPTED:
+                typer.echo(f"  exit code {code}: correct the faults above, then try again")
             words = step.words(self.files)
         return True
 

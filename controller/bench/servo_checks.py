@@ -254,12 +254,13 @@ def supply(servos: Sequence[ServoReport], low_v: float, high_v: float) -> Findin
     """Supply voltage of each servo, and the drop of the cable along the chain."""
     volts = [s.voltage_v for s in servos]
     shown = f"{min(volts):.1f} to {max(volts):.1f} V"
+    stated = "or correct servo.supply_v in the robot's file"
     if min(volts) < low_v:
-        return Finding(
-            "supply", "fail", f"{shown}: below {low_v:g} V", "charge the battery; thicker cable"
-        )
+        remedy = f"charge the battery; thicker cable; {stated}"
+        return Finding("supply", "fail", f"{shown}: below {low_v:g} V", remedy)
     if max(volts) > high_v:
-        return Finding("supply", "fail", f"{shown}: above {high_v:g} V", "a lower supply voltage")
+        remedy = f"a lower supply voltage, {stated}"
+        return Finding("supply", "fail", f"{shown}: above {high_v:g} V", remedy)
     if max(volts) - min(volts) > _CABLE_DROP_V:
         return Finding("supply", "warn", f"{shown} along the chain", "feed the chain at both ends")
     return Finding("supply", "ok", shown)

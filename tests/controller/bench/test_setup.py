@@ -99,6 +99,15 @@ def test_a_command_that_fails_is_tried_again_or_left(
     assert "exit code 2: correct the faults above" in capsys.readouterr().out
 
 
+def test_a_command_that_the_person_leaves_has_no_fault(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench.codes = [0, 0, 130]
+    with pytest.raises(SystemExit):
+        bench.sets_up("", "", "", "", "q")
+    assert "exit code" not in capsys.readouterr().out
+
+
 def test_a_skipped_calibration_says_what_is_assumed(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
