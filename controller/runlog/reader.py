@@ -148,6 +148,8 @@ def _foreign(file: BinaryIO) -> str:
             profile = record.profile
         elif isinstance(record, Channel):
             topics.add(record.topic)
+    if ConfigTable.topic.name in topics:
+        return "its /config is no JSON object, or is nested too deeply; read a copy of the log"
     listed = ", ".join(sorted(topics)[:_MOST_NAMED_TOPICS]) + (
         ", ..." if len(topics) > _MOST_NAMED_TOPICS else ""
     )

@@ -39,7 +39,6 @@ class Dashboard:
         self._run = header.run
         safety = header.run.safety
         self._limit_a = safety.current_limit_of_a(header.robot)
-        self._evidence = header.pose_evidence
         step_m = None if header.ground is None else contour_step_m(header.ground)
         self._contours = "" if step_m is None else f"<br>contours every {100.0 * step_m:g} cm"
         self._ground = header.ground
@@ -47,7 +46,10 @@ class Dashboard:
         self._volts = safety.voltage_limits_v(header.robot.servo)
         self._stale_s = safety.stale_limit_s
         self._speed_m_s = np.nan
-        self._names = [header.robot.joint_label(k) for k in range(header.robot.joint_count)]
+        self._names = [
+            header.robot.joint_label(k).removeprefix("joint ")
+            for k in range(header.robot.joint_count)
+        ]
         self._gui = gui = server.gui
         self._picture: viser.GuiHtmlHandle | None = None
         self._state = gui.add_html("")
@@ -116,9 +118,10 @@ class Dashboard:
                 facts.append(f"slope {steepest:.0f}°, {ahead:+.0f}° ahead")
         if np.isfinite(share := carrier_share(record)):
             facts.append(f"{share:.0%} of the walk on wide waves")
-        believes = "" if self._evidence.is_measured or not facts else "believed: "
-        colour = _INK if self._evidence.is_measured else _WARN
-        evidence_html = f"<span style='color:{colour}'>pose: {escape(self._evidence.text)}</span>"
+        evidence = record.header.pose_evidence
+        believes = "" if evidence.is_measured or not facts else "believed: "
+        colour = _INK if evidence.is_measured else _WARN
+        evidence_html = f"<span style='color:{colour}'>pose: {escape(evidence.text)}</span>"
         self._state.content = (
             f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "
             f"{escape(self._robot.name)}<br>{time_s:.1f} s, "
@@ -172,7 +175,7 @@ class Dashboard:
         head = "<tr><th>" + "</th><th>".join(heads) + "</th></tr>"
         self._bars.content = (
             "<table style='width:100%;font-size:11px;line-height:1.25;border-spacing:4px 1px;"
-            f"text-align:right'>{head}{''.join(lines)}</table>"
+            f"white-space:nowrap;text-align:right'>{head}{''.join(lines)}</table>"
         )
 
     def show_curves(self, record: RunRecord, cycle: int) -> None:

@@ -30,6 +30,7 @@ from snakewalk.controller.runlog.topics import (
     ConfigTable,
     CycleTable,
     EventTable,
+    PoseSourceTable,
     PoseTable,
     SlowTable,
     WaypointTable,
@@ -277,8 +278,8 @@ class _LivePage:
         now_s = self._told_s
         if scene is None or dashboard is None:
             return
-        names = (table.topic.name for table in (CycleTable, PoseTable, SlowTable))
-        newest = {name: list(self._rows[name])[-1:] for name in names}
+        tables = (CycleTable, PoseTable, SlowTable, PoseSourceTable)
+        newest = {table.topic.name: [*self._rows[table.topic.name]][-1:] for table in tables}
         now = self._record(newest)
         with self._server.atomic():
             follow = dashboard.follow.value

@@ -27,7 +27,7 @@
       #verdict, a { pointer-events: auto; overflow-wrap: anywhere; }
       #age { background: #b34700; color: #fff; font-weight: 700; }
       @media (prefers-color-scheme: dark) {
-        output { background: #22303c; color: #f1f3f5; }
+        output { background: #000; color: #f1f3f5; }
         button:focus-visible { outline-color: #fff; }
       }
     </style><button type="button" disabled>E-STOP <small>(Esc)</small></button>

@@ -22,6 +22,7 @@ from snakewalk.controller.exchange.flat_table import (
 )
 from snakewalk.controller.exchange.foxglove_scene import write_foxglove_scene
 from snakewalk.controller.exchange.ros_bag import write_ros_bag
+from snakewalk.controller.runlog.column import registered_tables
 
 
 @command(
@@ -63,20 +64,20 @@ def export(
 ) -> None:
     """Write a run's log as tables, as a ROS 2 bag, or for Foxglove with the body in 3-D."""
     _check_names(log, csv, parquet, ros2, foxglove)
+    tables_in = [(csv, "csv", write_csv), (parquet, "parquet", write_parquet)]
+    results = {file for folder, ending, _ in tables_in for file in _tables(folder, ending)}
+    refuse_to_overwrite([*sorted(results), ros2, foxglove], force)
     record = open_log(log)
     tables = flat_tables(record, joint_numbers=joint_numbers)
     named = with_joint_numbers(record) if joint_numbers else record
     writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}
-    for folder, ending, write in ((csv, "csv", write_csv), (parquet, "parquet", write_parquet)):
+    for folder, ending, write in tables_in:
         if folder is not None:
             writers |= {folder / f"{t.name}.{ending}": partial(write, t) for t in tables}
     if ros2 is not None:
         writers[ros2] = partial(write_ros_bag, named)
     if foxglove is not None:
         writers[foxglove] = partial(write_foxglove_scene, named)
-    folders = {folder for folder in (csv, parquet) if folder is not None and not folder.exists()}
-    files = [file for file in writers if file.parent not in folders]
-    refuse_to_overwrite([*sorted(folders), *files], force)
     written: dict[str, int | dict[str, int]] = {}
     for file, write_to in writers.items():
         with atomic_write(file) as part:
@@ -87,6 +88,15 @@ def export(
     for name, count in written.items():
         what = f"{count} rows" if isinstance(count, int) else f"{sum(count.values())} messages"
         console.print(f"{name}  {what}")
+
+
+def _tables(folder: Path | None, ending: str) -> list[Path]:
+    """Return the files of all tables in a folder, or the folder if it does not exist."""
+    if folder is None:
+        return []
+    if not folder.exists():
+        return [folder]
+    return [folder / f"{table.topic.table_name}.{ending}" for table in registered_tables()]
 
 
 def _check_names(
@@ -114,8 +124,6 @@ def _check_names(
         for path in bags
         if path.exists() and log.exists() and path.samefile(log)
     ]
-    if len(bags) == 2 and ros2 == foxglove:
-        faults.append("--ros2 and --foxglove have the same name")
     if faults:
         raise InputError(faults)
     if parquet is not None:

@@ -82,10 +82,9 @@ ROWS = [
     ("animal track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
     ("run --track bomb.npz", "bomb.npz: its 0.0197 MB would expand to 20 MB; at most 100 times"),
     ("log report bomb.mcap", "bomb.mcap: its 0.00"),
-    (
-        "log replay deep.mcap",
-        "deep.mcap: is a complete MCAP of profile '' with topics /config, but no log of snakewalk",
-    ),
+    ("log replay deep.mcap", "deep.mcap: its /config is no JSON object, or is nested too deeply"),
+    ("log export deep.mcap --csv nosuch/tables", "nosuch: no such folder"),
+    ("log export deep.mcap --csv taken", "taken/pose.csv: exists; --force overwrites it"),
     ("gait tune rolling -o /proc/a.toml", "/proc: takes no file"),
     ("bus serve --servos 1 --record nosuch/a", "nosuch: no such folder"),
     ("bus serve --servos 1 --link nosuch/a", "nosuch: no such folder"),
@@ -263,7 +262,7 @@ ROWS = [
     ("log export empty --foxglove a.txt", "a.txt: is an MCAP file; name it a.mcap"),
     (
         "log export empty --ros2 a.mcap --foxglove a.mcap",
-        "--ros2 and --foxglove have the same name",
+        "two results have the same name",
     ),
     ("log export noise.bin --ros2 a.mcap", "noise.bin: is not an MCAP log"),
     ("robot identify noise.bin", "noise.bin: is not JSON"),
@@ -383,8 +382,10 @@ def test_bad_input_is_told_and_nothing_is_written(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    Path("taken").mkdir()
     for name, text in {
         "empty": "",
+        "taken/pose.csv": "",
         "empty.toml": "",
         "file.txt": "mine",
         "path.toml": _RUN.replace("mine", "../../mine"),

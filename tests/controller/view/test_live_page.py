@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 pytest.importorskip("viser")
 
@@ -36,6 +37,7 @@ from snakewalk.controller.runlog.reader import read_log
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.runlog.row_line import RunEnd
 from snakewalk.controller.runtime.drive import Progress
+from snakewalk.controller.view.commands.demo import RECORDED
 from snakewalk.controller.view.dashboard import Dashboard
 from snakewalk.controller.view.dead_man import DeadMan
 from snakewalk.controller.view.gait_panel import GaitPanel
@@ -362,6 +364,28 @@ def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     view.close()
 
 
+def test_a_pose_that_the_joints_do_not_confirm_is_shown_as_unconfirmed() -> None:
+    rows: dict[str, dict[str, Any]] = {}
+    with RECORDED.open("rb") as file:
+        for _, channel, message in make_reader(file).iter_messages():
+            rows.setdefault(channel.topic, json.loads(message.data))
+    pose = {"kind": "measured", "source": "udp", "position_m": None, "heading_rad": None}
+    rows["/config"]["evidence"]["pose"] = pose
+    view = PageView()
+    view.on_row("/config", json.dumps(rows["/config"]).encode())
+
+    def is_shown(text: str) -> bool:
+        for topic in ("/cycle", "/pose_source", "/pose"):
+            view.on_row(topic, json.dumps(rows[topic]).encode())
+        view.page.step()
+        return text in view.shown("_state")
+
+    for is_confirmed, text in ((1, "measured"), (0, "unconfirmed"), (1, "measured")):
+        rows["/pose_source"] = {"time_s": 0.0, "latency_s": 0.0, "is_confirmed": is_confirmed}
+        assert any(is_shown(f"pose: {text} by udp") for _ in range(100))
+    view.close()
+
+
 def test_a_picture_is_sent_once_before_the_next_pose() -> None:
     pytest.importorskip("cv2")
     view = PageView()
@@ -441,7 +465,7 @@ def test_a_browser_shows_the_run_and_its_end_by_e_stop(tmp_path: Path) -> None:
     with run(tmp_path, *words) as child, browsed(child) as page:
         button = page.get_by_role("button", name="E-STOP")
         page.get_by_text("lateral-undulation").wait_for()
-        page.get_by_text("joint yaw_16 (ID 16)").wait_for()
+        page.get_by_text("yaw_16 (ID 16)").wait_for()
         page.keyboard.press("Escape")
         assert end_of_run(page) == "stop requested by E-STOP of the page"
         assert button.is_disabled()
@@ -465,7 +489,7 @@ def test_e_stop_of_a_browser_switches_torque_off(
     words += ["--set", "run.safety.lost_observer=warn"]  # a busy machine silences the page
     words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
     with run(tmp_path, *words) as child, browsed(child) as page:
-        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
+        page.get_by_text("yaw_04 (ID 4)").wait_for()
         assert bus["Torque Enable"].tolist() == [1] * 4
         page.keyboard.press("Escape")
         assert end_of_run(page) == "stop requested by E-STOP of the page"
@@ -510,7 +534,7 @@ def test_a_slider_that_was_set_while_the_connection_stalled_is_no_event_of_the_r
         return proxies[0].port
 
     with run(tmp_path, *words) as child, browsed(child, through=through) as page:
-        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
+        page.get_by_text("yaw_04 (ID 4)").wait_for()
         page.get_by_role("tab", name="gait").click()
         slider = page.get_by_role("slider").first
         set_by_hand(page, slider)
@@ -557,7 +581,7 @@ def test_an_operator_who_closes_the_page_stops_the_run(
     words += ["--robot", "quartet.toml", "--port", bus.path]
     words += [word for key, value in PATIENT.items() for word in ("--set", f"{key}={value}")]
     with run(tmp_path, *words) as child, browsed(child) as page:
-        page.get_by_text("joint yaw_04 (ID 4)").wait_for()
+        page.get_by_text("yaw_04 (ID 4)").wait_for()
         page.get_by_role("tab", name="gait").click()
         set_by_hand(page, page.get_by_role("slider").first)
         page.close()

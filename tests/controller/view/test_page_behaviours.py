@@ -239,7 +239,7 @@ def test_the_page_states_the_evidence_of_the_pose(stage: Stage) -> None:
 
 
 def test_each_servo_has_supply_and_age(stage: Stage) -> None:
-    row = stage.tab.locator("tr", has_text="joint yaw_16 (ID 16)")
+    row = stage.tab.locator("tr", has_text="yaw_16 (ID 16)")
     row.wait_for()
     cells = row.locator("td").all_text_contents()
     assert cells[4] == "12.0"
@@ -321,7 +321,7 @@ def test_a_slider_changes_the_run_which_answers_with_an_event(stage: Stage) -> N
 
 def test_a_reload_during_the_run_shows_the_run(stage: Stage) -> None:
     stage.tab.reload()
-    stage.tab.get_by_text("joint yaw_16 (ID 16)").wait_for()
+    stage.tab.get_by_text("yaw_16 (ID 16)").wait_for()
     stage.tab.get_by_text("torque off at once, latched").wait_for()
     stage.tab.wait_for_function("document.title === 'snakewalk'")
 
@@ -536,7 +536,7 @@ def test_escape_after_the_end_does_nothing(stage: Stage) -> None:
 def test_a_reload_after_the_end_shows_the_end(stage: Stage) -> None:
     stage.tab.reload()
     stage.tab.get_by_text(ENDED).wait_for()
-    stage.tab.get_by_text("joint yaw_16 (ID 16)").wait_for()
+    stage.tab.get_by_text("yaw_16 (ID 16)").wait_for()
     assert not stage.tab.get_by_text("Dev Settings").is_visible()
 
 
