@@ -13,6 +13,7 @@ from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
     check_picture,
@@ -41,7 +42,8 @@ def synthesise(
     """Join segments of a film in a new order, at random or through control points."""
     check_picture(picture)
     check_npz(output)
-    motion = synthesise_motion(load_postures(postures), options)
+    with ProgressBar("search", transient=True) as bar:
+        motion = synthesise_motion(load_postures(postures), options, bar.update)
     with atomic_write(output) as part:
         motion.save(part)
     if picture is not None:

@@ -24,6 +24,7 @@ from snakewalk.controller.animals.fish.segments import (
 from snakewalk.controller.animals.fish.steering import steered
 from snakewalk.controller.animals.fish.surroundings import Surroundings
 from snakewalk.controller.animals.fish.synthesis import (
+    OnProgress,
     PieceSequence,
     compose,
     joint_motion,
@@ -95,7 +96,9 @@ class SynthesisedMotion:
         save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
 
 
-def synthesise_motion(source: Postures, options: SynthesisOptions) -> SynthesisedMotion:
+def synthesise_motion(
+    source: Postures, options: SynthesisOptions, on_progress: OnProgress = lambda *_: None
+) -> SynthesisedMotion:
     """Cut, choose, compose, retarget.
 
     Raises:
@@ -117,6 +120,7 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
             limit_s=options.limit_s,
             capture=max(_CAPTURE * source.length, radius),
             around=around,
+            on_progress=on_progress,
         )
         steered_motion = steered(
             compose(pieces, sequence, options.blend_s, around.start),
@@ -136,7 +140,7 @@ def synthesise_motion(source: Postures, options: SynthesisOptions) -> Synthesise
         composed = steered_motion.motion
     else:
         rng = np.random.default_rng(options.seed)
-        sequence = random_sequence(pieces, options.seconds, rng, around)
+        sequence = random_sequence(pieces, options.seconds, rng, around, on_progress)
         composed = compose(pieces, sequence, options.blend_s, around.start)
     motion = replace(
         composed,

@@ -6,6 +6,7 @@ follows starts with the value *and slope* of the one before it, and the differen
 a quintic: position and speed are continuous, acceleration is bounded.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from snakewalk.controller.kinematics.retarget import Retarget
 from snakewalk.controller.kinematics.smoothstep import quintic
 
 BLEND_S = 0.25
+OnProgress = Callable[[float, float], object]
+"""Called with the seconds of motion that are chosen, and the most or wanted seconds."""
 STEERED = 0.2
 """Largest part of the distance swum by which a way is bent to a control point (ours)."""
 _BEAM = 40
@@ -96,6 +99,7 @@ def random_sequence(
     seconds: float,
     rng: np.random.Generator,
     around: Surroundings = OPEN_WATER,
+    on_progress: OnProgress = lambda *_: None,
 ) -> PieceSequence:
     """Follow permitted pieces, each as likely as the other, for at least ``seconds``.
 
@@ -105,6 +109,7 @@ def random_sequence(
     aim = _Aim(np.zeros((0, 2)), 0.0, around)
     node = _begin(around, 2)
     while not node.order or node.samples / pieces.rate_hz < seconds:
+        on_progress(node.samples / pieces.rate_hz, seconds)
         choice, by_rule = _choice(pieces, node)
         if not around.any:
             node = _append_piece(pieces, node, int(rng.choice(choice)), by_rule, aim)
@@ -157,6 +162,7 @@ def sequence_through(
     depth: int = _DEPTH,
     capture: float = 0.0,
     around: Surroundings = OPEN_WATER,
+    on_progress: OnProgress = lambda *_: None,
 ) -> PieceSequence:
     """Swim through control points in order, from the origin along x.
 
@@ -175,6 +181,7 @@ def sequence_through(
         capture: a point is also reached within this distance if ``steered`` can bend the way to it:
             the missing distance is less than ``STEERED`` of the distance swum. 0: no steering.
         around: walls and fish to keep away from.
+        on_progress: called before each piece.
 
     Raises:
         InputError: a point was not reached in time, or heights of a film that has none.
@@ -189,6 +196,7 @@ def sequence_through(
     aim = _Aim(points, radius, around, capture)
     begin = _begin(around, dimensions)
     while len(begin.reached_at) < len(points):
+        on_progress(begin.samples / pieces.rate_hz, limit_s)
         if begin.samples / pieces.rate_hz > limit_s:
             point = ",".join(f"{value:g}" for value in points[len(begin.reached_at)])
             turns = [np.degrees(piece.head_rad[-1]) for piece in pieces.pieces]

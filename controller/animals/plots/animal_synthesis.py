@@ -53,7 +53,7 @@ def draw_animal(animal_motion: SynthesisedAnimal, file: Path, title: str) -> Non
 def _map(axes: Axes, animal_motion: SynthesisedAnimal, title: str) -> None:
     if animal_motion.ground is not None:
         draw_ground(axes, animal_motion.ground)
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="N")
     path_m = animal_motion.path.position(np.linspace(0.0, animal_motion.path.length_m, 400))
     axes.plot(*path_m.T, color=INK, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
     motion = animal_motion.motion

@@ -57,7 +57,7 @@ def draw_walk(walk: SynthesisedWalk, ground: HeightField | None, file: Path, tit
     check_picture(file)
     low, high = _extent(walk)
     wide, tall = high - low
-    map_in = float(np.clip(0.85 * WIDTH_IN * tall / wide + 0.8, 2.8, 6.0))
+    map_in = float(np.clip(0.9 * WIDTH_IN * tall / wide + 1.1, 2.8, 6.0))
     with style():
         figure = Figure(figsize=(WIDTH_IN, map_in + 8.6), layout="constrained", dpi=110)
         upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[map_in, 8.6])[:, 0]
@@ -85,8 +85,7 @@ def _map(axes: Axes, walk: SynthesisedWalk, ground: HeightField | None, title: s
     axes.plot(*path_m.T, color=PATH, linewidth=1.2, linestyle=(0, (5, 3)), label="planned path")
     axes.plot(*centre.T, color=CENTRE, linewidth=1.6, label="mass centre")
     along = arc_lengths(centre)
-    length_m = float(np.hypot(*np.diff(points[0], axis=0).T).sum())
-    marks = np.arange(0.0, along[-1], _BODY_SPACING * length_m)
+    marks = np.arange(0.0, along[-1], _BODY_SPACING * walk.length_m)
     some = np.unique(np.append(np.searchsorted(along, marks), len(points) - 1))
     bodies = LineCollection(
         list(points[some]), cmap=TIMES, linewidths=2.6, capstyle="round", zorder=3
@@ -108,7 +107,7 @@ def _map(axes: Axes, walk: SynthesisedWalk, ground: HeightField | None, title: s
         draw_ground(axes, ground)
         axes.set_xlim(x)
         axes.set_ylim(y)
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", anchor="N")
     axes.set_xlabel("x (m); bodies darker with time, dots are heads")
     axes.set_ylabel("y (m)")
     axes.set_title(title, pad=24.0)

@@ -90,6 +90,11 @@ class SynthesisedWalk:
         """(T,) of the frames."""
         return np.arange(len(self.plan.speed_m_s)) / self.rate_hz
 
+    @property
+    def length_m(self) -> float:
+        """Length of the body."""
+        return float(np.hypot(*np.diff(self.plan.points_m[0], axis=0).T).sum())
+
     def bones(self, segments: int = 1) -> BoneMotion:
         """Bones on the ground, each of ``segments`` segments, a divisor of their number.
 
@@ -110,7 +115,10 @@ class SynthesisedWalk:
         """Plain numbers, for the table and JSON."""
         plan = self.plan
         targets = self.targets
-        length_m = float(np.hypot(*np.diff(plan.points_m[0], axis=0).T).sum())
+        distinct = {state for _, state in self.states}
+        moved_m = np.diff(plan.points_m[:, :-1], axis=0)
+        turn = plan.angles_rad[:-1]
+        aside_m = np.abs(moved_m[..., 1] * np.cos(turn) - moved_m[..., 0] * np.sin(turn))
         return {
             "frames": len(plan.speed_m_s),
             "seconds": round(float(self.time_s[-1]), 2),
@@ -120,19 +128,21 @@ class SynthesisedWalk:
             "path_m": round(self.path.length_m, 3),
             "states": len(self.library.shapes_rad),
             "states_taken": len(self.states),
-            "states_distinct": len({state for _, state in self.states}),
+            "states_distinct": len(distinct),
+            "states_random": len(distinct - set(range(self.library.recorded))),
             "speed_mean_m_s": round(float(plan.speed_m_s.mean()), 4),
-            "speed_mean_body_lengths_s": round(float(plan.speed_m_s.mean()) / length_m, 4),
+            "speed_mean_body_lengths_s": round(float(plan.speed_m_s.mean()) / self.length_m, 4),
+            "sideways_share": round(float(aside_m.sum() / np.hypot(*moved_m.T).sum()), 3),
             "bend_k_rad": round(float(np.median(plan.angles_rad.std(axis=1))), 3),
             "steepest_deg": round(float(np.degrees(self.skeleton.steepest_rad)), 1),
             "tongue_learned_from": self.tongue_evidence,
-            "segments_stretched_most": round(self._stretch(length_m), 4),
+            "segments_stretched_most": round(self._stretch(), 4),
             "ground_gap_most_m": round(float(np.abs(self.skeleton.gap_m).max()), 9),
         }
 
-    def _stretch(self, length_m: float) -> float:
+    def _stretch(self) -> float:
         points = self.skeleton.points_m
-        segment_m = length_m / (points.shape[-2] - 1)
+        segment_m = self.length_m / (points.shape[-2] - 1)
         return float(np.linalg.norm(np.diff(points, axis=-2), axis=-1).max() / segment_m - 1.0)
 
     def save(self, file: Path, name: str, source: str) -> None:
@@ -149,7 +159,7 @@ class SynthesisedWalk:
             file,
             points=points[..., :2],
             rate_hz=self.rate_hz,
-            length_m=float(np.hypot(*np.diff(self.plan.points_m[0], axis=0).T).sum()),
+            length_m=self.length_m,
             name=name,
             source=source,
             licence="made by snakewalk animal synthesise",

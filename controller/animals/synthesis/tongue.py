@@ -12,9 +12,6 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.text_table import numbers_of, read_rows
 
-RATE_LIMITS = (0.4, 2.5)
-"""Range of b_st, how fast the tongue plays."""
-
 
 def flicks(rate_hz: float = 25.0) -> Floats:
     """Make a sequence (T,) to learn from: no tracked one is published.
@@ -87,30 +84,14 @@ class HeightChain:
         level_indices = np.rint(heights * (levels - 1)).astype(np.intp)
         self._start = (int(level_indices[0]), int(level_indices[1]))
         counts = np.zeros((levels, levels, levels))
-        np.add.at(counts, (level_indices[:-2], level_indices[1:-1], level_indices[2:]), 1.0)
         # the sequence repeats, so that its last pair has a successor
-        np.add.at(
-            counts, (level_indices[[-2, -1]], level_indices[[-1, 0]], level_indices[[0, 1]]), 1.0
-        )
+        repeated = np.append(level_indices, level_indices[:2])
+        np.add.at(counts, (repeated[:-2], repeated[1:-1], repeated[2:]), 1.0)
         total = counts.sum(axis=2, keepdims=True)
         self.counts = counts
         """(z, y, x): how often height x followed y after z."""
         self.probability = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0.0)
         """(z, y, x): of height x after y after z; rows of pairs never seen are 0."""
-
-    def interval(self, two: int, latest: int, next_: int, z: float = 1.96) -> tuple[float, float]:
-        """Wilson interval of the probability of level ``next_`` after ``latest`` after ``two``.
-
-        ``z`` is the normal quantile: 1.96 is 95 %. A pair that was never seen gives 0 to 1.
-        """
-        total = float(self.counts[two, latest].sum())
-        if total == 0.0:
-            return 0.0, 1.0
-        share = float(self.counts[two, latest, next_]) / total
-        middle = (share + z * z / (2.0 * total)) / (1.0 + z * z / total)
-        half = z * np.sqrt(share * (1.0 - share) / total + z * z / (4.0 * total * total))
-        half /= 1.0 + z * z / total
-        return max(middle - float(half), 0.0), min(middle + float(half), 1.0)
 
     def sequence(self, steps: int, rng: np.random.Generator) -> Floats:
         """Draw heights (steps,) in 0..1, from the learned sequence's own beginning."""
@@ -128,25 +109,16 @@ class HeightChain:
 class Tongue:
     """Heights over time, drawn ahead in blocks from one seed."""
 
-    def __init__(
-        self, chain: HeightChain, seed: int, rate_hz: float = 25.0, speed: float = 1.0
-    ) -> None:
-        """Play ``chain`` at ``speed`` (b_st) times its ``rate_hz``.
-
-        Raises:
-            ValueError: the speed is outside 0.4 to 2.5.
-
-        """
-        if not RATE_LIMITS[0] <= speed <= RATE_LIMITS[1]:
-            raise ValueError(f"tongue speed {speed}: expected 0.4 to 2.5")
+    def __init__(self, chain: HeightChain, seed: int, rate_hz: float = 25.0) -> None:
+        """Play ``chain`` at ``rate_hz``."""
         self._chain = chain
         self._seed = seed
-        self._pace = rate_hz * speed
+        self._rate_hz = rate_hz
         self._heights = chain.sequence(256, np.random.default_rng(seed))
 
     def height(self, time_s: float) -> float:
         """Height at a time since the start, between samples linearly."""
-        place = max(time_s, 0.0) * self._pace
+        place = max(time_s, 0.0) * self._rate_hz
         while place > len(self._heights) - 1:  # the same seed again gives the same beginning
             more = 2 * len(self._heights)
             self._heights = self._chain.sequence(more, np.random.default_rng(self._seed))

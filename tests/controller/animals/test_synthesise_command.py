@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import cv2
 import mujoco
 import numpy as np
 import pygltflib
@@ -14,6 +15,7 @@ from snakewalk.config.loader import load_world, locate
 from snakewalk.controller.animals.mesh.body_look import rig_look
 from snakewalk.controller.animals.mesh.body_model import read_silhouettes
 from snakewalk.controller.animals.mesh.rig import posed_m, spine_rig
+from snakewalk.controller.animals.plots.snake_synthesis import draw_walk
 from snakewalk.controller.animals.synthesis.snake_synthesis import SnakeSynthesis, SynthesisedWalk
 from snakewalk.controller.animals.synthesis.synthesis_skin import FILM_SEGMENTS, SynthesisSkin
 from snakewalk.controller.run.factory import prepare_playback, prepare_walk
@@ -349,3 +351,28 @@ def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: 
         done = snakewalk(*words, "-o", str(tmp_path / "x"), *wrong)
         assert done.returncode == 2
         assert message in done.stderr
+
+
+def test_the_older_graph_says_that_it_replays_the_recording_and_moves_sideways() -> None:
+    """[KP] 4.2.1 wants random states, too; the walk of [PT] has them and slides less."""
+    facts = {
+        motion: SnakeSynthesis(prepare_walk("flat-slalom", motion=motion, on_paper=True))
+        .synthesise(400)
+        .facts()
+        for motion in ("walk", "kp")
+    }
+    assert facts["kp"]["states_random"] == 0
+    assert facts["walk"]["states_random"] > 0  # type: ignore[operator]
+    assert facts["kp"]["sideways_share"] > 4.0 * facts["walk"]["sideways_share"]  # type: ignore[operator]
+
+
+@pytest.mark.slow
+def test_the_title_of_a_long_narrow_map_is_whole(tmp_path: Path) -> None:
+    """The map pushed its title over the edge of the picture."""
+    made = SnakeSynthesis(prepare_walk("flat-slalom", motion="kp", on_paper=True)).synthesise()
+    draw_walk(made, None, tmp_path / "a.png", "flat-slalom: flat")
+    picture = cv2.imread(str(tmp_path / "a.png"))
+    assert picture is not None
+    is_blank = (picture == 255).all(axis=(1, 2))
+    assert is_blank[:2].all()  # above the title
+    assert is_blank[250:350].any()  # between the label of the map and the titles below it

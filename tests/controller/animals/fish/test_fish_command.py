@@ -177,7 +177,7 @@ def test_a_fish_that_cannot_keep_its_distance_is_reported(tmp_path: Path) -> Non
         done = CliRunner().invoke(app, words + options + out, catch_exceptions=False)
         assert done.exit_code == 0
         assert warning in done.stderr
-        assert bool(warning) == bool(done.stderr)
+        assert bool(warning) == bool(done.stderr.strip())
 
 
 def test_midlines_keep_the_facts_of_their_file(tmp_path: Path) -> None:

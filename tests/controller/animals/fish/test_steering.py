@@ -113,3 +113,14 @@ def test_points_at_the_end_of_a_motion_have_frames_of_their_own() -> None:
     ahead = motion.base[last] + 0.01 * (motion.base[last] - motion.base[last - 1])
     found = steered(motion, np.array([ahead, ahead + 1e-3]), (last, last), 0.5)
     assert found.reached_at == (last - 1, last)
+
+
+@pytest.mark.parametrize("through", [(), ((2.0, 0.0),)])
+def test_a_search_reports_its_progress(through: tuple[tuple[float, float], ...]) -> None:
+    reports: list[tuple[float, float]] = []
+    options = SynthesisOptions(through=through, seconds=10.0, limit_s=50.0, mirror=True)
+    synthesise_motion(TRUTH, options, lambda done, total: reports.append((done, total)))
+    done = [seconds for seconds, _ in reports]
+    assert len(reports) > 1
+    assert done == sorted(done)
+    assert {total for _, total in reports} == {50.0 if through else 10.0}

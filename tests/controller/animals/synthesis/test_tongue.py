@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.stats import binomtest
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.mesh.rig import Rig, posed_m
@@ -61,16 +62,10 @@ def test_the_same_seed_plays_the_same_and_faster_plays_it_sooner() -> None:
     plain, again = (Tongue(CHAIN, 3) for _ in range(2))
     heights = [plain.height(t) for t in times]
     assert heights == [again.height(t) for t in times[::-1]][::-1]
-    fast = Tongue(CHAIN, 3, speed=2.0)
+    fast = Tongue(CHAIN, 3, 50.0)
     np.testing.assert_allclose([fast.height(t / 2) for t in times], heights, atol=1e-9)
     assert heights != [Tongue(CHAIN, 4).height(t) for t in times]
     assert max(heights) > 0.9
-
-
-@pytest.mark.parametrize("speed", [0.3, 2.6])
-def test_speeds_outside_the_paper_s_range_are_refused(speed: float) -> None:
-    with pytest.raises(ValueError, match=r"expected 0\.4 to 2\.5"):
-        Tongue(CHAIN, 0, speed=speed)
 
 
 def test_too_little_to_learn_from_is_refused() -> None:
@@ -95,16 +90,18 @@ def test_a_known_chain_is_recovered_within_its_confidence_interval(tmp_path: Pat
     chain = HeightChain(record.heights, levels=3)
     wide = []
     for two, one, next_ in np.ndindex(3, 3, 3):
-        low, high = chain.interval(two, one, next_, z=3.29)
-        assert low <= known[two, one, next_] <= high
-        wide.append(high - low)
+        seen = binomtest(int(chain.counts[two, one, next_]), int(chain.counts[two, one].sum()))
+        interval = seen.proportion_ci(0.999, "wilson")
+        assert interval.low <= known[two, one, next_] <= interval.high
+        wide.append(interval.high - interval.low)
     assert np.median(wide) < 0.15
     assert TongueRecord.made_up().evidence == "assumed"
 
 
 def test_a_pair_that_was_never_seen_has_no_estimate() -> None:
     chain = HeightChain(np.array([0.0, 0.5, 1.0, 0.5]), levels=3)
-    assert chain.interval(0, 0, 1) == (0.0, 1.0)
+    assert chain.counts[0, 0].sum() == 0.0
+    assert chain.probability[0, 0].sum() == 0.0
 
 
 @pytest.mark.parametrize(
