@@ -1,7 +1,7 @@
 """Figures of the control cycle for the pages, from the benchmark's own rows.
 
 ``python -m benchmarks.codec_page`` runs ``benchmarks.cycle_codec``, writes the table of
-``docs/benchmarks/control-cycle.md``, and replaces the rows of ``docs/measured.md``.
+``docs/driver.md``, and replaces the rows of ``docs/measured.md``.
 """
 
 import argparse
@@ -90,7 +90,7 @@ def measured_rows(lines: Sequence[Line], *, is_quiet: bool) -> dict[str, str]:
     def over(some: Sequence[Line]) -> str:
         return span([100 * each.over_wire for each in some], 1)
 
-    source = f"`{COMMAND}` ([control cycle](benchmarks/control-cycle.md))"
+    source = f"`{COMMAND}` ([control cycle](driver.md#cpu-time-of-a-cycle))"
     of_sdk = span([each.of_sdk for each in ours])
     of_plain, of_fast = (span([each.of_rustypot for each in some]) for some in (plain, fast))
     cpu = "| control cycle of 16 servos, CPU |"
@@ -126,7 +126,7 @@ def main() -> None:
         head = provenance(f"{COMMAND} --rows {given.rows.name}")
     text = f"{head}\n\n{table(lines)}"
     print(text)
-    write_tables("control-cycle", "cycle", text)
+    write_tables("driver", "cycle", text)
     new = measured_rows(lines, is_quiet=load <= QUIET_LOAD)
     page = [
         next((row for begin, row in new.items() if line.startswith(begin)), line)

@@ -5,7 +5,7 @@
 CPU quota of the kernel (a control group of version 2 or 1; needs write access to it), or without
 one (``--limiter stop``) is stopped and continued. In version 1 the same share limits its real-time
 priority. ``--minutes 10`` is the long version. With ``--write`` it replaces the table of
-``docs/benchmarks/cpu-quota.md``.
+``docs/how-to/small-computer.md``.
 """
 
 import argparse
@@ -89,7 +89,7 @@ def main() -> None:
     text = f"{provenance(command)}\n\n{table(outcome)}"
     print(text)
     if given.write:
-        write_tables("cpu-quota", "quota", text)
+        write_tables("how-to/small-computer", "quota", text)
 
 
 def table(outcome: Outcome) -> str:

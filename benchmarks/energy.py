@@ -68,7 +68,7 @@ def main() -> None:
         print(*cells, sep=" | ", flush=True)
     if write:
         source = provenance("python -m benchmarks.energy --write")
-        write_tables("gait-energy", "energy", f"{markdown(HEAD, rows)}\n\n{source}")
+        write_tables("gaits", "energy", f"{markdown(HEAD, rows)}\n\n{source}")
 
 
 def jobs() -> Iterator[tuple[str, PreparedRun]]:

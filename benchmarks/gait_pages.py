@@ -169,8 +169,8 @@ def main() -> None:
     write = parser.parse_args().write
     land = _all(ON_LAND, 20.0)
     tables = {
-        ("gait-motion", "motion"): motion_table(land),
-        ("gait-motion", "slip"): slip_table(land),
+        ("gaits", "motion"): motion_table(land),
+        ("gaits", "slip"): slip_table(land),
         ("swimming", "swimming"): swimming_table(_all(IN_WATER, 16.0)),
         ("climbing", "climbing"): climbing_table(_all(CLIMBING, 16.0)),
     }

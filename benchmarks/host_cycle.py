@@ -5,7 +5,7 @@ a user, with its log, on 16 servos that another process serves on a pseudo-termi
 this folder and of the other commit take turns. CPU time is that of all threads of the program, in
 a window of the run without its start and end. With ``--profile`` a sampling profiler (``py-spy``)
 shows instead in which functions the main thread of a gait spends its time. With ``--write`` it
-replaces the table of ``docs/benchmarks/host-cycle.md``.
+replaces the table of ``docs/how-to/small-computer.md``.
 """
 
 import argparse
@@ -228,7 +228,7 @@ def main() -> None:
         text = f"{provenance(command)} {load}\n\n{shares(samples)}"
         print(text)
         if given.write:
-            write_tables("host-cycle", "shares", text)
+            write_tables("how-to/small-computer", "shares", text)
         return
     found: dict[tuple[str, bool], list[Cost]] = defaultdict(list)
     with TemporaryDirectory() as folder:
@@ -244,7 +244,7 @@ def main() -> None:
     text = f"{provenance(command)} {load}\n\n{table(found, given.old)}"
     print(text)
     if given.write:
-        write_tables("host-cycle", "cost", text)
+        write_tables("how-to/small-computer", "cost", text)
 
 
 if __name__ == "__main__":

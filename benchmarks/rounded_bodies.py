@@ -70,7 +70,7 @@ def main() -> None:
     text = "\n".join([f"{provenance(command)} n = {given.seeds} seeds.", "", *lines])
     print(text)
     if given.write:
-        write_tables("simulate-many-robots", "rounded", text)
+        write_tables("how-to/simulate-many-robots", "rounded", text)
 
 
 def deviations(robot: str, gaits: tuple[str, ...], seeds: int) -> list[tuple[float, float, float]]:

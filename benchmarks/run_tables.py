@@ -1,10 +1,10 @@
 """Tables of pages that come from commands of a user.
 
-``python -m benchmarks.run_tables synthesis shipped-robots recordings policies`` runs the commands
-of four pages of ``docs/benchmarks`` with ``--json``, one process at a time, and prints their tables
-as Markdown. ``synthesis.share`` is one table of a page. With ``--write`` a table replaces the old
-one on its page. ``recordings`` needs ``--data DIR`` with the published recordings
-(``docs/recordings.md`` lists their sources).
+``python -m benchmarks.run_tables synthesis robots recordings policies`` runs the commands of four
+pages with ``--json``, one process at a time, and prints their tables as Markdown.
+``synthesis.share`` is one table of a page. With ``--write`` a table replaces the old one on its
+page. ``recordings`` needs ``--data DIR`` with the published recordings (``docs/recordings.md``
+lists their sources).
 """
 
 import argparse
@@ -358,7 +358,7 @@ def _synthesised(run: str, seed: int, options: Sequence[str]) -> Synthesised:
 TABLES: Final[Mapping[str, Callable[[Wanted], str]]] = {
     "synthesis.waypoints": waypoints,
     "synthesis.share": share,
-    "shipped-robots.robots": shipped_robots,
+    "robots.robots": shipped_robots,
     "recordings.slowing": slowing,
     "recordings.walks": walks,
     "policies.flat": policies_on_flat,

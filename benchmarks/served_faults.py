@@ -211,7 +211,7 @@ def main() -> None:
     ]
     print(*lines, sep="\n")
     if not given.only:
-        write_tables("run-faults", "served faults", "\n".join(lines))
+        write_tables("bus-faults", "served faults", "\n".join(lines))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 Only the simulation integrates energy. A real servo has samples of Present Current, just before the
 next goal. The current between them follows from goals and angles
-(``docs/benchmarks/gait-energy.md``).
+(``docs/gaits.md``).
 """
 
 from dataclasses import dataclass

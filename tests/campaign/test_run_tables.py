@@ -1,5 +1,6 @@
 """The tables that user commands fill: cells, choice of tables, and their places on pages."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,19 @@ def test_each_cell_has_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", TABLES)
 def test_each_table_has_its_place_on_a_page(name: str) -> None:
     page, mark = name.split(".")
+    text = page_of(page).read_text(encoding="utf-8")
+    assert text.index(f"<!-- {mark} begins -->") < text.index(f"<!-- {mark} ends -->")
+
+
+PLACES = sorted(
+    place
+    for source in Path(run_tables.__file__).parent.glob("*.py")
+    for place in re.findall(r'write_tables\("([^"]+)", "([^"]+)"', source.read_text("utf-8"))
+)
+
+
+@pytest.mark.parametrize(("page", "mark"), PLACES)
+def test_each_writer_names_a_page_with_its_marks(page: str, mark: str) -> None:
     text = page_of(page).read_text(encoding="utf-8")
     assert text.index(f"<!-- {mark} begins -->") < text.index(f"<!-- {mark} ends -->")
 

@@ -44,7 +44,7 @@ def test_the_table_has_a_row_for_each_motion_and_world(monkeypatch: pytest.Monke
     learnt, gait = found["table"]
     assert [learnt["motion"], gait["motion"]] == ["wave-cma", "lateral-undulation"]
     assert learnt["trips"] == gait["trips"] == 0
-    # the gait's figures of docs/benchmarks/gait-motion.md, with another friction
+    # the gait's figures of docs/gaits.md, with another friction
     assert gait["speed_m_s"] == pytest.approx(0.377, rel=0.05)
     assert gait["body_lengths_cycle"] == pytest.approx(0.633, rel=0.05)
     assert learnt["speed_m_s"] > 1.3 * gait["speed_m_s"]
