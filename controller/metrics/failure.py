@@ -151,7 +151,7 @@ def _of_climb(record: RunRecord, text: str) -> Failure:
     body_m = record.header.robot.length_m
     pose = record.pose
     replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
-    rows = np.flatnonzero((pose.pulse_m_s > 0.0) & (pose.time_s < replanned_s))
+    rows = np.flatnonzero(pose.time_s < replanned_s)
     if len(rows) > 1:
         due_m = np.arange(0.0, length_m(record.header.plan.path_m), 0.25 * body_m)
         slid_m, fall_rad = _slide(record, rows)

@@ -37,4 +37,7 @@ def test_a_load_is_no_false_trip_and_a_wrong_reason_is() -> None:
     load = row | {"trip": "joint yaw_03 (ID 3): -2.28 A for too long"}
     false = row | {"trip": "joint yaw_03 (ID 3): 0.12 rad from its goal: dead current sensor"}
     assert [is_false(each) for each in (row, load, false)] == [False, False, True]
+    blocked = "joint yaw_03 (ID 3): 0.54 rad from its goal for 0.30 s with {} A: it does not follow"
+    assert not is_false(row | {"trip": blocked.format("-2.04")})
+    assert is_false(row | {"trip": blocked.format("0.41")}), "such a current blocks no servo"
     assert "| stuck | 3 | 15 | 1 | 1 |" in table([row, load, false])

@@ -63,8 +63,9 @@ def test_a_waypoint_is_reached_by_what_the_camera_sees(tmp_path: Path) -> None:
     record = read_log(finished.log)
     assert record.header.run.pose == "camera"
     assert any(event.kind == "pose" for event in record.events)
-    stated = finished.summary.evidence["pose_position_sd_m"]
-    assert float(str(stated)) == pytest.approx(float(str(found["head_sigma_median_m"])), rel=0.5)
+    stated_m = float(str(finished.summary.evidence["pose_position_sd_m"]))
+    assert float(str(found["head_sigma_median_m"])) <= stated_m < 0.0094, "the largest of the run"
+    assert float(str(found["head_error_rms_m"])) < 2.0 * stated_m
 
 
 @pytest.mark.nightly("draws and searches a picture in every cycle: 6 s of CPU")

@@ -219,8 +219,14 @@ def test_a_body_whose_links_advance_while_it_stays_slips(record: RunRecord) -> N
     assert found.cause == "slip"
 
 
-def test_a_slide_off_a_level_path_is_told_before_the_climb_back(record: RunRecord) -> None:
-    """The body slides down across the hillside; then its new path climbs back, and it stays."""
+@pytest.mark.parametrize("walks_from_s", [0.0, 21.0])
+def test_a_slide_off_a_level_path_is_told_before_the_climb_back(
+    record: RunRecord, walks_from_s: float
+) -> None:
+    """The body slides down across the hillside; then its new path climbs back, and it stays.
+
+    A body may also slide off before its first wave.
+    """
     y_m = np.arange(-20.0, 20.0, 0.5)
     height_m = np.tile(np.tan(np.radians(20.0)) * y_m[:, None], (1, 66))
     log = made(record)
@@ -232,6 +238,7 @@ def test_a_slide_off_a_level_path_is_told_before_the_climb_back(record: RunRecor
         links_m=log.pose.links_m + aside_m,
         centre_m=log.pose.centre_m + aside_m[:, 0],
         path_s_m=np.full(len(time_s), 1.0),
+        pulse_m_s=np.where(time_s < walks_from_s, 0.0, log.pose.pulse_m_s),
     )
     back_m = np.array([[0.0, -2.0], [0.0, 8.0]])
     header = dataclasses.replace(log.header, ground=HeightField(height_m, 0.5, -1.0, -20.0))
