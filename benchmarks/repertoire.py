@@ -16,13 +16,16 @@ import numpy as np
 from benchmarks.rows import Row, cpu_s
 from benchmarks.search_cost import search_cost
 from snakewalk.config.ground import build_ground
+from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
+from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
-from snakewalk.controller.repertoire.crowd_film import SIZE_PX, CrowdScene
+from snakewalk.controller.repertoire.crowd_film import SIZE, SIZE_PX, CrowdScene, species_of
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.repertoire_planning import plan_route
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
+from snakewalk.controller.repertoire.species import Habit
 from snakewalk.sim.rendering.crowd_film import CrowdShot, CrowdView
 
 TITLE = "Repertoire: 17 links, 60 frames a second, one core"
@@ -96,8 +99,7 @@ def herd_frame_s(repertoire: Repertoire) -> float:
     """CPU time of a body-frame of a herd on hills before a camera, bodies laid on the ground."""
     ground = build_ground(load_world(HILLS))
     assert ground is not None, "a world with hills"
-    robot = load_robot(repertoire.robot)
-    scene = CrowdScene(repertoire, robot, ground, HERD, separate=False)
+    scene = scene_of(repertoire, ground, HERD, separate=False)
     best = float("inf")
     for _ in range(TRIES):
         scene.costs.motion_s = scene.costs.laying_s = 0.0
@@ -105,6 +107,20 @@ def herd_frame_s(repertoire: Repertoire) -> float:
             pass
         best = min(best, (scene.costs.motion_s + scene.costs.laying_s) / (SHOTS * HERD))
     return best
+
+
+def scene_of(
+    repertoire: Repertoire,
+    ground: HeightField,
+    bodies: int,
+    *,
+    detail: bool = True,
+    separate: bool = True,
+) -> CrowdScene:
+    """Return a herd that wanders on a ground."""
+    robot = load_robot(repertoire.robot)
+    herd = species_of(repertoire, robot, bodies, SIZE, Habit.WANDER, 0)
+    return CrowdScene(Wandering([herd], ground, separate=separate), ground, detail=detail)
 
 
 def drawing_s(repertoire: Repertoire) -> tuple[float, float, float, float]:
@@ -116,7 +132,7 @@ def drawing_s(repertoire: Repertoire) -> tuple[float, float, float, float]:
         CrowdView(robot, world, ground, DRAWN, SIZE_PX, tiled=tiled) for tiled in (False, True)
     ]
     shots = [
-        list(CrowdScene(repertoire, robot, ground, DRAWN, detail=detail).shots(SHOTS, 3))
+        list(scene_of(repertoire, ground, DRAWN, detail=detail).shots(SHOTS, 3))
         for detail in (False, True)
     ]
     shots += [[replace(shot, bodies=[]) for shot in shots[1]]] * 2

@@ -171,20 +171,11 @@ class Crowd:
                 self._first,
                 self._last,
                 self._bridge_length,
-                self.rotation,
-                self.origin_m,
+                self._balance_rad,
                 self.scale,
                 self.visible,
                 self.segment,
-                self.cycles,
-                self._playing,
-                self._next,
-                self._ended,
-                self._bridge_from,
-                self._bridge_frames,
-                self._bridge_remaining,
-                self._points,
-                self._balance_rad,
+                *self._state,
             )
 
 
@@ -213,25 +204,26 @@ def _balance(r: Floats, most: float) -> None:
 
 
 @compiled(
-    f"void({_ROWS}, {_ROWS}, {_LINKS}, int32[::1], int32[::1], int32[:, ::1], {_ROWS}, {_ROWS},"
-    " float64[::1], boolean[::1], int32[::1], int32[::1], int32[::1], int32[::1], boolean[::1],"
-    f" int32[::1], int32[::1], int32[::1], {_LINKS}, float64)",
+    f"void({_ROWS}, {_ROWS}, {_LINKS}, int32[::1], int32[::1], int32[:, ::1], float64,"
+    f" float64[::1], boolean[::1], int32[::1], {_ROWS}, {_ROWS}, int32[::1], int32[::1],"
+    f" int32[::1], boolean[::1], int32[::1], int32[::1], int32[::1], {_LINKS})",
     divides_by_zero=True,
     makes_arrays=False,
     fastmath=True,
 )
-def _step(
+def _step(  # noqa: C901  a compiled loop
     turn: Floats,
     move: Floats,
     shape: Singles,
     first: Int32s,
     last: Int32s,
     bridge: Int32s,
-    rotation: Floats,
-    origin: Floats,
+    balance: float,
     scale: Floats,
     visible: Bools,
     requested: Int32s,
+    rotation: Floats,
+    origin: Floats,
     cycles: Int32s,
     playing: Int32s,
     following: Int32s,
@@ -240,7 +232,6 @@ def _step(
     bridge_frames_of: Int32s,
     bridge_remaining: Int32s,
     points: Singles,
-    balance: float,
 ) -> None:
     """One frame of every body; plain numbers, for a slice in this loop costs more than its work."""
     lanes = shape.shape[2]
@@ -259,46 +250,25 @@ def _step(
                 cycles[b] = 0
                 following[b] = first[new]
         last_move = following[b]
-        s = scale[b]
         shown = visible[b]
         a = last_move
         share = 0.0
-        r00, r01, r02 = rotation[b, 0], rotation[b, 1], rotation[b, 2]
-        r10, r11, r12 = rotation[b, 3], rotation[b, 4], rotation[b, 5]
-        r20, r21, r22 = rotation[b, 6], rotation[b, 7], rotation[b, 8]
-        x, y, z = origin[b, 0], origin[b, 1], origin[b, 2]
         if shown and bridge_remaining[b] > 0:  # the shape goes over, the body frame stays
             a = bridge_from[b]
             share = (bridge_frames_of[b] - bridge_remaining[b] + 1.0) / (bridge_frames_of[b] + 1.0)
             bridge_remaining[b] -= 1
         else:
             bridge_remaining[b] = 0
-            u, v, w = s * move[last_move, 0], s * move[last_move, 1], s * move[last_move, 2]
-            x += r00 * u + r01 * v + r02 * w
-            y += r10 * u + r11 * v + r12 * w
-            z += r20 * u + r21 * v + r22 * w
-            t00, t01, t02 = turn[last_move, 0], turn[last_move, 1], turn[last_move, 2]
-            t10, t11, t12 = turn[last_move, 3], turn[last_move, 4], turn[last_move, 5]
-            t20, t21, t22 = turn[last_move, 6], turn[last_move, 7], turn[last_move, 8]
-            r00, r01, r02 = (
-                r00 * t00 + r01 * t10 + r02 * t20,
-                r00 * t01 + r01 * t11 + r02 * t21,
-                r00 * t02 + r01 * t12 + r02 * t22,
-            )
-            r10, r11, r12 = (
-                r10 * t00 + r11 * t10 + r12 * t20,
-                r10 * t01 + r11 * t11 + r12 * t21,
-                r10 * t02 + r11 * t12 + r12 * t22,
-            )
-            r20, r21, r22 = (
-                r20 * t00 + r21 * t10 + r22 * t20,
-                r20 * t01 + r21 * t11 + r22 * t21,
-                r20 * t02 + r21 * t12 + r22 * t22,
-            )
-            rotation[b, 0], rotation[b, 1], rotation[b, 2] = r00, r01, r02
-            rotation[b, 3], rotation[b, 4], rotation[b, 5] = r10, r11, r12
-            rotation[b, 6], rotation[b, 7], rotation[b, 8] = r20, r21, r22
-            origin[b, 0], origin[b, 1], origin[b, 2] = x, y, z
+            for k in range(3):
+                u, v, w = rotation[b, 3 * k], rotation[b, 3 * k + 1], rotation[b, 3 * k + 2]
+                away = u * move[last_move, 0] + v * move[last_move, 1] + w * move[last_move, 2]
+                origin[b, k] += scale[b] * away
+                for j in range(3):
+                    rotation[b, 3 * k + j] = (
+                        u * turn[last_move, j]
+                        + v * turn[last_move, 3 + j]
+                        + w * turn[last_move, 6 + j]
+                    )
             if last_move == last[playing[b]]:
                 ended[b] = True
                 following[b] = first[playing[b]]
@@ -306,17 +276,16 @@ def _step(
                 following[b] = last_move + 1
         if not shown:
             continue
-        x0, y0, z0 = np.float32(x), np.float32(y), np.float32(z)
-        f00, f01, f02 = np.float32(s * r00), np.float32(s * r01), np.float32(s * r02)
-        f10, f11, f12 = np.float32(s * r10), np.float32(s * r11), np.float32(s * r12)
-        f20, f21, f22 = np.float32(s * r20), np.float32(s * r21), np.float32(s * r22)
         p, q = np.float32(1.0 - share), np.float32(share)
-        for k in range(lanes):
-            dx, dy, dz = shape[a, 0, k], shape[a, 1, k], shape[a, 2, k]
-            if share != 0.0:
-                dx = p * dx + q * shape[last_move, 0, k]
-                dy = p * dy + q * shape[last_move, 1, k]
-                dz = p * dz + q * shape[last_move, 2, k]
-            points[b, 0, k] = x0 + f00 * dx + f01 * dy + f02 * dz
-            points[b, 1, k] = y0 + f10 * dx + f11 * dy + f12 * dz
-            points[b, 2, k] = z0 + f20 * dx + f21 * dy + f22 * dz
+        for k in range(3):
+            o = np.float32(origin[b, k])
+            f = np.float32(scale[b] * rotation[b, 3 * k])
+            g = np.float32(scale[b] * rotation[b, 3 * k + 1])
+            h = np.float32(scale[b] * rotation[b, 3 * k + 2])
+            for lane in range(lanes):
+                x, y, z = shape[a, 0, lane], shape[a, 1, lane], shape[a, 2, lane]
+                if share != 0.0:
+                    x = p * x + q * shape[last_move, 0, lane]
+                    y = p * y + q * shape[last_move, 1, lane]
+                    z = p * z + q * shape[last_move, 2, lane]
+                points[b, k, lane] = o + f * x + g * y + h * z

@@ -2,18 +2,19 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.arrays import Floats, Ints
+from snakewalk.config.arrays import Bools, Floats, Ints
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.species import Habit, Species
 from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
@@ -37,34 +38,23 @@ def detail_levels(view: ViewFrustum, centre_m: Floats, length_m: Floats) -> Ints
     return np.where(view.touches(centre_m, 0.5 * length_m), level, HIDDEN)
 
 
-@dataclass(frozen=True, slots=True)
-class DetailedChain:
-    """A body as detailed as it needs to be."""
-
-    body: int
-    level: int
-    points_m: Floats
-    """(n, 3) on the ground, head first: 4, one of two links, or all."""
-    radius_m: Floats
-    """(n,) radii of the body at its points."""
-
-
 class DetailedCrowd:
     """Lays the bodies of a crowd on a ground, each at its level."""
 
-    def __init__(self, ground: HeightField, radius_m: Floats) -> None:
-        """``radius_m`` (L,): half the recorded body's height at its links."""
+    def __init__(self, ground: HeightField, radius_m: Floats, swims: Bools) -> None:
+        """``radius_m`` (N, L): half the recorded bodies' heights; ``swims`` (N,): not laid down."""
         self._ground = ground
         self._radius_m = radius_m
+        self._swims = swims
         self._step = GroundStep(ground)
-        last = len(radius_m) - 1
+        last = radius_m.shape[1] - 1
         self._kept = {
             FAR: np.linspace(0, last, 4).round().astype(int),
             MIDDLE: np.arange(0, last + 1, 2),
         }
 
-    def chains(self, crowd: Crowd, levels: Ints) -> list[DetailedChain]:
-        """Return the bodies that are not hidden.
+    def chains(self, crowd: Crowd, levels: Ints) -> list[BodyChain]:
+        """Return the bodies that are not hidden, each with its number as its colour.
 
         Near ones stand on the ground by the half circle of [PT] 2.6.5, which keeps their lengths;
         of others each point is lifted onto the ground.
@@ -72,27 +62,29 @@ class DetailedCrowd:
         detailed_chains = []
         for body in np.flatnonzero(levels > HIDDEN).tolist():
             level = int(levels[body])
-            scale = float(crowd.scale[body])
-            links = crowd.link_m(body)
-            if level == NEAR:
-                radius = scale * self._radius_m
+            points = links = crowd.link_m(body)
+            radius = crowd.scale[body] * self._radius_m[body]
+            if level == NEAR and not self._swims[body]:
                 chord = links[:-1, :2] - links[1:, :2]
                 r = float(np.hypot(*chord.T).mean())
                 angles = np.arctan2(chord[:, 1], chord[:, 0])
                 points = self._step.place(angles, links[-1, :2], r, radius).points_m
-            else:
+            elif level != NEAR:
                 kept = self._kept[level]
                 points = links[kept]
-                radius = scale * self._radius_m[kept]
-                points[:, 2] = self._ground.elevation_m(points[:, 0], points[:, 1]) + radius
-            detailed_chains.append(DetailedChain(body, level, points, radius))
+                radius = radius[kept]
+                if not self._swims[body]:
+                    points[:, 2] = self._ground.elevation_m(points[:, 0], points[:, 1]) + radius
+            detailed_chains.append(BodyChain(points, radius, body, level - FAR))
         return detailed_chains
 
 
 FPS = 20
 SIZE_PX = (960, 540)
-SIZES = (0.22, 0.42)
-"""Lengths of the animals over the recorded robot's (ours): the world is a model of 9 m."""
+SIZE = 0.32
+"""Mean length of the animals over the recorded robot's (ours): the world is a model of 9 m."""
+_SPREAD = 0.3
+"""Largest difference of a size from the mean, as a share of it (ours)."""
 FLIGHT_S = 40.0
 """Time in which the camera circles the field."""
 
@@ -110,47 +102,34 @@ class CrowdCosts:
     """(4,) body-frames hidden, far, middle, near."""
 
 
+FOOD_KIND = 4
+"""Number of the colours of food."""
+_FOOD_M = np.array([[x, 0.0, 0.015] for x in (0.03, 0.01, -0.01, -0.03)])
+"""(4, 3) points of a piece of food about its place; their height is its radius (ours)."""
+
+
+def species_of(
+    repertoire: Repertoire, robot: RobotConfig, bodies: int, size: float, habit: Habit, seed: int
+) -> Species:
+    """Return bodies of random sizes about a mean, with the radii of a robot, thinner behind."""
+    links = repertoire.segments[0].link_m.shape[1]
+    along = np.arange(links) / (links - 1)
+    thin = 0.85 + 0.15 * np.sin(np.pi * np.minimum(along / 0.5, 1.0) / 2)
+    thin *= 1.0 - 0.7 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
+    radius_m = thin * np.array(robot.radii_m(2 * links + 1))[1::2]
+    sizes = np.random.default_rng(seed).uniform(1.0 - _SPREAD, 1.0 + _SPREAD, bodies)
+    return Species(repertoire, size * sizes, radius_m, habit)
+
+
 class CrowdScene:
-    """A crowd that wanders on a ground before a camera that flies around."""
+    """A crowd on a ground before a camera that flies around."""
 
-    def __init__(
-        self,
-        repertoire: Repertoire,
-        robot: RobotConfig,
-        ground: HeightField,
-        bodies: int,
-        *,
-        seed: int = 0,
-        detail: bool = True,
-        separate: bool = True,
-    ) -> None:
-        """Put the bodies on the ground.
-
-        Args:
-            repertoire: their actions.
-            robot: its radii are those of the bodies.
-            ground: under them.
-            bodies: how many.
-            seed: of places, sizes and choices.
-            detail: with culling and levels; else every body is drawn in full.
-            separate: bodies do not intersect.
-
-        Raises:
-            InputError: the ground is too small for the bodies.
-
-        """
-        sizes = np.random.default_rng(seed).uniform(*SIZES, bodies)
+    def __init__(self, wandering: Wandering, ground: HeightField, *, detail: bool = True) -> None:
+        """``detail``: with culling and levels; else every body is drawn in full."""
         self._ground = ground
         self._detail = detail
-        links = repertoire.segments[0].link_m.shape[1]
-        radii = np.array(robot.radii_m(2 * links + 1))[1::2]
-        along = np.arange(links) / (links - 1)
-        thin = 0.85 + 0.15 * np.sin(np.pi * np.minimum(along / 0.5, 1.0) / 2)
-        thin *= 1.0 - 0.7 * np.maximum(0.0, (along - 0.55) / 0.45) ** 1.5
-        self._chains = DetailedCrowd(ground, radii * thin)
-        self._wandering = Wandering(
-            repertoire, ground, sizes, seed=seed, radius_m=radii * thin if separate else None
-        )
+        self._chains = DetailedCrowd(ground, wandering.radius_m, wandering.swims)
+        self._wandering = wandering
         self.costs = CrowdCosts()
 
     def shots(self, frames: int, steps: int) -> Iterator[CrowdShot]:
@@ -158,6 +137,7 @@ class CrowdScene:
         wandering = self._wandering
         costs = self.costs
         crowd = wandering.crowd
+        is_mixed = wandering.species[-1] > 0  # then a colour is that of a species
         for k in range(frames):
             begun = time.process_time()
             lookat, distance, azimuth, elevation = self._camera(k / FPS)
@@ -166,8 +146,8 @@ class CrowdScene:
             )
             levels = np.full(len(crowd.scale), NEAR)
             if self._detail:
-                ground_m = self._ground.elevation_m(*crowd.origin_m[:, :2].T)
-                centre = np.column_stack([crowd.origin_m[:, :2], ground_m])
+                centre = crowd.origin_m.copy()
+                centre[:, 2] = np.maximum(centre[:, 2], self._ground.elevation_m(*centre[:, :2].T))
                 levels = detail_levels(frustum, centre, wandering.length_m)
             if self._wandering.separated is None:
                 crowd.visible[:] = levels > HIDDEN
@@ -175,22 +155,31 @@ class CrowdScene:
             wandering.step(steps)
             moved = time.process_time()
             chains = self._chains.chains(crowd, levels)
+            if is_mixed:
+                chains = [replace(of, kind=int(wandering.species[of.kind])) for of in chains]
             costs.frames += 1
             costs.motion_s += moved - culled
             costs.laying_s += time.process_time() - moved + culled - begun
             costs.levels += np.bincount(levels, minlength=4)
             near = int((levels == NEAR).sum())
+            food = [
+                BodyChain(place + _FOOD_M, np.full(len(_FOOD_M), _FOOD_M[0, 2]), FOOD_KIND, 0)
+                for place in self._food_m()
+            ]
             yield CrowdShot(
                 lookat,
                 distance,
                 azimuth,
                 elevation,
-                [
-                    BodyChain(chain.points_m, chain.radius_m, chain.body, chain.level - FAR)
-                    for chain in chains
-                ],
+                chains + food,
                 f"{len(chains)} of {len(levels)} bodies in view, {near} near",
             )
+
+    def _food_m(self) -> Floats:
+        """(F, 3) places of the food, which lies on the ground or floats in the water."""
+        food_m = self._wandering.food_m.copy()
+        food_m[:, 2] = np.maximum(food_m[:, 2], self._ground.elevation_m(*food_m[:, :2].T))
+        return food_m
 
     def _camera(self, time_s: float) -> tuple[Floats, float, float, float]:
         """Where the camera looks, from how far, and its two angles in degrees."""

@@ -12,7 +12,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.repertoire.segment import REVERSE, SIDES, Segment
 
 FORMAT = "snakewalk-repertoire-1"
-_HEAD = ("robot", "joint_axes", "world", "length_m", "law")
+_HEAD = ("robot", "joint_axes", "world", "length_m", "law", "swims")
 NO_LAW = "not stated"
 """Text for files without the law of friction."""
 _ARRAYS = ("turn", "move_m", "link_m", "link_rotation", "goal_rad", "joint_rad")
@@ -32,6 +32,8 @@ class Repertoire:
     segments: tuple[Segment, ...]
     law: str = NO_LAW
     """Law of friction of the recorded runs."""
+    swims: bool = False
+    """Whether the actions were recorded in water."""
 
     @property
     def frame_s(self) -> float:
@@ -112,7 +114,7 @@ def load_repertoire(path: Path) -> Repertoire:
         about = parse_json(str(arrays["about"]))
         if about.get("format") != FORMAT:
             raise InputError(f"{path}: format {about.get('format')}; expected {FORMAT}")
-        about.setdefault("law", NO_LAW)
+        about = {"law": NO_LAW, "swims": False} | about
         about = {key: about[key] for key in (*_HEAD, "segments")}
         segments = tuple(
             Segment(**plain, **{name: arrays[f"{k}/{name}"] for name in _ARRAYS})

@@ -94,10 +94,10 @@ def flat(world: WorldConfig) -> None:
         InputError: one line.
 
     """
-    if world.ground.kind != "flat":
+    if world.ground.kind not in {"flat", "water"}:
         raise InputError(
             f"world {world.name}: its ground is {world.ground.kind}; an action repeats itself "
-            "only on a flat one"
+            "only on a flat one or in water"
         )
 
 

@@ -71,8 +71,15 @@ def record(
     """
     check_supply(robot)
     segments = tuple(record_action(robot, world, action, on_progress) for action in actions)
-    law = world.friction.law_text
-    return Repertoire(robot.name, robot.joint_axes, world.name, robot.length_m, segments, law)
+    return Repertoire(
+        robot.name,
+        robot.joint_axes,
+        world.name,
+        robot.length_m,
+        segments,
+        world.friction.law_text,
+        world.ground.kind == "water",
+    )
 
 
 def record_action(

@@ -19,7 +19,7 @@ from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.route import RouteFollower
 from snakewalk.controller.repertoire.search import MotionPrimitives, Route
-from snakewalk.controller.run.prepared_run import pose_with
+from snakewalk.controller.run.prepared_run import pose_with, start_heading_rad
 from snakewalk.controller.run.request import RunResult
 from snakewalk.controller.run.results import by_evidence
 from snakewalk.controller.runlog.record import InitialPose, PlanSummary
@@ -133,14 +133,6 @@ class RouteMotion(MotionWrapper):
         if action is not None:
             self._on_event("action", self._names[action])
         return action
-
-
-def start_heading_rad(run: RunConfig) -> float:
-    """Start heading of the run, or else the direction of the first waypoint."""
-    if run.start_heading_rad is not None:
-        return run.start_heading_rad
-    x, y = np.subtract(run.waypoints_m[0], run.start_m)
-    return float(np.arctan2(y, x))
 
 
 def pose_of_action(

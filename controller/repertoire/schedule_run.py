@@ -20,6 +20,7 @@ from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.motion.wrapper import MotionWrapper
 from snakewalk.controller.repertoire.motion import RepertoireMotion
 from snakewalk.controller.repertoire.repertoire import Repertoire, load_repertoire
+from snakewalk.controller.repertoire.repertoire_planning import flat
 from snakewalk.controller.repertoire.search import plane_pose
 from snakewalk.controller.repertoire.secondary import SecondaryController
 from snakewalk.controller.run.prepared_run import PathlessRun, plan_without_path, pose_with
@@ -87,11 +88,7 @@ class ScheduleRun(PathlessRun):
         """
         loaded = load_repertoire(Path(self.config.file))
         loaded.check(self.robot)
-        if self.world.ground.kind != "flat":
-            raise InputError(
-                f"world {self.world.name}: its ground is {self.world.ground.kind}; an action "
-                "repeats itself only on a flat one"
-            )
+        flat(self.world)
         return loaded
 
     @property
@@ -126,7 +123,7 @@ class ScheduleRun(PathlessRun):
             InputError: the actions cannot be loaded, or have no such mean.
 
         """
-        fault = self._first_unreachable(is_constant=True) if self.config.patience is None else None
+        fault = self._first_unreachable(is_constant=True)
         if fault is not None:
             raise InputError(fault)
         return plan_without_path(self.run)

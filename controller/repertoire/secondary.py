@@ -1,6 +1,8 @@
 """The secondary controller ([YT] 5.1): from a requested speed and turn to a segment."""
 
+from copy import copy
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -9,17 +11,13 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.repertoire.mixture import CYCLES, Mixtures
 from snakewalk.controller.repertoire.repertoire import Repertoire
 
-_ALIKE = 0.1
-"""Turns that differ by less than this share of the largest one count as equal (ours)."""
-
 
 class SecondaryController:
     """Selects segments whose mean speed and turn over ten cycles are the requested ones.
 
-    With ``patience`` it repeats the nearest segment, and replaces it after that many cycles.
-    A requested speed has a direction: forward, backward, or at rest, which is below half of the
-    slowest recorded speed. A segment of another direction is selected only if this direction has
-    none.
+    With ``patience`` it replaces a segment that it repeats for that many cycles. A requested
+    speed has a direction: forward, backward, or at rest, which is below half of the slowest
+    recorded speed. A segment of another direction is selected only if this direction has none.
     """
 
     def __init__(
@@ -47,7 +45,8 @@ class SecondaryController:
         self._steady = np.flatnonzero(self._kinds != "brake")
         brakes = np.flatnonzero(self._kinds == "brake")
         self._brake = int(brakes[0]) if len(brakes) else None
-        self._speed_m_s = scale * np.array([segment.speed_m_s for segment in segments])
+        self._scale = scale
+        self._speed_m_s = np.array([segment.speed_m_s for segment in segments])
         self._turn_rad_s = np.array([segment.turn_rad_s for segment in segments])
         moves = self._kinds != "rest"
         self._direction = np.where(moves, np.sign(self._speed_m_s), 0.0).astype(int)
@@ -67,22 +66,21 @@ class SecondaryController:
         self._last: int | None = None
         self._repeats = 0
 
-    def nearest(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
-        """Return the nearest segment in the direction of the speed: by turn, then by speed."""
-        options = self._segments_of_direction(self._requested_direction(speed_m_s))
-        off = np.abs(self._turn_rad_s[options] - turn_rad_s)
-        near = options[off <= off.min() + _ALIKE * np.abs(self._turn_rad_s).max()]
-        return int(near[np.argmin(np.abs(self._speed_m_s[near] - speed_m_s))])
+    def of_size(self, scale: float, seed: int) -> Self:
+        """Return a new controller of a body of another size; it shares the mixtures."""
+        assert self._mixtures, "each direction has segments"
+        other = copy(self)
+        other._scale = scale
+        other._owed_cycles = np.zeros_like(self._owed_cycles)
+        other._random = np.random.default_rng(seed)
+        return other
 
     def choose(self, speed_m_s: float, turn_rad_s: float = 0.0) -> int:
         """Select the next cycle; a body that goes forward brakes before it rests.
 
         After ``patience`` equal ones a random other of the same kind and direction follows.
         """
-        if self._patience is None:
-            chosen = self._next_of_mixture(speed_m_s, turn_rad_s)
-        else:
-            chosen = self.nearest(speed_m_s, turn_rad_s)
+        chosen = self._next_of_mixture(speed_m_s / self._scale, turn_rad_s)
         if self._kinds[chosen] == "rest":
             # a brake goes forward, also after an action that does not
             last = self._last
@@ -105,15 +103,15 @@ class SecondaryController:
 
     def unreachable(self, speed_m_s: float, turn_rad_s: float) -> str:
         """Return the reachable speeds and turns in words; empty if a mixture meets both."""
-        asked = np.array([speed_m_s, turn_rad_s])
-        if self._mixtures[self._requested_direction(speed_m_s)].best(asked)[1] <= 1.0:
+        asked = np.array([speed_m_s / self._scale, turn_rad_s])
+        if self._mixtures[self._requested_direction(asked[0])].best(asked)[1] <= 1.0:
             return ""
         ranges = []
-        for axis, unit, other in (
-            (0, "m/s", f"{turn_rad_s:g} rad/s"),
-            (1, "rad/s", f"{speed_m_s:g} m/s"),
+        for axis, scale, unit, other in (
+            (0, self._scale, "m/s", f"{turn_rad_s:g} rad/s"),
+            (1, 1.0, "rad/s", f"{speed_m_s:g} m/s"),
         ):
-            means = (mixtures.span(axis, asked) for mixtures in self._mixtures.values())
+            means = (scale * mixtures.span(axis, asked) for mixtures in self._mixtures.values())
             ends = (np.round([span.min(), span.max()], 2) + 0.0 for span in means if len(span))
             spans = dict.fromkeys(
                 " to ".join(dict.fromkeys(f"{end:.2f}" for end in pair)) for pair in ends
@@ -124,8 +122,9 @@ class SecondaryController:
 
     def available(self) -> str:
         """Return name, speed and turn of all segments that can be selected, for a message."""
+        speed_m_s = self._scale * self._speed_m_s
         return ", ".join(
-            f"{self._names[k]} ({self._speed_m_s[k]:.2f} m/s, {self._turn_rad_s[k]:.2f} rad/s)"
+            f"{self._names[k]} ({speed_m_s[k]:.2f} m/s, {self._turn_rad_s[k]:.2f} rad/s)"
             for k in self._steady
         )
 

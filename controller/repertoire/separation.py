@@ -18,6 +18,7 @@ YIELDING_LENGTHS = 0.005
 """Sideways distance of a waiting body in a frame, body lengths (ours)."""
 _LINKS = "float32[:, :, ::1]"
 _ROW = "float64[::1]"
+_RADII = "float64[:, ::1]"
 
 
 class SeparatedCrowd:
@@ -26,12 +27,13 @@ class SeparatedCrowd:
     def __init__(self, crowd: Crowd, radius_m: Floats, length_m: float) -> None:
         """Separate bodies of a crowd.
 
-        ``radius_m`` (L,) are half the widths of the recorded body at its links, ``length_m`` is its
-        length. All bodies of the crowd have to be visible: the links of others are stale.
+        ``radius_m`` (L,) or (N, L) are half the widths of the recorded bodies at their links,
+        ``length_m`` is their length. All bodies of the crowd have to be visible: the links of
+        others are stale.
         """
         self._crowd = crowd
         self._length_m = length_m
-        self._radius_m = np.array(radius_m, dtype=float)
+        self._radius_m = radius_m * crowd.scale[:, None]
         self.blocker: Ints = np.full(len(crowd.scale), NONE)
         """(N,) the body that stops each body in this frame; -1: it moved."""
         self.met: Floats = np.zeros(len(crowd.scale))
@@ -60,7 +62,7 @@ class SeparatedCrowd:
     def _yield(self, body: int) -> None:
         """Shift a body away from the one that stops it, unless it would meet another one."""
         crowd = self._crowd
-        links = len(self._radius_m)
+        links = self._radius_m.shape[1]
         place = crowd.points_m[body, :2, round(self.met[body] * (links - 1))]
         other = crowd.points_m[self.blocker[body], :2, :links]
         away = place - other[:, np.linalg.norm(other.T - place, axis=1).argmin()]
@@ -68,22 +70,20 @@ class SeparatedCrowd:
         move = YIELDING_LENGTHS * crowd.scale[body] * self._length_m * away
         before = crowd.origin_m[body].copy(), crowd.points_m[body].copy()
         crowd.shift(body, move)
-        if not _is_clear(crowd.points_m, crowd.scale, self._radius_m, body):
+        if not _is_clear(crowd.points_m, self._radius_m, body, len(crowd.scale)):
             crowd.origin_m[body], crowd.points_m[body] = before
 
     def intersecting(self) -> Ints:
-        """(P, 2) pairs of bodies that intersect now."""
-        pairs = np.empty((len(self.held), 2), dtype=np.int64)
-        count = _find_pairs(self._crowd.points_m, self._crowd.scale, self._radius_m, pairs)
-        return pairs[:count]
+        """Return the bodies that intersect one of a smaller number now."""
+        points_m = self._crowd.points_m
+        bodies = range(len(points_m))
+        return np.flatnonzero([not _is_clear(points_m, self._radius_m, b, b) for b in bodies])
 
     def _bodies_to_return(self, old_m: Singles) -> Ints:
         """Mark further bodies that have to return to links ``old_m``, and return them."""
         blocker_before = self.blocker.copy()
         points = self._crowd.points_m
-        _stop(
-            points, old_m, self._crowd.scale, self._radius_m, blocker_before, self.blocker, self.met
-        )
+        _stop(points, old_m, self._radius_m, blocker_before, self.blocker, self.met)
         return np.flatnonzero(self.blocker != blocker_before)
 
 
@@ -116,10 +116,10 @@ def _segment_gap(
 
 @callable_in_loops
 def _meeting(
-    one: Singles, scale_one: float, other: Singles, scale_other: float, radius: Floats
+    one: Singles, radius_one: Floats, other: Singles, radius_other: Floats
 ) -> tuple[int, int]:
     """Links of two bodies that intersect, nearest to a head first; -1, -1 without such links."""
-    links = len(radius)
+    links = len(radius_one)
     for k in range(2 * links - 3):  # the sum of both link numbers
         for a in range(max(0, k - links + 2), min(k, links - 2) + 1):
             b = k - a
@@ -133,19 +133,19 @@ def _meeting(
                 other[0, b + 1],
                 other[1, b + 1],
             )
-            wide = scale_one * max(radius[a], radius[a + 1])
-            if gap < wide + scale_other * max(radius[b], radius[b + 1]):
+            wide = max(radius_one[a], radius_one[a + 1])
+            if gap < wide + max(radius_other[b], radius_other[b + 1]):
                 return a, b
     return NONE, NONE
 
 
 @callable_in_loops
-def _boxes(points: Singles, scale: Floats, radius: Floats) -> Floats:
+def _boxes(points: Singles, radius: Floats) -> Floats:
     """(N, 4) least and largest x and y of each body with its width."""
-    links = len(radius)
+    links = radius.shape[1]
     box = np.empty((len(points), 4))
     for b in range(len(points)):
-        wide = scale[b] * radius.max()
+        wide = radius[b].max()
         x, y = points[b, 0, :links], points[b, 1, :links]
         box[b, 0], box[b, 1] = x.min() - wide, x.max() + wide
         box[b, 2], box[b, 3] = y.min() - wide, y.max() + wide
@@ -159,35 +159,34 @@ def _boxes_are_apart(box: Floats, i: int, j: int) -> bool:
 
 
 @compiled(
-    f"void({_LINKS}, {_LINKS}, {_ROW}, {_ROW}, int64[::1], int64[::1], {_ROW})",
+    f"void({_LINKS}, {_LINKS}, {_RADII}, int64[::1], int64[::1], {_ROW})",
     divides_by_zero=True,
 )
 def _stop(
     points: Singles,
     old: Singles,
-    scale: Floats,
     radius: Floats,
     blocker_before: Ints,
     blocker: Ints,
     met: Floats,
 ) -> None:
     """Write into ``blocker`` the bodies that must return; those of ``blocker_before`` did."""
-    box = _boxes(points, scale, radius)
-    last = len(radius) - 1.0
+    box = _boxes(points, radius)
+    last = radius.shape[1] - 1.0
     for i in range(len(points)):
         for j in range(i):
             if (blocker_before[i] != NONE and blocker_before[j] != NONE) or _boxes_are_apart(
                 box, i, j
             ):
                 continue
-            at_i, at_j = _meeting(points[i], scale[i], points[j], scale[j], radius)
+            at_i, at_j = _meeting(points[i], radius[i], points[j], radius[j])
             if at_i == NONE:
                 continue
             if blocker_before[i] != NONE or blocker_before[j] != NONE:
                 stops_i = blocker_before[j] != NONE
             else:
-                by_i = _meeting(points[i], scale[i], old[j], scale[j], radius)[0] != NONE
-                by_j = _meeting(old[i], scale[i], points[j], scale[j], radius)[0] != NONE
+                by_i = _meeting(points[i], radius[i], old[j], radius[j])[0] != NONE
+                by_j = _meeting(old[i], radius[i], points[j], radius[j])[0] != NONE
                 stops_i = by_i if by_i != by_j else at_i <= at_j
             if stops_i:
                 blocker[i], met[i] = j, at_i / last
@@ -195,29 +194,13 @@ def _stop(
                 blocker[j], met[j] = i, at_j / last
 
 
-@compiled(f"boolean({_LINKS}, {_ROW}, {_ROW}, int64)", divides_by_zero=True)
-def _is_clear(points: Singles, scale: Floats, radius: Floats, i: int) -> bool:
-    box = _boxes(points, scale, radius)
-    for j in range(len(points)):
+@compiled(f"boolean({_LINKS}, {_RADII}, int64, int64)", divides_by_zero=True)
+def _is_clear(points: Singles, radius: Floats, i: int, others: int) -> bool:
+    """Whether a body intersects none of the first ``others`` bodies."""
+    box = _boxes(points, radius)
+    for j in range(others):
         if j == i or _boxes_are_apart(box, i, j):
             continue
-        if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
+        if _meeting(points[i], radius[i], points[j], radius[j])[0] != NONE:
             return False
     return True
-
-
-@compiled(f"int64({_LINKS}, {_ROW}, {_ROW}, int64[:, ::1])", divides_by_zero=True)
-def _find_pairs(points: Singles, scale: Floats, radius: Floats, pairs: Ints) -> int:
-    """Write the pairs that intersect into ``pairs``, as many as it holds; return their number."""
-    box = _boxes(points, scale, radius)
-    count = 0
-    for i in range(len(points)):
-        for j in range(i):
-            if count == len(pairs):
-                return count
-            if _boxes_are_apart(box, i, j):
-                continue
-            if _meeting(points[i], scale[i], points[j], scale[j], radius)[0] != NONE:
-                pairs[count, 0], pairs[count, 1] = i, j
-                count += 1
-    return count

@@ -70,6 +70,14 @@ class PreparedRun(Protocol):
         ...
 
 
+def start_heading_rad(run: RunConfig) -> float:
+    """Start heading of the run, or else the direction of the first waypoint."""
+    if run.start_heading_rad is not None:
+        return run.start_heading_rad
+    x, y = np.subtract(run.waypoints_m[0], run.start_m)
+    return float(np.arctan2(y, x))
+
+
 def pose_with(robot: RobotConfig, heading_rad: float, joint_rad: Floats) -> InitialPose:
     """Return the pose with joint angles (J,) and the mean heading ``heading_rad``."""
     return InitialPose(heading_rad - mean_heading_rad(robot, joint_rad), joint_rad)

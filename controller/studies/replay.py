@@ -14,10 +14,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.ground import build_ground
 from snakewalk.controller.kinematics.links import body_in_world
 from snakewalk.controller.metrics.comparison import Comparison, compare
-from snakewalk.controller.repertoire import repertoire_run
 from snakewalk.controller.run.backend import Backend
 from snakewalk.controller.run.external.simulated_backend import simulated
 from snakewalk.controller.run.factory import prepare_run
+from snakewalk.controller.run.prepared_run import start_heading_rad
 from snakewalk.controller.runlog.evidence import evidence_of_old_log
 from snakewalk.controller.runlog.record import Header, InitialPose, RunRecord
 from snakewalk.controller.runlog.topics import PoseTable
@@ -148,5 +148,5 @@ def _start_heading_rad(header: Header) -> float:
     if run.motion == "source":
         return run.start_heading_rad or 0.0
     if run.motion == "repertoire":
-        return repertoire_run.start_heading_rad(run)
+        return start_heading_rad(run)
     return prepare_run(run, header.robot, header.world).start_heading_rad

@@ -1,7 +1,8 @@
 """The panels next to the scene: state, a row of bars for each servo, curves over time, events."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
+from typing import Any
 
 import numpy as np
 import viser
@@ -34,7 +35,13 @@ _LEVELS = {"info": _INK, "warning": _WARN, "error": _BAD_COLOUR}
 class Dashboard:
     """Panels of one run."""
 
-    def __init__(self, server: viser.ViserServer, header: Header) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        header: Header,
+        switches: Mapping[str, viser.SceneNodeHandle],
+    ) -> None:
+        """Add the panels; ``switches`` are nodes of the scene that a checkbox hides."""
         self._robot = header.robot
         self._run = header.run
         safety = header.run.safety
@@ -62,6 +69,9 @@ class Dashboard:
             hint="amber, where joints should be",
             visible=not self.checks_pose,
         )
+        with gui.add_folder("show", expand_by_default=False):
+            for label, node in switches.items():
+                gui.add_checkbox(label, True).on_update(_hiding(node))
         self.tabs = tabs = gui.add_tab_group()
         if self.checks_pose:
             with tabs.add_tab("pose"):
@@ -231,6 +241,15 @@ def _feed_lines(events: Sequence[Event]) -> str:
         f"<div style='padding:.15em .8em;color:{colour}'>{escape(text)}</div>"
         for colour, text in lines
     )
+
+
+def _hiding(node: viser.SceneNodeHandle) -> Callable[[viser.GuiEvent[Any]], None]:
+    """Callback of a checkbox that shows or hides a node."""
+
+    def hide(event: viser.GuiEvent[Any]) -> None:
+        node.visible = event.target.value
+
+    return hide
 
 
 def _plot(

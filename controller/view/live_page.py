@@ -244,7 +244,7 @@ class _LivePage:
         with self._server.atomic():
             self._scene = BodyScene(self._server, header)
             self._scene.first_camera()
-            self._dashboard = Dashboard(self._server, header)
+            self._dashboard = Dashboard(self._server, header, self._scene.switches)
         self._show_gait()
         self._take_waypoints()
         self._gamepad_panel = GamepadPanel(self._server, self._dashboard.tabs, self._gamepad)

@@ -14,7 +14,7 @@ from snakewalk.controller.metrics.summary import summary
 from snakewalk.controller.metrics.verdict import verdict
 from snakewalk.controller.runlog.record import RunRecord
 from snakewalk.controller.view.dashboard import Dashboard
-from snakewalk.controller.view.page_server import float_above, open_page
+from snakewalk.controller.view.page_server import float_above, served_page
 from snakewalk.controller.view.scene import BodyScene
 from snakewalk.drivers.clock import Clock
 
@@ -49,10 +49,7 @@ class LogPage:
                 raise InputError(
                     f"{name}: it ends before the first control cycle: there is nothing to show"
                 )
-        try:
-            self.server, self.url = open_page(host, port)
-        except OSError as fault:
-            raise InputError(f"--view-at {host}:{port}: {fault.strerror or fault}") from None
+        self.server, self.url = served_page(host, port)
         first = next(iter(records.values()))
         self._begin_s = _begin_s(first)
         longest_s = max(
@@ -82,7 +79,7 @@ class LogPage:
         for number, (name, record) in enumerate(records.items()):
             scene = BodyScene(self.server, record.header, number)
             with nullcontext() if tabs is None else tabs.add_tab(name):
-                board = Dashboard(self.server, record.header)
+                board = Dashboard(self.server, record.header, scene.switches)
             if not board.checks_pose:
                 board.show_verdict(verdict(record, summary(record)))
             self._shown.append(_ShownLog(record, scene, board))

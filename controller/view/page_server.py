@@ -7,6 +7,7 @@ from io import StringIO
 
 import viser
 
+from snakewalk.config.errors import InputError
 from snakewalk.controller.view.fresh_line import Freshness
 from snakewalk.controller.view.gate import Gate, Insert
 
@@ -43,6 +44,19 @@ def open_page(
     server.gui.main_panel.dock_right()
     server.gui.set_panel_label("snakewalk")
     return server, f"http://{_in_url(host)}:{server.get_port()}/?token={gate.token}"
+
+
+def served_page(host: str, port: int) -> tuple[viser.ViserServer, str]:
+    """Serve an empty page as ``open_page`` does.
+
+    Raises:
+        InputError: nothing can be served there.
+
+    """
+    try:
+        return open_page(host, port)
+    except OSError as fault:
+        raise InputError(f"--view-at {host}:{port}: {fault.strerror or fault}") from None
 
 
 def _in_url(host: str) -> str:

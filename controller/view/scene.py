@@ -69,6 +69,11 @@ class BodyScene:
         self._ground = header.ground
         self._limit_a = header.run.safety.current_limit_of_a(header.robot)
         self._frame = self._scene.add_frame(self._root, show_axes=False)
+        self._marks = f"{self._root}/marks"
+        self.switches: dict[str, viser.SceneNodeHandle] = {
+            "waypoints, path and trail": self._scene.add_frame(self._marks, show_axes=False)
+        }
+        """Nodes that a user may hide, by their labels."""
         self._paths = 0
         self._reached = -1
         self._waypoints_m: Floats = np.zeros((0, 2))
@@ -76,7 +81,7 @@ class BodyScene:
         self._axes = self._draw_axes() if header.backend == POSE_CHECK else None
         self._scene.set_up_direction("+z")
         self._draw_ground()
-        self._draw_water()
+        draw_water(self._scene, f"{self._root}/water", water_surface_m(header.world, self._ground))
         self._draw_obstacle()
         links = self._robot.link_count
         colors = [_LINKS[number % 2][k % 2] for k in range(links)]
@@ -96,6 +101,7 @@ class BodyScene:
             axes = self._scene.add_frame(
                 f"{self._root}/axes_{name}", axes_length=length_m, axes_radius=0.02 * length_m
             )
+            self.switches[f"axes of the {name}"] = axes
         return axes
 
     def show(self, record: RunRecord, cycle: int, pose: int, *, follow: bool, goals: bool) -> None:
@@ -140,7 +146,7 @@ class BodyScene:
             return
         self._paths = laid
         for number, (_, points_m) in enumerate(paths):
-            name = f"{self._root}/paths/{number}"
+            name = f"{self._marks}/paths/{number}"
             if number < laid and len(points_m) > 1:
                 new = number == laid - 1
                 self._line(name, points_m, _PATH if new else _OLD_PATH, _LINE if new else 1.5)
@@ -152,30 +158,14 @@ class BodyScene:
         finite_values = centre_m[np.isfinite(centre_m).all(axis=1)]
         step = max(1, len(finite_values) // _TRAIL_POINTS)
         if len(finite_values) > step:
-            self._line(f"{self._root}/trail", finite_values[::step, :2], _TRAIL, 2.0)
+            self._line(f"{self._marks}/trail", finite_values[::step, :2], _TRAIL, 2.0)
 
     def ground_m(
         self, origin_m: Sequence[float], direction: Sequence[float]
     ) -> tuple[float, float] | None:
         """X and y of the drawn ground where a ray of the page meets it; None where it does not."""
         at_m = np.asarray(origin_m, float) - self._frame.position
-        along = np.asarray(direction, float) / max(float(np.linalg.norm(direction)), 1e-9)
-        points_m = at_m + np.arange(0.0, _VISIBLE_M, _RAY_STEP_M)[:, None] * along
-        above_m = points_m[:, 2] - self._height_m(points_m[:, :2])
-        below = np.flatnonzero((above_m <= 0.0) & self._is_drawn(points_m[:, :2]))
-        if not len(below) or below[0] == 0:
-            return None
-        before, behind = above_m[below[0] - 1 : below[0] + 1]
-        if before <= 0.0:  # from below, or through the border
-            return None
-        ground_point = points_m[below[0]] - along * _RAY_STEP_M * behind / (behind - before)
-        return float(ground_point[0]), float(ground_point[1])
-
-    def _is_drawn(self, points_m: Floats) -> Bools:
-        """Which of points (n, 2) lie on the ground that is drawn."""
-        if self._ground is None:
-            return np.asarray((np.abs(points_m) <= 0.5 * _FLOOR_M).all(axis=1))
-        return self._ground.contains(points_m[:, 0], points_m[:, 1])
+        return ground_hit_m(self._ground, at_m, direction)
 
     def release(self) -> None:
         """Put the ground back where it is: the camera no longer follows."""
@@ -252,29 +242,16 @@ class BodyScene:
             )
             return
         self._floor = self._scene.add_mesh_trimesh(
-            f"{self._root}/ground", _ground_mesh(self._ground)
+            f"{self._root}/ground", ground_mesh(self._ground)
         )
         lines_m = contours_m(self._ground, contour_step_m(self._ground))
         if len(lines_m):
-            self._scene.add_line_segments(
+            self.switches["contours"] = self._scene.add_line_segments(
                 f"{self._root}/ground/contours",
                 lines_m + np.array([0.0, 0.0, _CONTOUR_ABOVE_M]),
                 _CONTOUR,
                 thickness=1.5,
                 thickness_units="screen",
-            )
-
-    def _draw_water(self) -> None:
-        surface_m = water_surface_m(self._header.world, self._ground)
-        if surface_m is not None:
-            middle_m, size_m = surface_m
-            self._scene.add_box(
-                f"{self._root}/water",
-                color=_WATER,
-                dimensions=(*size_m.tolist(), 0.002),
-                opacity=0.25,
-                position=tuple(middle_m),
-                cast_shadow=False,
             )
 
     def _draw_obstacle(self) -> None:
@@ -314,7 +291,7 @@ class BodyScene:
         heights_m = self._height_m(self._waypoints_m)
         for number, (point_m, z_m) in enumerate(zip(self._waypoints_m, heights_m, strict=True)):
             position = (float(point_m[0]), float(point_m[1]), float(z_m))
-            name = f"{self._root}/waypoints/{number}"
+            name = f"{self._marks}/waypoints/{number}"
             self._waypoints.append(
                 self._scene.add_mesh_simple(
                     name,
@@ -337,9 +314,51 @@ class BodyScene:
         )
 
     def _height_m(self, points_m: Floats) -> Floats:
-        if self._ground is None:
-            return np.zeros(len(points_m))
-        return self._ground.elevation_m(points_m[:, 0], points_m[:, 1])
+        return _height_m(self._ground, points_m)
+
+
+def draw_water(scene: viser.SceneApi, name: str, surface_m: tuple[Floats, Floats] | None) -> None:
+    """Draw a surface of water with a centre (3,) and a size (2,), if there is one."""
+    if surface_m is not None:
+        middle_m, size_m = surface_m
+        scene.add_box(
+            name,
+            color=_WATER,
+            dimensions=(*size_m.tolist(), 0.002),
+            opacity=0.25,
+            position=tuple(middle_m),
+            cast_shadow=False,
+        )
+
+
+def ground_hit_m(
+    ground: HeightField | None, at_m: Floats, direction: Sequence[float]
+) -> tuple[float, float] | None:
+    """X and y where a ray from ``at_m`` (3,) meets the drawn ground; None where it does not."""
+    along = np.asarray(direction, float) / max(float(np.linalg.norm(direction)), 1e-9)
+    points_m = at_m + np.arange(0.0, _VISIBLE_M, _RAY_STEP_M)[:, None] * along
+    above_m = points_m[:, 2] - _height_m(ground, points_m[:, :2])
+    below = np.flatnonzero((above_m <= 0.0) & _is_drawn(ground, points_m[:, :2]))
+    if not len(below) or below[0] == 0:
+        return None
+    before, behind = above_m[below[0] - 1 : below[0] + 1]
+    if before <= 0.0:  # from below, or through the border
+        return None
+    ground_point = points_m[below[0]] - along * _RAY_STEP_M * behind / (behind - before)
+    return float(ground_point[0]), float(ground_point[1])
+
+
+def _is_drawn(ground: HeightField | None, points_m: Floats) -> Bools:
+    """Which of points (n, 2) lie on the ground that is drawn."""
+    if ground is None:
+        return np.asarray((np.abs(points_m) <= 0.5 * _FLOOR_M).all(axis=1))
+    return ground.contains(points_m[:, 0], points_m[:, 1])
+
+
+def _height_m(ground: HeightField | None, points_m: Floats) -> Floats:
+    if ground is None:
+        return np.zeros(len(points_m))
+    return ground.elevation_m(points_m[:, 0], points_m[:, 1])
 
 
 def _place(links: viser.BatchedMeshHandle, body: BodyView, above_m: float = 0.0) -> None:
@@ -370,7 +389,8 @@ def _mesh_of(part: Solid) -> trimesh.Trimesh:
     return mesh
 
 
-def _ground_mesh(field: HeightField) -> trimesh.Trimesh:
+def ground_mesh(field: HeightField) -> trimesh.Trimesh:
+    """Return the ground, coloured by height."""
     corners_m, faces = surface(field)
     height = corners_m[:, 2]
     share = (height - height.min()) / max(float(np.ptp(height)), 1e-9)

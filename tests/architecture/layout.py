@@ -21,8 +21,8 @@ BETWEEN_FEATURES: Final[dict[tuple[str, str], str]] = {
     ("animals", "report"): "an animated skin is drawn by the film of a run",
     ("cameras", "view"): "camera check shows its findings on the live page",
     ("learning", "studies"): "policies are compared by the measures of a sweep",
+    ("repertoire", "view"): "a crowd is steered on the page",
     ("ros", "exchange"): "a live node and an exported bag have the same messages",
-    ("studies", "repertoire"): "a replay begins where the recorded actions begin",
     ("view", "bench"): "the demonstration compiles the loops while a recorded run plays",
     ("view", "studies"): "a page of several logs shows their comparison",
 }

@@ -1,4 +1,4 @@
-"""``snakewalk view``: a log in the browser, in 3-D, with a time slider."""
+"""``snakewalk view``: a log or a glTF in the browser, in 3-D."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +12,7 @@ from snakewalk.controller.console.options import VIEW_AT, ViewAt
 from snakewalk.controller.studies.run_comparison import log_names
 from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.log_page import LogPage, play
+from snakewalk.controller.view.model_page import open_model
 from snakewalk.drivers.clock import WallClock
 
 _MOST_LOGS = 2
@@ -19,22 +20,22 @@ _MOST_LOGS = 2
 
 @command(
     "view",
-    examples=("view runs/flat-square-walk-seed0/log.mcap", "gait run sidewinding --view"),
+    examples=("view runs/flat-square-walk-seed0/log.mcap", "view place.glb"),
 )
 def view(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            metavar="LOG [LOG]",
-            help="log.mcap of a run, or the .part of a killed one; or of two runs",
+            metavar="FILE [LOG]",
+            help="log.mcap of a run, the .part of a killed one, two of them, or a glTF (.glb)",
         ),
     ],
     view_at: ViewAt = VIEW_AT,
 ) -> None:
-    """Show a log in the browser: body, path, servos and curves.
+    """Show a log in the browser: body, path, servos and curves; or play a glTF.
 
     A slider sets the time. ^C ends it. Two logs are shown side by side, or over each other if they
-    have the same ground.
+    have the same ground. The camera flies through a glTF of a place.
 
     To watch a run, use --view of run, gait run and play.
     """
@@ -43,6 +44,10 @@ def view(
         raise InputError(
             f"{len(logs)} logs: the page shows one or two; more: snakewalk log compare"
         )
+    if len(logs) == 1 and logs[0].suffix.lower() == ".glb":
+        server, url = open_model(logs[0], host, port)
+        print(f"{url}  (^C ends)", flush=True)
+        server.sleep_forever()
     records = {}
     for log, name in zip(logs, log_names(logs), strict=True):
         records[name] = open_log(log).from_torque_on()

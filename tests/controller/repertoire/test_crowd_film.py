@@ -24,6 +24,7 @@ from snakewalk.controller.repertoire.crowd_film import (
     film_crowd,
 )
 from snakewalk.controller.repertoire.repertoire import Repertoire
+from snakewalk.controller.repertoire.species import Habit, Species
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 
@@ -32,6 +33,11 @@ def hills() -> HeightField:
     ground = build_ground(load_world("jacksboro-basin"))
     assert ground is not None
     return ground
+
+
+def species(repertoire: Repertoire, bodies: int, habit: Habit = Habit.WANDER) -> Species:
+    """Bodies of 0.3 times the recorded length."""
+    return Species(repertoire, np.full(bodies, 0.3), np.full(17, 0.025), habit)
 
 
 def test_no_body_of_which_a_part_is_in_view_is_culled_and_most_others_are() -> None:
@@ -72,18 +78,18 @@ def test_levels_fall_with_the_distance() -> None:
 def test_bodies_lie_on_the_ground_and_near_ones_keep_their_length(
     repertoire: Repertoire, hills: HeightField
 ) -> None:
-    wandering = Wandering(repertoire, hills, np.full(12, 0.3), seed=2)
+    wandering = Wandering([species(repertoire, 12)], hills, seed=2, separate=False)
     wandering.step(60)
-    laid = DetailedCrowd(hills, np.full(17, 0.025))
+    laid = DetailedCrowd(hills, wandering.radius_m, wandering.swims)
     levels = np.arange(12) % 4
     chains = laid.chains(wandering.crowd, levels)
-    assert [chain.level for chain in chains] == [level for level in levels if level != HIDDEN]
+    assert [chain.level + FAR for chain in chains] == [k for k in levels if k != HIDDEN]
     for chain in chains:
         over = chain.points_m[:, 2] - hills.elevation_m(*chain.points_m[:, :2].T)
         np.testing.assert_allclose(over, chain.radius_m, atol=1e-9)
-        assert len(chain.points_m) == {FAR: 4, MIDDLE: 9, NEAR: 17}[chain.level]
-        if chain.level == NEAR:
-            links = wandering.crowd.link_m(chain.body)
+        assert len(chain.points_m) == {FAR: 4, MIDDLE: 9, NEAR: 17}[chain.level + FAR]
+        if chain.level + FAR == NEAR:
+            links = wandering.crowd.link_m(chain.kind)
             flat = np.linalg.norm(np.diff(links[:, :2], axis=0), axis=1)
             steps = np.linalg.norm(np.diff(chain.points_m, axis=0), axis=1)
             np.testing.assert_allclose(steps, flat.mean(), rtol=1e-6)
@@ -93,7 +99,9 @@ def test_bodies_lie_on_the_ground_and_near_ones_keep_their_length(
 def test_they_wander_within_the_field_apart_from_each_other_and_alike_for_a_seed(
     repertoire: Repertoire, hills: HeightField
 ) -> None:
-    one, two = (Wandering(repertoire, hills, np.full(40, 0.3), seed=5) for _ in range(2))
+    one, two = (
+        Wandering([species(repertoire, 40)], hills, seed=5, separate=False) for _ in range(2)
+    )
     start = one.crowd.origin_m.copy()
     for _ in range(10):
         one.step(60)
@@ -111,13 +119,13 @@ def test_they_wander_within_the_field_apart_from_each_other_and_alike_for_a_seed
 def test_a_ground_that_is_all_steep_is_refused(repertoire: Repertoire) -> None:
     steep = HeightField(np.outer(np.ones(4), [0.0, 2.0, 4.0, 6.0]), 1.0, 0.0, 0.0)
     with pytest.raises(InputError, match="nowhere under"):
-        Wandering(repertoire, steep, np.ones(3))
+        Wandering([species(repertoire, 3)], steep)
 
 
 @pytest.mark.nightly("a film of many bodies: 11 s of CPU")
 def test_a_film_is_drawn(repertoire: Repertoire, hills: HeightField, tmp_path: Path) -> None:
     robot, world = load_robot("yaw16"), load_world("jacksboro-basin")
-    scene = CrowdScene(repertoire, robot, hills, 8)
+    scene = CrowdScene(Wandering([species(repertoire, 8)], hills), hills)
     film = tmp_path / "a.mp4"
     view = CrowdView(robot, world, hills, 8, SIZE_PX)
     assert film_crowd(scene, view, film, seconds=0.1, frame_s=repertoire.frame_s) == 2
@@ -129,10 +137,13 @@ def test_bad_input_of_the_command_is_said(tmp_path: Path, repertoire: Repertoire
     file = tmp_path / "r.npz"
     repertoire.save(file)
     for given, said in (
-        ({"file": tmp_path / "none.npz"}, "no such file"),
+        ({"files": [tmp_path / "none.npz"]}, "no such file"),
+        ({"bodies": [1, 2]}, "--bodies: 2 values for 1 files"),
         ({"out": tmp_path / "a.png"}, "ends in .mp4"),
         ({"world": "flat"}, "has no hills"),
     ):
         with pytest.raises(InputError, match=said):
-            crowd(**{"file": file, "world": "jacksboro-basin", "out": tmp_path / "a.mp4"} | given)
+            crowd(
+                **{"files": [file], "world": "jacksboro-basin", "out": tmp_path / "a.mp4"} | given
+            )
     assert [path.name for path in tmp_path.iterdir()] == ["r.npz"]

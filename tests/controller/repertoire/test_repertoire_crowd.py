@@ -125,17 +125,21 @@ def test_a_body_that_goes_brakes_before_it_rests(repertoire: Repertoire) -> None
 
 def test_a_body_twice_as_long_goes_twice_as_fast_by_the_same_action(repertoire: Repertoire) -> None:
     names = [segment.name for segment in repertoire.segments]
-    assert names[SecondaryController(repertoire, scale=2.0).nearest(0.75)] == "forward-medium"
-    assert names[SecondaryController(repertoire).nearest(0.75)] == "forward-fast"
+    control = SecondaryController(repertoire)
+    assert names[control.of_size(2.0, 0).choose(0.75)] == "forward-medium"
+    assert names[control.choose(0.75)] == "forward-fast"
 
 
 def test_the_controller_picks_by_speed_and_by_turn(repertoire: Repertoire) -> None:
-    control = SecondaryController(repertoire)
     names = [segment.name for segment in repertoire.segments]
-    assert names[control.nearest(0.35)] == "forward-medium"
-    assert names[control.nearest(9.0)] == "forward-fast"
-    assert names[control.nearest(0.6, 0.4)] == "left-gentle"
-    assert names[control.nearest(0.6, -2.0)] == "right-sharp"
+
+    def first(*asked: float) -> str:
+        return names[SecondaryController(repertoire).choose(*asked)]
+
+    assert first(0.35) == "forward-medium"
+    assert first(9.0) == "forward-fast"
+    assert first(0.6, 0.4) == "left-gentle"
+    assert first(0.6, -2.0) == "right-sharp"
 
 
 @pytest.mark.parametrize(
@@ -144,7 +148,7 @@ def test_the_controller_picks_by_speed_and_by_turn(repertoire: Repertoire) -> No
         ((-0.4, 0.3), "reverse", "with 0.3 rad/s: 0.42 to 0.59 m/s; with -0.4 m/s: 0.00 rad/s"),
         ((-0.4, 0.03), "reverse", ""),
         ((0.0, 0.9), "rest", "with 0.9 rad/s: 0.54 to 0.55 m/s; with 0 m/s: 0.00 rad/s"),
-        ((0.4, 0.3), "left-gentle", ""),
+        ((0.4, 0.3), "forward-medium", ""),
         ((0.4, 0.1), "forward-medium", ""),
     ],
 )
@@ -152,7 +156,7 @@ def test_no_turn_changes_the_direction_of_travel(
     repertoire: Repertoire, asked: tuple[float, float], name: str, others: str
 ) -> None:
     control = SecondaryController(repertoire)
-    assert repertoire.segments[control.nearest(*asked)].name == name
+    assert repertoire.segments[control.choose(*asked)].name == name
     assert control.unreachable(*asked) == others
 
 
@@ -165,7 +169,7 @@ def test_slow_turns_and_turns_of_a_body_that_goes_backward(repertoire: Repertoir
     assert not both.contradictions()
     control = SecondaryController(both)
     asked = [(0.3, 0.3), (0.3, -0.3), (-0.3, 0.3), (-0.3, -0.3), (-0.4, 0.0), (0.6, 0.4)]
-    chosen = [both.segments[control.nearest(*one)].name for one in asked]
+    chosen = [both.segments[SecondaryController(both).choose(*one)].name for one in asked]
     assert chosen == [
         *("left-slow", "right-slow", "reverse-left", "reverse-right", "reverse", "left-gentle"),
     ]

@@ -12,6 +12,7 @@ from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.separation import NONE, SeparatedCrowd
+from snakewalk.controller.repertoire.species import Species
 
 pytestmark = pytest.mark.costs("the first test compiles the loops of a crowd")
 
@@ -73,18 +74,23 @@ def test_compiled_loops_find_what_python_finds(repertoire: Repertoire) -> None:
         crowd.place(body, Frame.flat(*at, random.uniform(-3, 3)), scale=random.uniform(0.4, 1.0))
     crowd.step()
     found = SeparatedCrowd(crowd, RADIUS_M, repertoire.length_m).intersecting().tolist()
-    expected = []
+    expected = set()
+    pairs = 0
     for i in range(12):
         for j in range(i):
             one, other = crowd.link_m(i), crowd.link_m(j)
             near = gap_m(one, other) < 0.025 * (crowd.scale[i] + crowd.scale[j])
-            expected += [[i, j]] if near else []
+            pairs += near
+            expected |= {i} if near else set()
             plain = separation._meeting(
-                crowd.points_m[i], crowd.scale[i], crowd.points_m[j], crowd.scale[j], RADIUS_M
+                crowd.points_m[i],
+                RADIUS_M * crowd.scale[i],
+                crowd.points_m[j],
+                RADIUS_M * crowd.scale[j],
             )
-            assert (plain[0] != NONE) == ([i, j] in found)
-    assert len(expected) > 5
-    assert found == expected
+            assert (plain[0] != NONE) == near
+    assert pairs > 5
+    assert found == sorted(expected)
 
 
 def test_an_interrupted_body_goes_on_from_its_own_shape(repertoire: Repertoire) -> None:
@@ -104,18 +110,20 @@ def test_an_interrupted_body_goes_on_from_its_own_shape(repertoire: Repertoire) 
 def test_a_crowd_wanders_without_intersections(repertoire: Repertoire) -> None:
     ground = HeightField(np.zeros((9, 9)), 1.0, -4.0, -4.0)
     sizes = np.full(40, 0.4)
-    apart = Wandering(repertoire, ground, sizes, seed=3, radius_m=RADIUS_M)
-    through = Wandering(repertoire, ground, sizes, seed=3)
+    apart, through = (
+        Wandering([Species(repertoire, sizes, RADIUS_M)], ground, seed=3, separate=separate)
+        for separate in (True, False)
+    )
     assert apart.separated is not None
     counter = SeparatedCrowd(through.crowd, RADIUS_M, repertoire.length_m)
-    pairs = 0
+    met = 0
     start = apart.crowd.origin_m.copy()
     for _ in range(30):
         apart.step(10)
         through.step(10)
         assert not len(apart.separated.intersecting())
-        pairs += len(counter.intersecting())
-    assert pairs > 10
+        met += len(counter.intersecting())
+    assert met > 10
     gone = np.linalg.norm(apart.crowd.origin_m - start, axis=1)
     assert np.median(gone) > 0.4
 
@@ -123,4 +131,4 @@ def test_a_crowd_wanders_without_intersections(repertoire: Repertoire) -> None:
 def test_a_ground_without_room_is_rejected(repertoire: Repertoire) -> None:
     small = HeightField(np.zeros((4, 4)), 0.5, 0.0, 0.0)
     with pytest.raises(InputError, match="too small for them"):
-        Wandering(repertoire, small, np.ones(40), radius_m=RADIUS_M)
+        Wandering([Species(repertoire, np.ones(40), RADIUS_M)], small)

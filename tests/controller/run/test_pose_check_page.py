@@ -96,7 +96,7 @@ def test_the_page_shows_the_facts_and_no_servos(rows: dict[str, list[dict[str, A
     record = record_of({t.topic.name: rows[t.topic.name] for t in names}, complete=False, note="")
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        board = Dashboard(server, record.header)
+        board = Dashboard(server, record.header, {})
         board.show_servos(record, -1, None)
         board.show_curves(record, -1)
         board.show_events(record.events)

@@ -340,7 +340,7 @@ def test_a_click_finds_the_ground_that_it_falls_on(record: RunRecord) -> None:
 def test_the_camera_of_a_run_is_shown_twice_a_second(record: RunRecord) -> None:
     cv2 = pytest.importorskip("cv2")
     view = PageView()
-    view.page._dashboard = Dashboard(view.page._server, record.header)
+    view.page._dashboard = Dashboard(view.page._server, record.header, {})
     colour = np.full((48, 64, 3), (200, 120, 40), dtype=np.uint8)  # red first
 
     def shown_at(time_s: float, image: Image) -> Image | None:
