@@ -24,6 +24,9 @@ from snakewalk.sim.rendering.offscreen import Offscreen
 from snakewalk.sim.rendering.shade import SoftShade, add_sheet, link_surface_m, surface_points_m
 from snakewalk.sim.rendering.trail import AXES_GEOMS, add_axes, make_trail
 
+_LEGEND = "\nhead purple, centre blue"
+"""Colours of the tracks of head and body."""
+
 
 @dataclass(frozen=True, slots=True)
 class Style:
@@ -95,7 +98,7 @@ def render_film(
             if trail is not None:
                 trail.add(shown, now)
                 add_axes(shown, _corner(camera[k]), _scale_m(scene.robot.length_m), scene.ground)
-                caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip()
+                caption = f"{style.title}  {now:6.1f} s   {style.speed_up:g}x".strip() + _LEGEND
             film.add(screen.draw(shown, caption))
             if on_frame is not None:
                 on_frame(k + 1, len(shots))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from snakewalk.controller.studies.run_comparison import ComparedRun
 
 _HIDDEN_NUMBERS = frozenset(
-    {"config_hash", "software", "outcome", "pose_evidence", "pose_source", "assumptions"}
+    {"config_hash", "software", "outcome", "pose_evidence", "pose_source", "assumptions", "seed"}
 )
 """Numbers that the verdicts or the differing settings state."""
 
@@ -74,15 +74,7 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
     else:
         console.print("Run, robot and world are the same.\n")
     numbers = _table("number", "Numbers that differ, the largest difference first", runs)
-    verdicts = [run.verdict for run in runs]
-    numbers.add_row("verdict", *(verdict.sentence for verdict in verdicts))
-    numbers.add_row("pose", *(verdict.evidence for verdict in verdicts))
-    numbers.add_row("exit code", *(str(verdict.exit_code) for verdict in verdicts))
-    for label in ("cause", "next_command"):
-        texts = [getattr(verdict, label) for verdict in verdicts]
-        if any(texts):
-            numbers.add_row(label.replace("_", " "), *(text or "-" for text in texts))
-    summaries = [flat(run.summary.to_dict()) for run in runs]
+    summaries = [flat({"verdict": run.verdict.to_dict()} | run.summary.to_dict()) for run in runs]
     keys = dict.fromkeys(key for summary in summaries for key in summary)
     values_by_key = {key: [summary.get(key) for summary in summaries] for key in keys}
     for key in sorted(keys, key=lambda key: _spread(values_by_key[key]), reverse=True):
@@ -93,7 +85,10 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
                 (spelling for spelling, _ in cells), key=len
             )  # without the unit, if one is known
             numbers.add_row(label, *(text for _, text in cells))
-    console.print(numbers, "The other numbers are the same; --json prints all.")
+    if numbers.row_count:
+        console.print(numbers)
+    poses = ", ".join(dict.fromkeys(run.verdict.evidence for run in runs))
+    console.print(f"The other numbers are the same; --json prints all. Pose: {poses}.")
 
 
 def _spread(values: list[Any]) -> float:

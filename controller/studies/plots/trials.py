@@ -44,6 +44,8 @@ def draw_trials(rows: Sequence[CaseSummary], path: Path) -> None:
         squeeze=False,
         layout="constrained",
     )
+    same = [f"{name} {value}" for name, value in cells[0].items() if value and name not in names]
+    figure.suptitle("\n".join(["complete runs", *same]), x=0.0, ha="left", fontsize=10, color=INK)
     for panel in axes.flat[len(panels) :]:
         panel.axis("off")
     for panel, fixed in zip(axes.flat, panels, strict=False):

@@ -118,7 +118,9 @@ def test_a_film_without_marks_has_no_caption_and_nothing_but_body_and_ground(
     frames = len(drawn) // 3
     plain, without_waypoints, marked = drawn[:frames], drawn[frames:-frames], drawn[-frames:]
     assert {caption for _, caption in plain} == {""}
-    assert all(caption.startswith("walk") for _, caption in (*without_waypoints, *marked))
+    for _, caption in (*without_waypoints, *marked):
+        assert caption.startswith("walk")
+        assert caption.endswith("\nhead purple, centre blue")
     assert all(a < b for (a, _), (b, _) in zip(plain, without_waypoints, strict=True))
     assert all(a < b for (a, _), (b, _) in zip(without_waypoints, marked, strict=True))
 

@@ -81,7 +81,8 @@ def test_the_command_compares_and_draws(make: Make, tmp_path: Path) -> None:
     assert "run.seed" in table
     assert "path error mean " in table
     assert "friction law" not in table, "a number that is the same"
-    assert "--json prints all" in table
+    assert "verdict.evidence" not in table, "the same"
+    assert table.rstrip().endswith("--json prints all. Pose: simulated.")
     assert " m " in table.partition("path error mean ")[2].partition("\n")[0]
 
 

@@ -52,7 +52,9 @@ def test_a_cell_accounts_for_every_run(monkeypatch: pytest.MonkeyPatch) -> None:
     case = Case("ramp-10-up", "walk")
     causes = ("climb", "climb", "climb", "slip", "slip", "roll", "joint", "time")
     trials = [Trial(case, k, cause=cause) for k, cause in enumerate(causes)]
-    (axes,) = figure_of(monkeypatch, [case], [*trials, Trial(case, 9, complete=True)]).axes
+    figure = figure_of(monkeypatch, [case], [*trials, Trial(case, 9, complete=True)])
+    (axes,) = figure.axes
+    assert figure.get_suptitle() == "complete runs\nrelief 1\nmotion walk\nrun ramp-10-up"
     assert [text.get_text() for text in axes.texts] == ["1 of 9", "3 climb\n2 slip\n3 other"]
 
 
