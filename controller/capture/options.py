@@ -25,7 +25,9 @@ def check_options(options: CaptureOptions) -> None:
 
     """
     if options.cropped and options.background is not None:
-        raise InputError("--cropped and --background: a moving camera has no single background")
+        raise InputError(
+            "--cropped and --background: a moving camera has no background; leave one out"
+        )
     if options.cropped and options.trail is not None:
         raise InputError("--cropped and --trail: the camera must stand still; leave one out")
     if options.length_m is not None and options.marker is not None:

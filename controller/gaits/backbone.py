@@ -50,10 +50,12 @@ class SpaceCurve:
     def __init__(self, robot: "RobotConfig", curve_m: ArrayLike) -> None:
         points = np.asarray(curve_m, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) < 4:
-            raise InputError(f"a backbone curve has four points (x, y, z) or more: {points.shape}")
+            raise InputError(
+                f"the curve has shape {points.shape}; expected 4 or more points (x, y, z)"
+            )
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         if not np.isfinite(points).all() or steps.min() <= 0.0:
-            raise InputError("a backbone curve's points must be finite, and neighbours must differ")
+            raise InputError("the curve's points must be finite, and neighbours must differ")
         spline = CubicSpline(np.concatenate([[0.0], steps.cumsum()]), points)
         fine = np.linspace(0.0, spline.x[-1], 20 * len(points) + 2000)
         steps = np.linalg.norm(np.diff(spline(fine), axis=0), axis=1)

@@ -48,7 +48,7 @@ class ElevationChoice(Answers, TableAnswers):
         None, description="classes of LAS points, such as 2,9; default: ground, else all but noise"
     )
     assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
-        {}, description="KEY=VALUE: a value that the file does not state; may be repeated"
+        {}, description="KEY=VALUE: a value that a message asks for; may be repeated"
     )
 
 

@@ -258,7 +258,7 @@ def _horizontal_unit(file: Path, opened: Any) -> Fact:
         try:
             return Fact(unit_name(float(crs.linear_units_factor[1])), "file", SYSTEM)
         except (ValueError, LookupError, TypeError) as error:
-            raise InputError(f"{file}: its system states no unit ({error}): --unit") from None
+            raise InputError(f"{file}: its system states no unit ({error}); add --unit") from None
     west = turn.c
     north = turn.f
     east = west + turn.a * opened.width
@@ -289,7 +289,7 @@ def _height_unit(file: Path, opened: Any, units: ElevationChoice, horizontal: Fa
     words = (opened.units[0] or "").strip()
     band = named_unit(words) if words else None
     if words and band is None:
-        raise InputError(f"{file}: its heights are in {words!r}: --height-unit, one of m, ft, ...")
+        raise InputError(f"{file}: its heights are in {words!r}; state --height-unit: m, ft, ...")
     vertical = None if opened.crs is None else vertical_unit(opened.crs.to_wkt())
     if units.unit is not None and units.unit != DEGREE:
         stated = vertical or band
@@ -299,7 +299,7 @@ def _height_unit(file: Path, opened: Any, units: ElevationChoice, horizontal: Fa
         )
     if band is not None and vertical is not None and band != vertical:
         raise InputError(
-            f"{file}: states heights in {band} (band) and in {vertical} (system): --height-unit"
+            f"{file}: states heights in {band} (band), {vertical} (system); choose by --height-unit"
         )
     return by_file("its band", band) or height_fact(
         file, horizontal, None, by_file(SYSTEM, vertical)
@@ -329,7 +329,9 @@ def _cells(
     middle_y = turn.f + turn.e * 0.5 * (rows.start + rows.stop)
     if unit == DEGREE:
         if not -89.0 <= middle_y <= 89.0:
-            raise InputError(f"{file}: its middle has no latitude between -89 and 89: --unit m")
+            raise InputError(
+                f"{file}: its middle has no latitude from -89 to 89; for metres add --unit m"
+            )
         return _Cells(*degree_cell_m(*cell, middle_y), "m", [])
     per_unit_m = unit_m(unit)
     notes: list[str] = []

@@ -88,7 +88,7 @@ class RosPoseFeed(PoseQueue):
         self._end, far = pipe()
         self._process = start(_serve, far, topic, daemon=True)
         far.close()
-        said = b"it did not start"
+        said = b"the node did not start; its own messages name the cause"
         with suppress(EOFError, OSError):
             if self._end.poll(_START_S):
                 said = self._end.recv_bytes()

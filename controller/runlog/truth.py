@@ -108,7 +108,9 @@ def read_truth(path: Path) -> Truth:
         )
     truth = Truth(header, *(column.mapped() for column in columns))
     if not len(truth.time_s):
-        raise InputError(f"{path}: the served robot was never measured")
+        raise InputError(
+            f"{path}: contains no true pose; let bus serve run until the robot has moved"
+        )
     return truth
 
 

@@ -154,7 +154,7 @@ def body(
         of_meshes={"--surface": surface, "--forward": forward, "--up": up},
     )
     if frame and not image and not posed:
-        raise InputError("--frame: is for --image and --posed")
+        raise InputError("--frame: needs --image or --posed")
     how = Cut(37 if curves is None else curves, 2 if order is None else order, forward, up, surface)
     if given:
         body_options.refuse(textured=True)

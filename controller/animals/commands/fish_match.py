@@ -73,7 +73,9 @@ def match(
     true_postures = None if truth is None else load_postures(truth)
     if footage.suffix.lower() in MIDLINES:
         if side or length or background:
-            raise InputError(f"{footage}: --side, --length and --background go with images")
+            raise InputError(
+                f"{footage}: --side, --length and --background need images; leave them out"
+            )
         matched = read_midlines(footage, build, rate)
     else:
         with ProgressBar("frames", transient=True) as bar:

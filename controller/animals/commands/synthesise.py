@@ -144,7 +144,7 @@ def synthesise(
         track=track,
     )
     if prepared.run.motion not in _MOTIONS:
-        raise InputError(f"--motion {prepared.run.motion}: {', '.join(_MOTIONS)}")
+        raise InputError(f"--motion {prepared.run.motion}: choose {', '.join(_MOTIONS)}")
     name = Path(prepared.run.name) if output is None else output
     left_out = {"film": not film, "skin": not glb}
     files = {
@@ -189,7 +189,7 @@ def _snake(
 
         worn = SynthesisSkin.of(look, prepared.run.track, prepared.robot)
     elif look != ANIMAL:
-        raise InputError(f"--look {look}: is for --film and --glb")
+        raise InputError(f"--look {look}: needs --film or --glb")
     walk = SnakeSynthesis(prepared, tongue).synthesise(frames)
     with atomic_write(files["track"]) as part:
         walk.save(part, files["track"].stem, f"snakewalk animal synthesise of {prepared.run.track}")

@@ -200,9 +200,9 @@ def _fitted_contacts(
 ) -> tuple[list[Contact], tuple[float, float]]:
     """Contacts of feet (T, 4), NaN where not seen, and the shape of their ways in the air."""
     is_visible = np.isfinite(ahead)
-    fewest = int(is_visible.sum(axis=0).min())
-    if fewest < _FEWEST_FRAMES:
-        raise InputError(f"a foot is seen in {fewest} frames; expected six or more")
+    counts = is_visible.sum(axis=0)
+    if counts.min() < _FEWEST_FRAMES:
+        raise InputError(f"--feet: their points are seen in {counts} frames; expected 6 or more")
     feet_indices = range(ahead.shape[1])
     return fit_contacts(
         [phase[is_visible[:, k]] for k in feet_indices],
@@ -244,7 +244,7 @@ def _bridged_points(points: Floats, time_s: Floats) -> Floats:
         is_visible = np.isfinite(filled[:, k]).all(axis=1)
         if is_visible.sum() < 2:
             raise InputError(
-                f"point {k + 1} of the spine is seen in {int(is_visible.sum())} frames"
+                f"--spine: point {k + 1} is seen in {is_visible.sum()} frames; expected 2 or more"
             )
         for axis in range(2):
             filled[:, k, axis] = np.interp(time_s, time_s[is_visible], filled[is_visible, k, axis])

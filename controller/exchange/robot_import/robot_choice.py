@@ -21,7 +21,7 @@ class RobotChoice(Answers):
     )
     reverse: bool = Field(False, description="the first body of the model is the tail")
     assume: Annotated[dict[str, str], Flag(metavar="KEY=VALUE")] = Field(
-        {}, description="KEY=VALUE: a value that the model does not state; may be repeated"
+        {}, description="KEY=VALUE: a value that a message asks for; may be repeated"
     )
 
 

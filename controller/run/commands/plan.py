@@ -53,28 +53,30 @@ def plan(
         typer.Option("--with", help="planner to use; repertoire: search over recorded actions"),
     ] = None,
     repertoire: Annotated[
-        Path | None, typer.Option(help="file of actions; default: repertoire-ROBOT-WORLD.npz")
+        Path | None,
+        typer.Option(help="actions for --with repertoire; default: repertoire-ROBOT-WORLD.npz"),
     ] = None,
     beam: Annotated[
         int | None,
         typer.Option(
             min=1,
             max=100_000,
-            help="number of action sequences that the search keeps per round; default: 400",
+            help="action sequences that --with repertoire keeps per round; default: 400",
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("-o", "--out", help="write the planned actions here as JSON")
+        Path | None,
+        typer.Option("-o", "--out", help="write the plan of --with repertoire here (JSON)"),
     ] = None,
     carry: Annotated[
-        bool, typer.Option("--run", help="run the planned actions in the simulator")
+        bool, typer.Option("--run", help="run the plan of --with repertoire in the simulator")
     ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Check states, path and joint limits of a run; nothing moves.
 
-    Needs neither servos nor simulator.
+    Needs neither servos nor simulator, except for --run.
     """
     if with_ is not None:
         planner = require("planner", with_, "--with")

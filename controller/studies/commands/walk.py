@@ -31,8 +31,8 @@ def walk(
     graph: Annotated[
         list[str] | None,
         typer.Option(
-            help="graph: er:STATES:DEGREE, ws:STATES:DEGREE:REWIRED, kp:TRACK[:THRESHOLD] or a "
-            "file; may be repeated; default: er:1000:9"
+            help="random er:STATES:DEGREE, small world ws:STATES:DEGREE:REWIRED, shapes "
+            "kp:TRACK[:THRESHOLD], or a file; may be repeated; default: er:1000:9"
         ),
     ] = None,
     rule: Annotated[

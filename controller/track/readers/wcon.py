@@ -78,7 +78,7 @@ def _metres(file: Path, units: dict[str, Any]) -> dict[str, float | None]:
     }
     if len({value is None for value in metres.values()}) > 1:
         raise InputError(
-            f"{file}: units: some are lengths and some are not: "
+            f"{file}: units: some are lengths and some are not; state one for each: "
             + ", ".join(f"{name} {units[name]!r}" for name in metres if name in units)
         )
     return metres

@@ -205,7 +205,7 @@ def test_the_surface_through_a_meshs_curves_wears_its_colours(tmp_path: Path) ->
         (("worm-like", "-o", "a.glb", "--curves", "20"), "--curves: is for a skin"),
         (("worm-like", "-o", "a.glb", "--curves", "0"), "--curves: is for a skin"),
         (("worm-like", "-o", "a.glb", "--order", "9"), "--order: is for a skin"),
-        (("worm-like", "-o", "a.glb", "--frame", "-5"), "--frame: is for --image and --posed"),
+        (("worm-like", "-o", "a.glb", "--frame", "-5"), "--frame: needs --image or --posed"),
         (("shark", "-o", "a.glb", "--fps", "0"), "--fps: is for --animate"),
         (("worm-like", "-o", "a.glb", "--posed", "--animate", "worm-like"), "--posed: --animate"),
         (("shark", "-o", "a.glb", "--curves", "5"), "curves: a body with round tips needs 12"),

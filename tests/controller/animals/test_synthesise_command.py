@@ -155,7 +155,7 @@ def test_what_is_not_a_walk_is_refused(tmp_path: Path) -> None:
         "animal", "synthesise", "flat-square", "--motion", "serpenoid", "-o", str(tmp_path / "x")
     )
     assert done.returncode == 2
-    assert "--motion serpenoid: walk, walk-printed, kp" in done.stderr
+    assert "--motion serpenoid: choose walk, walk-printed, kp" in done.stderr
     assert not list(tmp_path.iterdir())
 
 
@@ -210,7 +210,7 @@ def test_film_and_skin_are_written_beside_the_recording(tmp_path: Path) -> None:
     ]
     wrong = snakewalk(*words, "--look", "shark")
     assert wrong.returncode == 2
-    assert "--look shark: is for --film and --glb" in wrong.stderr
+    assert "--look shark: needs --film or --glb" in wrong.stderr
     unknown = snakewalk(*words, "--glb", "--look", "unicorn")
     assert unknown.returncode == 2
     assert not list(tmp_path.iterdir())  # refused before any work

@@ -357,7 +357,7 @@ ROWS = [
         "--motion: is for snakes; --animal",
     ),
     ("animal synthesise flat-square -o x --animal nosuch.toml", "nosuch.toml: no such file"),
-    ("animal synthesise flat-square -o x --look nosuch", "--look nosuch: is for --film and --glb"),
+    ("animal synthesise flat-square -o x --look nosuch", "--look nosuch: needs --film or --glb"),
     ("nosuch", "No such command 'nosuch'"),
 ]
 

@@ -94,13 +94,13 @@ def test_units_are_known_by_their_spellings() -> None:
 
 
 def test_an_unknown_unit_of_heights_is_rejected(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="its heights are in 'kelvin': --height-unit"):
+    with pytest.raises(InputError, match="its heights are in 'kelvin'; state --height-unit"):
         read(geotiff(tmp_path / "a.tif", unit="kelvin"))
 
 
 def test_two_statements_that_differ_are_asked_about(tmp_path: Path) -> None:
     file = geotiff(tmp_path / "a.tif", crs=COMPOUND, unit="metre", GEOTIFF_VERSION="1.1")
-    with pytest.raises(InputError, match=r"in m \(band\) and in us-ft \(system\): --height-unit"):
+    with pytest.raises(InputError, match=r"in m \(band\), us-ft \(system\); choose by"):
         read(file)
     assert read(file, height_unit="m").relief_m == pytest.approx(np.ptp(HILL))
 

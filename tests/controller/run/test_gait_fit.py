@@ -79,7 +79,7 @@ def test_help_gives_an_example() -> None:
         (STRAIGHT + "-3,left,0\n", [], "line 7: y_m: expected a number or nothing"),
         (STRAIGHT + "-3,0\n", [], "line 7 lacks one of x_m, y_m, z_m"),
         (STRAIGHT + "-3,0,nan\n", [], "line 7 lacks one of x_m, y_m, z_m"),
-        ("x_m,y_m,z_m\n0,0,0\n-1,0,0\n", [], "curve.csv: a backbone curve has four points"),
+        ("x_m,y_m,z_m\n0,0,0\n-1,0,0\n", [], "curve.csv: the curve has shape (2, 3)"),
         (SHORT, ["--robot", "yaw16"], "curve.csv: the curve is 0.300 m long; robot yaw16 has"),
         (STRAIGHT.replace("-1.0", "-0.5"), [], "neighbours must differ"),
         (STRAIGHT, ["--robot", "hop"], "hop"),

@@ -186,4 +186,4 @@ def test_midlines_keep_the_facts_of_their_file(tmp_path: Path) -> None:
     assert found["facts"]["unit"] == "m (stated by the names of its columns)"  # type: ignore[index]
     assert set(found["facts"]) == {"quantity", "unit", "order", "time"}  # type: ignore[call-overload]
     words = ("match", file, "--length", 1, "--force", *out)
-    assert "--length and --background go with images" in refused(*words)
+    assert "--length and --background need images" in refused(*words)
