@@ -116,7 +116,7 @@ OTHERS: Final = {
     "controller/cameras/device_camera.py": "a device",
     "controller/cameras/lens.py": "a lens has pixels and pure numbers",
     "controller/exchange/ros_bag.py": "writes bags",
-    "controller/mapping/colour_picture.py": "colours",
+    "controller/images/colour_picture.py": "colours",
     "controller/run/commands/gait_fit.py": "columns x_m, y_m, z_m",
     "controller/view/scene.py": "draws meshes",
 }  # fmt: skip

@@ -101,7 +101,8 @@ def body(
         str,
         typer.Argument(
             metavar="BODY",
-            help="an .npz of skeletons with widths, a shipped recording or skin, an .obj or a .glb",
+            help="an .npz of skeletons with widths, a picture of one part, a shipped recording or "
+            "skin, an .obj or a .glb",
             autocompletion=completion.BODIES,
         ),
     ],
@@ -123,7 +124,7 @@ def body(
     side: Annotated[
         Path | None,
         typer.Option(
-            help="an .npz of the same body seen from the side, for its heights and side pictures"
+            help="an .npz or picture of the same body from the side, for heights and side pictures"
         ),
     ] = None,
     aspect: Annotated[
@@ -172,8 +173,12 @@ def body(
         )
         body_options.skin(replace(skin, facts=skin.facts | worn.facts), animate, fps)
         return
-    pose_frame = posed_frame(shots, frame or [])
-    body_options.solid(measured, _skeleton(track, measured.points, pose_frame) if posed else None)
+    skeleton = straight()
+    if posed:
+        pose_frame = posed_frame(shots, frame or [])
+        check_frame(track, measured.points, pose_frame)
+        skeleton = pose(measured.points[pose_frame])
+    body_options.solid(measured, skeleton)
 
 
 @dataclass(frozen=True)
@@ -201,11 +206,11 @@ class _ResultFiles:
     def refuse(self, *, textured: bool) -> None:
         refuse_to_overwrite([*mesh_files(self.output, textured), *self.drawn], self.force)
 
-    def solid(self, body: _MeasuredBody, skeleton: Floats | None) -> None:
-        """Write the ellipses along a skeleton; None is straight."""
+    def solid(self, body: _MeasuredBody, skeleton: Floats) -> None:
+        """Write the ellipses along a skeleton."""
         body_model = body.model
         worn = body.texture
-        mesh = body_mesh(body_model, straight() if skeleton is None else skeleton)
+        mesh = body_mesh(body_model, skeleton)
         corners = len(mesh.vertices)
         if worn.is_around:
             mesh, _ = picture_around(mesh)
@@ -322,9 +327,3 @@ def _measure(track: str, shots: Sequence[Shot], side: Path | None, aspect: float
     body = model.body_model(top, silhouettes, aspect)
     points = top.points * [1.0, -1.0] if top.pixels else top.points
     return _MeasuredBody(body, points, skin_picture(shots, top, silhouettes, body))
-
-
-def _skeleton(track: str, points: Floats, frame: int) -> Floats:
-    """Skeleton of one frame, in body lengths."""
-    check_frame(track, points, frame)
-    return pose(points[frame])

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-from PIL import Image as Pillow
-from PIL import UnidentifiedImageError
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
@@ -14,6 +13,7 @@ from snakewalk.controller.animals.mesh.body_model import BodyModel, Silhouettes
 from snakewalk.controller.animals.mesh.photographs import VIEWS, Photograph, blend
 from snakewalk.controller.animals.mesh.skin_texture import unroll
 from snakewalk.controller.console.messages import LOGGER
+from snakewalk.controller.images.colour_picture import read_colours
 
 _VIEWS_FROM_ABOVE = ("top", "below")
 """Views whose skeletons are those of the body seen from above."""
@@ -54,12 +54,8 @@ def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
             f"--frame: give one, or one for each --image; there are {len(frames)} frames and "
             f"{len(images)} images"
         )
-    frames_of_images = (
-        list(frames) * len(images) if len(frames) == 1 else list(frames) or [0] * len(images)
-    )
-    return tuple(
-        Shot(*_view(image), frame) for image, frame in zip(images, frames_of_images, strict=True)
-    )
+    each = zip(images, cycle(frames or [0]), strict=False)
+    return tuple(Shot(*_view(image), frame) for image, frame in each)
 
 
 def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:
@@ -129,7 +125,7 @@ def _photographed_body(
             "give their .npz as --side"
         )
     check_frame(str(shot.file), track.points, shot.frame)
-    image = _read_picture(shot.file)
+    image = read_colours(shot.file)[..., ::-1]
     points = track.points[shot.frame]
     if not track.pixels:
         raise InputError(
@@ -143,19 +139,6 @@ def _photographed_body(
             "give the --frame of the track that it shows"
         )
     return image, points, track.radius[shot.frame]
-
-
-def _read_picture(image: Path) -> Image:
-    """Grey or coloured image of a file."""
-    try:
-        with Pillow.open(image) as picture:
-            return np.asarray(picture.convert("RGB"))
-    except FileNotFoundError:
-        raise InputError(f"{image}: no such file") from None
-    except Pillow.DecompressionBombError as error:
-        raise InputError(f"{image}: {error}") from None
-    except (UnidentifiedImageError, OSError, SyntaxError):
-        raise InputError(f"{image}: is not a readable picture; choose another file") from None
 
 
 def check_frame(name: str, points: Floats, frame: int) -> None:

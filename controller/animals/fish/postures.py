@@ -84,10 +84,13 @@ def skeleton(base: Floats, tangents_rad: Floats, base_at: float, length: float) 
     step = np.stack([np.cos(tangents_rad), np.sin(tangents_rad)], axis=-1) * (length / SEGMENTS)
     points = np.zeros((len(base), SEGMENTS + 1, 2))
     points[:, 1:] = -np.cumsum(step, axis=1)
-    place = base_at * SEGMENTS
-    low = int(place)
-    origin = points[:, low] * (low + 1 - place) + points[:, low + 1] * (place - low)
-    return points + (base - origin)[:, None, :]
+    return points + (base - _place_on(points, base_at))[:, None, :]
+
+
+def _place_on(points: Floats, at: float) -> Floats:
+    """(T, 2) places at a share of the length of skeletons (T, 101, 2)."""
+    low, share = divmod(at * SEGMENTS, 1.0)
+    return points[:, int(low)] * (1.0 - share) + points[:, int(low) + 1] * share
 
 
 def fit_angles(tangents_rad: Floats, joints_at: tuple[float, ...]) -> tuple[Floats, Floats]:
@@ -101,10 +104,7 @@ def fit_angles(tangents_rad: Floats, joints_at: tuple[float, ...]) -> tuple[Floa
 def postures_of_track(track: Track, joints_at: tuple[float, ...]) -> Postures:
     """Read postures off tracked midlines: no images needed; frames that are missing are NaN."""
     head, angles = fit_angles(track.angles_rad, joints_at)
-    place = joints_at[0] * SEGMENTS
-    low = int(place)
-    even = np.stack([equal_arc_length(body) for body in track.points])
-    base = even[:, low] * (low + 1 - place) + even[:, low + 1] * (place - low)
+    base = _place_on(np.stack([equal_arc_length(body) for body in track.points]), joints_at[0])
     frame = np.rint((track.time_s - track.time_s[0]) * track.rate_hz).astype(int)
     total = int(frame[-1]) + 1
 

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.images.body_detector import make_detector
+from snakewalk.controller.images.video import IMAGES, read_image
+from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length
 
 ASPECT = 0.85
@@ -69,16 +73,18 @@ def spindle(length_m: float | None = None) -> BodyModel:
 
 
 def read_silhouettes(file: Path) -> Silhouettes:
-    """Read skeletons and radii from an .npz.
+    """Read skeletons and radii from an .npz, or find the one body in a picture, thicker end first.
 
-    It contains points and radii of one unit: ``points_px`` and ``radius_px``, ``points`` and
+    An .npz contains points and radii of one unit: ``points_px`` and ``radius_px``, ``points`` and
     ``radius_m``, or ``skeletons`` and ``radius_px`` or ``width`` (whole widths). Radii are (T, P),
     (P,) or, of the segments, one fewer.
 
     Raises:
-        InputError: no such file or arrays, or their shapes do not match.
+        InputError: no such file, arrays or body, or the shapes of the arrays do not match.
 
     """
+    if file.suffix.lower() in IMAGES:
+        return _in_picture(file)
     try:
         arrays, _ = read_arrays(file)
     except FileNotFoundError:
@@ -110,6 +116,19 @@ def read_silhouettes(file: Path) -> Silhouettes:
     return Silhouettes(
         points, np.broadcast_to(radius, points.shape[:2]), length_m, where != "points"
     )
+
+
+def _in_picture(file: Path) -> Silhouettes:
+    image = read_image(file)
+    body = make_detector([image]).detect(image).skeleton
+    if body.status is not FrameStatus.GOOD:
+        raise InputError(
+            f"{file}: {body.status}; photograph one body alone, on an even ground in another colour"
+        )
+    if body.radius_px[:50].mean() < body.radius_px.mean():
+        body = body.reversed()
+    radius_px = gaussian_filter1d(body.radius_px, 2.0)  # distances change by whole pixels
+    return Silhouettes(body.points_px[None], radius_px[None], None, pixels=True)
 
 
 def body_model(

@@ -98,8 +98,10 @@ def stereo(
     The origin of the world is below the left camera; the x axis points where the camera looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
+    from snakewalk.controller.images.colour_picture import (  # noqa: PLC0415  an extra
+        read_colours,
+    )
     from snakewalk.controller.mapping import (  # noqa: PLC0415  an extra
-        colour_picture,
         stereo_camera,
         stereo_ground,
     )
@@ -115,7 +117,7 @@ def stereo(
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
     calibrated = stereo_camera.read_calibration(calibration, choice)
-    pictures = (colour_picture.read_colours(side) for side in (left, right))
+    pictures = (read_colours(side) for side in (left, right))
     pair = stereo_camera.rectify(calibrated, *pictures)
     stand = None
     if height is not None and tilt is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
-from snakewalk.controller.mapping.colour_picture import read_colours
+from snakewalk.controller.images.colour_picture import read_colours
 from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.mosaic.adjustment import (
     Adjusted,

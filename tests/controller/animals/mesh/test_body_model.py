@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import cv2
 import mujoco
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import trimesh
 from PIL import Image
 from pydantic import ValidationError
 
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.animals.mesh.body_model import (
@@ -149,7 +151,7 @@ def test_the_command_writes_reports_and_does_not_overwrite(tmp_path: Path) -> No
         (["nosuch.npz", "-o", "b.glb"], "nosuch.npz: no such file"),
         (["t.npz", "-o", "b.stl"], "written as .obj or .glb"),
         (["t.npz", "-o", "b.glb", "--image", "none.png"], "none.png: no such file"),
-        (["t.npz", "-o", "b.glb", "--image", "t.npz"], "not a readable picture"),
+        (["t.npz", "-o", "b.glb", "--image", "t.npz"], "cannot be read as a picture"),
         (["t.npz", "-o", "b.glb", "--image", "small.png"], "does not lie in this picture"),
         (["t.npz", "-o", "b.glb", "--posed", "--frame", "7"], "frame 7 is not in 0..1"),
         (["t.npz", "-o", "b.glb", "--aspect", "0"], "aspect: height over width"),
@@ -193,6 +195,52 @@ def test_radii_of_segments_serve_as_well(tmp_path: Path) -> None:
     seen = read_silhouettes(tmp_path / "s.npz")
     assert not seen.pixels
     np.testing.assert_allclose(body_model(seen).half_width, 0.03 / 0.8)
+
+
+def leg(file: Path, bend_px: float, root_px: float, tip_px: float) -> None:
+    """Photograph a leg of 400 px between the middles of its round ends, root upwards."""
+    s = np.linspace(0.0, 1.0, 400)
+    image = np.full((520, 240), 200, np.uint8)
+    x = 120.0 + bend_px * np.sin(np.pi * s)
+    radii = root_px + (tip_px - root_px) * s
+    for at in np.column_stack([x, 60.0 + 400.0 * s, radii]):
+        across, down, radius = (round(16.0 * float(value)) for value in at)
+        cv2.circle(image, (across, down), radius, 60, -1, cv2.LINE_AA, 4)
+    noise = np.random.default_rng(0).normal(0.0, 3.0, image.shape)
+    cv2.imwrite(str(file), np.clip(image + noise, 0.0, 255.0).astype(np.uint8))
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_two_photographs_of_a_leg_make_its_ellipses(flipped: bool, tmp_path: Path) -> None:
+    """[KP] 4.1: a part of a goat or lizard; it is bent from the side, and thicker there."""
+    views = {"front": (0.0, 14.0, 5.0), "side": (25.0, 24.0, 7.0)}
+    for view, (bend, root, tip) in views.items():
+        leg(tmp_path / f"{view}.png", bend, root, tip)
+        if flipped:
+            image = cv2.imread(str(tmp_path / f"{view}.png"))
+            assert image is not None
+            cv2.imwrite(str(tmp_path / f"{view}.png"), image[::-1])
+    front, side = (read_silhouettes(tmp_path / f"{view}.png") for view in views)
+    root_row = 460.0 if flipped else 60.0
+    assert front.points[0, 0, 1] == pytest.approx(root_row, abs=20.0)
+    part = body_model(front, side)
+    for silhouettes, half, (_, root, tip) in (
+        (front, part.half_width, views["front"]),
+        (side, part.half_height, views["side"]),
+    ):
+        length_px = np.hypot(*np.diff(silhouettes.points[0], axis=0).T).sum()
+        along_px = np.linspace(0.0, length_px, 101) - root
+        known_px = root + (tip - root) * along_px / (length_px - root - tip)
+        middle = slice(10, 91)
+        np.testing.assert_allclose(half[middle] * length_px, known_px[middle], atol=2.0)
+    mesh = body_mesh(part, straight())
+    assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
+
+
+def test_a_picture_without_a_part_is_refused(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.full((60, 80), 128, np.uint8))
+    with pytest.raises(InputError, match=r"a\.png: .*photograph one body alone"):
+        read_silhouettes(tmp_path / "a.png")
 
 
 def test_a_real_worm_in_its_picture(shared_data: Path, tmp_path: Path) -> None:
