@@ -54,8 +54,10 @@ def shots_of(images: Sequence[str], frames: Sequence[int]) -> tuple[Shot, ...]:
             f"--frame: give one, or one for each --image; there are {len(frames)} frames and "
             f"{len(images)} images"
         )
-    each = zip(images, cycle(frames or [0]), strict=False)
-    return tuple(Shot(*_view(image), frame) for image, frame in each)
+    return tuple(
+        Shot(*_view(image), frame)
+        for image, frame in zip(images, cycle(frames or [0]), strict=False)
+    )
 
 
 def posed_frame(shots: Sequence[Shot], frames: Sequence[int]) -> int:

@@ -109,7 +109,7 @@ def synthesise_motion(
     segments = _segments(source, options)
     pieces = piece_graph(source, segments, mirror=options.mirror)
     around = _surroundings(source, options)
-    reached: dict[str, Any] = {}
+    reached: dict[str, Any] = {"reached_s": []}
     if options.through:
         points = np.array(options.through)
         radius = options.radius * source.length
@@ -157,13 +157,12 @@ def synthesise_motion(
         pieces_used=len(sequence.order),
         seconds=round((motion.frames - 1) / motion.rate_hz, 2),
         joins_without_rule=sequence.forced,
-        reached_s=[],
         robot=robot.name,
         pieces_too_close=sequence.crowded if around.any else None,
         wall_distance=rounded(around.wall_distance(motion), 4),
         fish_distance=rounded(around.fish_distance(motion), 4),
+        **reached,
     )
-    facts = replace(facts, **reached)
     if motion.height is not None and motion.pitch_rad is not None:
         facts = replace(
             facts,

@@ -83,13 +83,11 @@ class HeightChain:
         self.levels = levels
         level_indices = np.rint(heights * (levels - 1)).astype(np.intp)
         self._start = (int(level_indices[0]), int(level_indices[1]))
-        counts = np.zeros((levels, levels, levels))
+        counts = np.zeros((levels, levels, levels))  # (z, y, x): of height x after y after z
         # the sequence repeats, so that its last pair has a successor
         repeated = np.append(level_indices, level_indices[:2])
         np.add.at(counts, (repeated[:-2], repeated[1:-1], repeated[2:]), 1.0)
         total = counts.sum(axis=2, keepdims=True)
-        self.counts = counts
-        """(z, y, x): how often height x followed y after z."""
         self.probability = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0.0)
         """(z, y, x): of height x after y after z; rows of pairs never seen are 0."""
 
