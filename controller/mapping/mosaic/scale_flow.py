@@ -1,7 +1,7 @@
 """Dense flow between wide-baseline pictures: labels (dx, dy, scale) of least energy ([KP] 3.4.1).
 
 The paper minimises ``D = corr``, whose least value is the worst match. This module uses
-``D = 1 - corr`` (docs/errata.md).
+``D = 1 - corr`` (docs/papers.md).
 """
 
 from dataclasses import dataclass
