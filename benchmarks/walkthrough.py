@@ -23,7 +23,7 @@ from benchmarks.provenance import provenance
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.config.loader import load
 from snakewalk.config.walkthrough import WalkthroughConfig
-from snakewalk.controller.mapping.mosaic.labelling import cheapest, descend, energy, labelled
+from snakewalk.controller.mapping.mosaic.labelling import cheapest, descend, labelled
 from snakewalk.controller.mapping.mosaic.local_model import project
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.route import picture_camera, render, views_along
@@ -36,6 +36,7 @@ from snakewalk.controller.mapping.mosaic.scale_flow import (
 )
 from snakewalk.controller.mapping.mosaic.scale_matches import SCALES, match_over_scale
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk, read_walk
+from tests.oracles.labelling_energy import energy
 from tests.oracles.motorcycle import true_depth, write_motorcycle
 from tests.oracles.ravine import Camera, Station, station, write_route
 

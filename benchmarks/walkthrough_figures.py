@@ -23,7 +23,7 @@ from snakewalk.config.walkthrough import WalkthroughConfig
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel
 from snakewalk.controller.mapping.mosaic.mosaic import Mosaic, mosaic
-from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, draw
 from snakewalk.controller.mapping.mosaic.route import RouteView, picture_camera, render, views_along
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk, read_walk
 from snakewalk.controller.mapping.stereo_camera import RectifiedPair
@@ -118,10 +118,8 @@ def psi_of(walk: StereoWalk, at: Look) -> Bools:
     """(H, W) pixels of a view that show points with a counterpart."""
     morph = walk.morphs[at.view.step]
     canvas = Canvas.blank(*CAMERA.size_px)
-    points = (morph.points_m(at.view.share) - at.view.place_m) @ at.view.rotation.T
-    shown = cells(morph.first.points_m) & cells(morph.destination_m)
     mask = np.repeat(np.where(morph.common, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
-    draw(canvas, points, at.camera, shown, mask)
+    draw(canvas, morph.points_m(at.view.share), at.camera @ at.view.motion, morph.cells, mask)
     return np.asarray(canvas.colour[..., 0] > 127)
 
 
@@ -230,7 +228,7 @@ def turned(found: Mosaic) -> Canvas:
     tall, wide = found.model.valid.shape
     canvas = Canvas.blank(wide, tall)
     points = found.model.points_m - np.array([0.1, -0.1, 0.1])
-    draw(canvas, points, found.model.camera, cells(found.model.points_m), found.model.image)
+    draw(canvas, points, found.model.camera @ np.eye(3, 4), found.model.cells, found.model.image)
     return canvas
 
 
@@ -275,7 +273,7 @@ def cut(found: Mosaic, truth: Floats) -> float:
     with np.errstate(invalid="ignore"):
         smooth = near.max(axis=0) / near.min(axis=0) - 1.0 < 2.0 * SMOOTH
     over = inside & (count > 0) & (count < 4) & smooth
-    return float((over & ~cells(found.model.points_m)).sum() / max(over.sum(), 1))
+    return float((over & ~found.model.cells).sum() / max(over.sum(), 1))
 
 
 def figures(walk: StereoWalk, file: Path) -> None:

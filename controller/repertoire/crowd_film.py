@@ -149,7 +149,7 @@ class CrowdScene:
                 centre = crowd.origin_m.copy()
                 centre[:, 2] = np.maximum(centre[:, 2], self._ground.elevation_m(*centre[:, :2].T))
                 levels = detail_levels(frustum, centre, wandering.length_m)
-            if self._wandering.separated is None:
+            if wandering.separated is None:
                 crowd.visible[:] = levels > HIDDEN
             culled = time.process_time()
             wandering.step(steps)

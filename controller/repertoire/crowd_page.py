@@ -19,6 +19,8 @@ from snakewalk.controller.view.scene import draw_water, ground_hit_m, ground_mes
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.sim.rendering.crowd_mesh import COLOURS, MESHES, TubeGrid
 
+_SAMPLES = 2500
+"""Samples of the drawn ground (ours): more slow a browser that draws without a graphics card."""
 FRAMES = 4
 """Frames of the repertoire between two pictures (ours): 15 a second."""
 _LATE_S = 0.25
@@ -48,13 +50,14 @@ class CrowdPage:
     ) -> None:
         self.server, self.url = served_page(host, port)
         self.wandering = wandering
-        self._ground = ground
+        self._ground = ground = _coarse(ground)
         self._chains = DetailedCrowd(ground, wandering.radius_m, wandering.swims)
         self._wish: Floats = np.zeros(3)
         self._inputs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         scene = self.server.scene
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=False)
+        scene.configure_environment_map(None)
         self.frame = scene.add_frame("/crowd", show_axes=False)
         scene.add_mesh_trimesh("/crowd/ground", ground_mesh(ground))
         draw_water(scene, "/crowd/water", water_surface_m(world, ground))
@@ -62,7 +65,7 @@ class CrowdPage:
         numbers = np.arange(len(wandering.species))
         groups = [numbers[:1]]
         groups += [numbers[1:][wandering.species[1:] == k] for k in np.unique(wandering.species)]
-        shades = [colours.rgb(colours.HEAD), *(_rgb(back) for back, _ in COLOURS)]
+        shades = [colours.rgba(colours.HEAD)[:3], *(back[:3] for back, _ in COLOURS)]
         self.drawn: list[tuple[Ints, TubeGrid, viser.MeshHandle]] = []
         """Bodies, grid and mesh of each group."""
         tubes = self._tubes(grid)
@@ -153,6 +156,8 @@ def serve_crowd(
         page.step(FRAMES)
 
 
-def _rgb(colour: tuple[float, float, float, float]) -> tuple[int, int, int]:
-    red, green, blue, _ = (round(255 * part) for part in colour)
-    return red, green, blue
+def _coarse(ground: HeightField) -> HeightField:
+    """Return the ground with about ``_SAMPLES`` samples."""
+    step = max(1, round((ground.z_m.size / _SAMPLES) ** 0.5))
+    z_m = ground.z_m[::step, ::step]
+    return HeightField(z_m, step * ground.spacing_m, ground.x0_m, ground.y0_m)

@@ -33,12 +33,9 @@ class SecondaryController:
         ``patience``: cycles of one segment after which it changes, 1 or more; None: never.
 
         Raises:
-            ValueError: ``patience`` below 1.
             InputError: no segment goes forward.
 
         """
-        if patience is not None and patience < 1:
-            raise ValueError("patience must be at least one cycle")
         segments = repertoire.segments
         self._names = [segment.name for segment in segments]
         self._kinds = np.array([segment.kind for segment in segments])

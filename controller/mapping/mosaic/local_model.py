@@ -1,6 +1,7 @@
 """Local model of a position: points, colours and valid region of a stereo pair ([KP] 3.2)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Self
 
 import cv2
@@ -21,7 +22,7 @@ LARGEST_STEP = 0.08
 """Relative difference of depth between neighbours that belong to one surface (ours)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class LocalModel:
     """Maps ``X, Y, Z`` and ``I`` of a picture over its valid region.
 
@@ -64,6 +65,11 @@ class LocalModel:
     def valid(self) -> Bools:
         """(H, W) the valid region of the maps."""
         return np.isfinite(self.points_m[..., 2])
+
+    @cached_property
+    def cells(self) -> Bools:
+        """(H - 1, W - 1) grid cells whose four corners belong to one surface."""
+        return cells(self.points_m)
 
     @property
     def error_m(self) -> Floats:
@@ -130,3 +136,10 @@ def joined(depth_m: Floats, axis: int) -> Bools:
     with np.errstate(invalid="ignore"):
         together = np.abs(near_m - two) <= LARGEST_STEP * np.minimum(near_m, two)
     return np.moveaxis(together, 0, axis)
+
+
+def cells(points_m: Floats) -> Bools:
+    """(H - 1, W - 1) grid cells whose four corners belong to one surface."""
+    depth = points_m[..., 2]
+    along, across = joined(depth, 1), joined(depth, 0)
+    return along[:-1] & along[1:] & across[:, :-1] & across[:, 1:]

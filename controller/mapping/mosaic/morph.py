@@ -1,12 +1,13 @@
 """Morphable model: a local model and its destination at the next position ([KP] 3.4)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
-from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project, sampled
+from snakewalk.controller.mapping.mosaic.local_model import LocalModel, cells, project, sampled
 from snakewalk.controller.mapping.mosaic.poisson import continued
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_flow import LEAST_CORRELATION, ScaleFlow
@@ -16,7 +17,7 @@ LARGEST_GAP = 0.12
 _LEAST_ISLAND_PX = 40
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class MorphableModel:
     """Model of a position with maps of its destination, in the position's axes."""
 
@@ -34,12 +35,10 @@ class MorphableModel:
         """(H, W, 3) vertices by Eq. 1: ``(1 - m) X_k + m X_dst``."""
         return (1.0 - share) * self.first.points_m + share * self.destination_m
 
-    def colours(self, share: float) -> Floats:
-        """(H, W, 3) colours of the vertices by Eq. 2 to 4."""
-        first_colour = self.first.image.astype(float)
-        other = sampled(self.second.image.astype(np.float32), self.counterpart_px)
-        there = np.where(self.common[..., None], other, first_colour)
-        return (1.0 - share) * first_colour + share * there
+    @cached_property
+    def cells(self) -> Bools:
+        """(H - 1, W - 1) cells that belong to one surface here and at the destination."""
+        return self.first.cells & cells(self.destination_m)
 
 
 def dense_flow(

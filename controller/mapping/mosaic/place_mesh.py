@@ -7,7 +7,6 @@ import numpy as np
 import trimesh
 from PIL import Image as Pillow
 
-from snakewalk.controller.mapping.mosaic.rasteriser import cells
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
 from snakewalk.controller.mapping.mosaic.walk_ground import level_stand
 
@@ -36,7 +35,7 @@ def write_place(file: Path, walk: StereoWalk, error_m: float) -> None:
         vertices = (points_m @ stand.world_from_camera().T @ to_gltf.T).reshape(-1, 3)
         vertices[:, 1] += stand.height_m
         near = model.near(error_m)
-        shown = cells(model.points_m) & near[1:, 1:] & near[:-1, :-1]
+        shown = model.cells & near[1:, 1:] & near[:-1, :-1]
         corner = (np.arange(high * wide).reshape(high, wide)[:-1, :-1])[shown]
         faces = np.concatenate(
             [

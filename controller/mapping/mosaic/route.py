@@ -10,7 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, SecondTexture, cells, draw
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, SecondTexture, draw
 from snakewalk.controller.mapping.mosaic.walk import StereoWalk
 from snakewalk.sim.rendering.movie_file import MovieFile
 
@@ -30,6 +30,11 @@ class RouteView:
     """(3, 3) from the axes of that position to the camera's."""
     place_m: Floats
     """(3,) of the camera, in the axes of that position."""
+
+    @property
+    def motion(self) -> Floats:
+        """(3, 4) from the axes of that position to the camera's."""
+        return self.rotation @ np.column_stack([np.eye(3), -self.place_m])
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,13 +92,11 @@ def render(
     canvas = Canvas.blank(*size_px)
     if walk.morphs:
         morph = walk.morphs[view.step]
-        points = (morph.points_m(view.share) - view.place_m) @ view.rotation.T
-        shown = cells(morph.first.points_m) & cells(morph.destination_m)
         draw(
             canvas,
-            points,
-            camera,
-            shown,
+            morph.points_m(view.share),
+            camera @ view.motion,
+            morph.cells,
             morph.first.image,
             SecondTexture(morph.second.image, morph.counterpart_px, view.share),
         )
@@ -111,11 +114,10 @@ def _draw_model(
 ) -> None:
     model = walk.models[number]
     pose, base = walk.poses[number], walk.poses[view.step]
-    turn = view.rotation @ base[:, :3].T
-    place_m = turn @ (pose[:, 3] - base[:, 3]) - view.rotation @ view.place_m
-    points_m = model.points_m @ (turn @ pose[:, :3]).T + place_m
+    motion = base[:, :3].T @ pose
+    motion[:, 3] -= base[:, :3].T @ base[:, 3] + view.place_m
     canvas.blocked = canvas.drawn
-    draw(canvas, points_m, camera, cells(model.points_m), model.image)
+    draw(canvas, model.points_m, camera @ view.rotation @ motion, model.cells, model.image)
 
 
 def film(

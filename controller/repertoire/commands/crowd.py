@@ -128,7 +128,8 @@ def crowd(
             on_frame=bar.update,
         )
     costs = scene.costs
-    hidden, far, middle, near = (round(float(of), 1) for of in costs.levels / costs.frames)
+    names = ("hidden_mean", "far_mean", "middle_mean", "near_mean")
+    means = (costs.levels / costs.frames).round(1).tolist()
     show(
         {
             "film": str(out),
@@ -136,10 +137,7 @@ def crowd(
             "bodies": sum(counts),
             "frames": frames,
             "reached": int(wandering.reached.sum()),
-            "hidden_mean": hidden,
-            "far_mean": far,
-            "middle_mean": middle,
-            "near_mean": near,
+            **dict(zip(names, means, strict=True)),
             "motion_ms_a_frame": round(1e3 * costs.motion_s / costs.frames, 3),
             "laying_ms_a_frame": round(1e3 * costs.laying_s / costs.frames, 3),
         },

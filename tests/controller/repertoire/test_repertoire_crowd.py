@@ -229,5 +229,3 @@ def test_a_segment_repeated_too_long_is_changed_for_one_alike(repertoire: Repert
     assert set(names) == {"forward-fast", "forward-medium"}
     turns = [repertoire.segments[control.choose(0.6, 0.9)].name for _ in range(8)]
     assert set(turns) == {"left-sharp", "left-gentle"}
-    with pytest.raises(ValueError, match="at least one"):
-        SecondaryController(repertoire, patience=0)

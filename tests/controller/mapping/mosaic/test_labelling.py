@@ -8,10 +8,10 @@ import pytest
 from snakewalk.controller.mapping.mosaic.labelling import (
     cheapest,
     descend,
-    energy,
     flow_of,
     labelled,
 )
+from tests.oracles.labelling_energy import energy
 
 
 def problem(seed: int, rows: int = 2, columns: int = 3) -> tuple[np.ndarray, np.ndarray]:

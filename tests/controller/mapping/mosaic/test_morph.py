@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from snakewalk.controller.mapping.mosaic.local_model import sampled
+from snakewalk.controller.mapping.mosaic.local_model import cells, sampled
 from snakewalk.controller.mapping.mosaic.morph import MorphableModel, morphable
-from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, cells, draw
+from snakewalk.controller.mapping.mosaic.rasteriser import Canvas, SecondTexture, draw
 from snakewalk.controller.mapping.mosaic.relative_pose import RelativePose
 from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
 from tests.controller.mapping.mosaic.test_relative_pose import K, nearer, wall
+
+VIEW = K @ np.eye(3, 4)
 
 
 def approach(ahead_m: float = 0.5) -> MorphableModel:
@@ -24,14 +26,9 @@ def test_the_morph_begins_at_one_model_and_ends_at_the_next() -> None:
     common, places = morph.common, morph.counterpart_px
     assert common.mean() > 0.4
     np.testing.assert_array_equal(morph.points_m(0.0), morph.first.points_m)  # Eq. 1
-    np.testing.assert_array_equal(morph.colours(0.0), morph.first.image)  # Eq. 2
     there = sampled(morph.second.points_m.astype(np.float32), places)
     met = morph.pose.back(there)  # Eq. 3
     np.testing.assert_allclose(morph.points_m(1.0)[common], met[common], atol=1e-6)
-    colour = sampled(morph.second.image.astype(np.float32), places)
-    np.testing.assert_allclose(morph.colours(1.0)[common], colour[common], atol=1e-3)
-    outside = morph.first.valid & ~common  # Eq. 4
-    np.testing.assert_array_equal(morph.colours(1.0)[outside], morph.first.image[outside])
     half = 0.5 * (morph.points_m(0.0) + morph.points_m(1.0))
     np.testing.assert_allclose(morph.points_m(0.5), half)
 
@@ -83,7 +80,7 @@ def test_the_first_picture_is_the_photograph_and_holes_stay_holes() -> None:
     points = model.points_m.copy()
     points[40:60, 80:120] = np.nan
     canvas = Canvas.blank(240, 180)
-    draw(canvas, points, K, cells(points), model.image)
+    draw(canvas, points, VIEW, cells(points), model.image)
     inside = canvas.drawn
     assert not inside[41:59, 81:119].any()
     assert inside.mean() > 0.95
@@ -101,7 +98,7 @@ def test_a_slanted_plane_is_drawn_in_perspective_and_the_nearer_surface_wins() -
     image = np.repeat(ramp, 3, axis=2).astype(np.uint8)
     canvas = Canvas.blank(240, 180)
     whole = np.ones((29, 4), bool)
-    draw(canvas, points, K, whole, image)
+    draw(canvas, points, VIEW, whole, image)
     rows = np.arange(110, 170)
     depth = 0.5 * 200.0 / (rows - K[1, 2])
     kept = (depth > near + 0.1) & (depth < far - 0.1)
@@ -110,9 +107,26 @@ def test_a_slanted_plane_is_drawn_in_perspective_and_the_nearer_surface_wins() -
     np.testing.assert_allclose(canvas.colour[rows[kept], 120, 0], wanted, atol=2.0)
     across, down = np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-1, 1, 30))
     wall_m = np.stack([across, down, np.full_like(down, 3.0)], -1)
-    draw(canvas, wall_m, K, whole, np.full_like(image, 77))
+    draw(canvas, wall_m, VIEW, whole, np.full_like(image, 77))
     assert canvas.colour[rows[depth > 3.1], 120, 0] == pytest.approx(77)
     assert (canvas.colour[rows[kept & (depth < 2.9)], 120, 0] > 77).all()
+
+
+def test_the_second_texture_is_mixed_in_where_a_vertex_has_a_counterpart() -> None:
+    """Eq. 2 to 4."""
+    model = wall()
+    tall, wide = model.valid.shape
+    there_px = np.stack(np.meshgrid(np.arange(wide), np.arange(tall)), axis=-1) + 0.5
+    there_px[:, 120:] = np.nan
+    ramp = np.repeat(np.arange(wide, dtype=np.uint8)[None, :, None], tall, axis=0)
+    second = np.ascontiguousarray(np.broadcast_to(ramp, (tall, wide, 3)))
+    first = np.full((tall, wide, 3), 200, np.uint8)
+    canvas = Canvas.blank(240, 180)
+    draw(canvas, model.points_m, VIEW, model.cells, first, SecondTexture(second, there_px, 0.25))
+    columns = np.arange(10, 110)
+    expected = 0.75 * 200 + 0.25 * (columns + 0.5)
+    np.testing.assert_allclose(canvas.colour[90, columns, 0], expected, atol=1.0)
+    assert (canvas.colour[90, 125:230] == 200).all()
 
 
 def test_what_no_camera_saw_is_grey() -> None:
@@ -132,7 +146,7 @@ def test_blocked_pixels_do_not_change() -> None:
     canvas.colour[:, :100] = 7
     canvas.depth_m[:, :100] = 5.0  # farther than the wall
     canvas.blocked = canvas.drawn
-    draw(canvas, model.points_m, K, cells(model.points_m), model.image)
+    draw(canvas, model.points_m, VIEW, model.cells, model.image)
     assert (canvas.colour[:, :100] == 7).all()
     off = canvas.colour[5:-5, 105:-5].astype(int) - model.image[5:-5, 105:-5]
     assert np.abs(off).max() <= 1
