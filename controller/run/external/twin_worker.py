@@ -19,7 +19,7 @@ from snakewalk.controller.walk.twin_rollout import TwinRollout
 
 PIECE_S = 0.22
 """Time of a piece in a rehearsal: median CPU time of 807 pieces on a busy machine; a tenth needed
-less than 0.16 s (docs/benchmarks/steep-rehearsal.md)."""
+less than 0.16 s (docs/benchmarks/rehearsal.md)."""
 LARGEST_BYTES = 60_000
 """Largest question that a pipe accepts at once."""
 
