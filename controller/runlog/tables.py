@@ -41,8 +41,8 @@ _TABLES: Mapping[str, type[Table]] = {
 """Tables of a record, by attribute."""
 
 
-_PARTS = 16
-"""Parts of a table that stay in memory (ours): 22 minutes at 50 Hz."""
+_PARTS = 4
+"""Parts of a table that stay in memory (ours): 5 minutes at 50 Hz."""
 
 
 class RowPacker:

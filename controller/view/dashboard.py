@@ -130,7 +130,7 @@ class Dashboard:
             facts.append(f"{share:.0%} of the walk on wide waves")
         evidence = record.header.pose_evidence
         believes = "" if evidence.is_measured or not facts else "believed: "
-        colour = _INK if evidence.is_measured else _WARN
+        colour = _INK if evidence.is_measured else _BAD_COLOUR
         evidence_html = f"<span style='color:{colour}'>pose: {escape(evidence.text)}</span>"
         self._state.content = (
             f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "

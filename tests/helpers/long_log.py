@@ -68,5 +68,5 @@ def repeat_log(source: Path, target: Path, times: int, chunk_bytes: int = 1 << 2
 
 
 def pack_early(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
-    """Turn each few rows of a log into arrays, and 16 times as many into files."""
+    """Turn each few rows of a log into arrays, and four times as many into files."""
     monkeypatch.setattr(tables, "ROWS", rows)
