@@ -85,14 +85,14 @@ class Detections:
         if body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
-            first = np.asarray(silhouette.origin_px)
-            line = body.points_px - first
-            ends_px = profile_ends(line, body.radius_px, silhouette.level, blur_px)
-            ends_px[:, :2] += first
             if is_tailed:
-                ends_px = NO_ENDS
                 self.tip_error_px[number] = detection.tip_error_px
-            elif detection.faint_parts:
+            else:
+                first = np.asarray(silhouette.origin_px)
+                line = body.points_px - first
+                ends_px = profile_ends(line, body.radius_px, silhouette.level, blur_px)
+                ends_px[:, :2] += first
+            if detection.faint_parts:
                 hidden = min(1.0, silhouette.noise_level / max(silhouette.threshold, 1e-9))
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN_PART * hidden**2 * body.length_px)
                 self.bands_px.append(_longest_band_px(body, detection))
@@ -144,10 +144,8 @@ class Detections:
     def skip(self, status: FrameStatus) -> None:
         """Add a frame in which the animal is not searched for."""
         self.skeletons.append(no_skeleton(status))
-        self.area_px.append(0.0)
-        self.noise.append(0.0)
-        self.contrast.append(0.0)
-        self.distractors.append(0.0)
+        for values in (self.area_px, self.noise, self.contrast, self.distractors):
+            values.append(0.0)
         self.expected_px.append(np.nan)
         self.axis_error_px.append(np.nan)
         self.ends_px.append(NO_ENDS)

@@ -23,8 +23,8 @@ def margin_of(body: Skeleton, before: Skeleton) -> float:
     """
     point = body.points_px - body.points_px.mean(axis=0)
     there = before.points_px - before.points_px.mean(axis=0)
-    same_order_px = float(np.sqrt(((point - there) ** 2).sum(axis=1)).mean())
-    other = float(np.sqrt(((point[::-1] - there) ** 2).sum(axis=1)).mean())
+    same_order_px = float(np.hypot(*(point - there).T).mean())
+    other = float(np.hypot(*(point[::-1] - there).T).mean())
     return (other - same_order_px) / max(other + same_order_px, 1e-9)
 
 
@@ -76,11 +76,6 @@ def _asymmetry(body: Skeleton) -> Floats:
 def _agreement(vector: Floats, other: Floats) -> float:
     """-1 to 1: whether two asymmetries have the same sign; about 0 where there is hardly one."""
     scale = float(np.abs(other).mean())
-    product = float(
-        (vector * other).sum() / max(np.hypot(*_norms(vector, other)) ** 2 / 2.0, 1e-12)
-    )
+    squares = float(vector @ vector + other @ other)
+    product = 2.0 * float(vector @ other) / max(squares, 1e-12)
     return product * min(1.0, scale / 0.1)
-
-
-def _norms(vector: Floats, other: Floats) -> tuple[float, float]:
-    return float(np.linalg.norm(vector)), float(np.linalg.norm(other))

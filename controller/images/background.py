@@ -20,7 +20,7 @@ _QUANTILE = 0.85  # a slow dark animal may cover a pixel in up to this share of 
 
 def median_background(frames: Sequence[DeepImage]) -> DeepImage:
     """Median (H, W[, 3]) over frames of one size; each pixel must be uncovered in half of them."""
-    return _quantile(np.stack(frames), 0.5)
+    return _quantiles(frames, 0.5)[0]
 
 
 def background_candidates(
@@ -32,19 +32,20 @@ def background_candidates(
         Background (H, W[, 3]), the polarity that it assumes (None: any), and its name.
 
     """
-    stack = np.stack(frames)
-    yield _quantile(stack, 0.5), None, "the median of frames"
-    yield _quantile(stack, _QUANTILE), Polarity.DARK, "the lighter half of the frames at each place"
-    yield (
-        _quantile(stack, 1.0 - _QUANTILE),
-        Polarity.LIGHT,
-        "the darker half of the frames at each place",
-    )
+    median, lighter, darker = _quantiles(frames, 0.5, _QUANTILE, 1.0 - _QUANTILE)
+    yield median, None, "the median of frames"
+    yield lighter, Polarity.DARK, "the lighter half of the frames at each place"
+    yield darker, Polarity.LIGHT, "the darker half of the frames at each place"
 
 
-def _quantile(stack: DeepImage, quantile: float) -> DeepImage:
-    place = round(quantile * (len(stack) - 1))
-    return np.ascontiguousarray(np.partition(stack, place, axis=0)[place])
+def _quantiles(frames: Sequence[DeepImage], *quantiles: float) -> list[DeepImage]:
+    """Quantiles of each pixel, by exchanges of neighbours until all frames are in order."""
+    rows = list(frames)
+    for number in range(len(rows)):
+        for k in range(number % 2, len(rows) - 1, 2):
+            pair = rows[k], rows[k + 1]
+            rows[k], rows[k + 1] = np.minimum(*pair), np.maximum(*pair)
+    return [rows[round(quantile * (len(rows) - 1))] for quantile in quantiles]
 
 
 def smooth_background(image: DeepImage) -> DeepImage:

@@ -33,6 +33,7 @@ _LONGER_THAN_CORE = 1.15  # times the length without the faint parts: they belon
 _LENGTH_TOLERANCE = 0.15  # of the length: frames agree on it
 _BETTER_SHARE = 0.04  # of the frames: this many more must agree for another ground than the median
 _FEWEST = 5  # frames to estimate a ground
+_TURNS = 3  # a ground that shows no body in this part of the frames is not tried in the others
 _CALM = 8  # frames whose median has little noise
 _CLEAR = 0.9  # share above which no other size of the surroundings is tried
 _VOTES = 9  # frames that usually decide whether the animal is dark or light
@@ -104,7 +105,9 @@ class BodyDetector:
                 f"a frame is {_size(image)}, the background {_size(background)}: they must be alike"
             )
         body = silhouette_of(image, background, self.polarity, self.threshold, wide_margin=True)
-        detection = self._judged_detection(image, background, body)
+        confirmed = self._confirmed(image, background, body)
+        core = _skeleton_of(confirmed)
+        detection = self._checked_detection(image, background, confirmed, core)
         if self.threshold is not None:
             return detection
         faint = may_have_faint_parts(body)
@@ -113,21 +116,21 @@ class BodyDetector:
         hidden = body.noise_level > _HIDING * body.threshold
         part = detection.skeleton.status is FrameStatus.PART
         may_go_on = faint or hidden or part or _has_thin_end(detection.skeleton)
-        tailed = self._with_tails(image, background, body) if may_go_on else None
+        tailed = self._with_tails(image, background, body, core) if may_go_on else None
         best = detection if tailed is None else tailed
         if faint:
             fuller = with_faint_parts(image, background, self.polarity, body)
             if fuller is not None:
-                other = self._judged_detection(image, background, fuller)
+                fuller = self._confirmed(image, background, fuller)
+                other = self._checked_detection(image, background, fuller, _skeleton_of(fuller))
                 length = np.nan_to_num(best.skeleton.length_px)
                 least = _LONGER_THAN_CORE if tailed is None else _LONGER_THAN_TAILED
                 if other.skeleton.length_px > least * length:
                     return replace(other, faint_parts=True, core_threshold=body.threshold)
         return best if tailed is not None else replace(detection, may_have_faint_parts=faint)
 
-    def _judged_detection(
-        self, image: DeepImage, background: DeepImage, body: Silhouette
-    ) -> Detection:
+    def _confirmed(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Silhouette:
+        """The silhouette; its status is ``CUT`` or ``GHOST`` if it is no complete animal."""
         if self.inside is not None and body.status is FrameStatus.GOOD:
             left, top = (int(v) for v in body.origin_px)
             rows, columns = body.mask.shape
@@ -136,10 +139,7 @@ class BodyDetector:
         may_be_ghost = self.background is not None and body.status is FrameStatus.GOOD
         if may_be_ghost and is_ghost(image, background, body):
             body = replace(body, status=FrameStatus.GHOST)
-        if body.status is not FrameStatus.GOOD:
-            return Detection(body, no_skeleton(body.status), background)
-        skeleton = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
-        return self._checked_detection(image, background, body, skeleton)
+        return body
 
     def _checked_detection(
         self, image: DeepImage, background: DeepImage, body: Silhouette, skeleton: Skeleton
@@ -153,12 +153,9 @@ class BodyDetector:
         return Detection(body, skeleton, background)
 
     def _with_tails(
-        self, image: DeepImage, background: DeepImage, body: Silhouette
+        self, image: DeepImage, background: DeepImage, body: Silhouette, core: Skeleton
     ) -> Detection | None:
         """The body with a faint tail that is thin beyond its silhouette; None without one."""
-        if body.status is not FrameStatus.GOOD:
-            return None
-        core = skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
         if core.status is not FrameStatus.GOOD:
             return None
         tailed = with_tails(image, background, self.polarity, body, core)
@@ -176,6 +173,12 @@ class BodyDetector:
         if self.surroundings_px:
             return surrounding_ground(image, self.polarity, self.surroundings_px)
         return smooth_background(image)
+
+
+def _skeleton_of(body: Silhouette) -> Skeleton:
+    if body.status is not FrameStatus.GOOD:
+        return no_skeleton(body.status)
+    return skeleton_of_level(body.level, body.threshold, body.origin_px, body.noise_level)
 
 
 def _has_thin_end(body: Skeleton) -> bool:
@@ -220,16 +223,23 @@ def make_detector(
         given = replace(plain, background=background, background_source="given")
         given.detect(frames[0])
         return replace(given, polarity=usual_polarity(frames, background))
-    best = _learnt(replace(plain, search_faint_parts=False), frames, cropped=cropped)
+    fixed = not cropped and len(frames) >= _FEWEST and len({frame.shape for frame in frames}) == 1
+    grounds = [*background_candidates(frames)] if fixed else []
+    best = _learnt(replace(plain, search_faint_parts=False), frames, grounds)
     if best.share < _SURE_SHARE:
-        other = _learnt(plain, frames, cropped=cropped)
+        other = _learnt(plain, frames, grounds)
         best = other if other.share > best.share + _BETTER_SHARE else best
     elif best.faint_share >= _SURE_SHARE:
-        best = _best_candidate([best, _learnt(plain, frames, cropped=cropped)])
+        best = _best_candidate([best, _learnt(plain, frames, grounds)])
     return replace(best.detector, search_faint_parts=True)
 
 
-def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) -> "_Candidate":
+def _learnt(
+    plain: BodyDetector,
+    frames: Sequence[DeepImage],
+    grounds: Sequence[tuple[DeepImage, Polarity | None, str]],
+) -> "_Candidate":
+    """The best ground for some frames; ``grounds`` are those of ``background_candidates``."""
     surface = replace(
         plain,
         polarity=usual_polarity(frames, None),
@@ -239,7 +249,7 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
     around = _with_surroundings(surface, alone[0], frames)
     if around is not None:
         alone.append(_Candidate.of(around, frames))
-    if cropped or len({frame.shape for frame in frames}) > 1 or len(frames) < _FEWEST:
+    if not grounds:
         return _best_candidate(alone)
     median, *quantiles = [
         replace(
@@ -248,10 +258,10 @@ def _learnt(plain: BodyDetector, frames: Sequence[DeepImage], *, cropped: bool) 
             polarity=usual_polarity(frames, candidate) if polarity is None else polarity,
             background_source=source,
         )
-        for candidate, polarity, source in background_candidates(frames)
+        for candidate, polarity, source in grounds
     ]
     fixed = [median, *quantiles]
-    painted = _repainted_detector(_best_detector(alone), frames)
+    painted = _repainted_detector(_best_candidate(alone).detector, frames)
     if painted is not None:
         fixed.insert(1, painted)
     return _best_candidate([*(_Candidate.of(detector, frames) for detector in fixed), *alone])
@@ -280,11 +290,14 @@ class _Candidate:
 
     @classmethod
     def of(cls, detector: BodyDetector, frames: Sequence[DeepImage]) -> "_Candidate":
-        detections = [detector.detect(frame) for frame in frames]
-        bodies = [detection.skeleton for detection in detections]
-        length = np.array([body.length_px for body in bodies])
-        if not np.isfinite(length).any():
-            return cls(detector, 0.0, 0.0, 0.0, 0.0, 0.0)
+        detections: list[Detection] = []
+        length = np.zeros(0)
+        for start in range(_TURNS):
+            detections += map(detector.detect, frames[start::_TURNS])
+            bodies = [detection.skeleton for detection in detections]
+            length = np.array([body.length_px for body in bodies])
+            if not np.isfinite(length).any():
+                return cls(detector, 0.0, 0.0, 0.0, 0.0, 0.0)
         usual = float(np.nanmedian(length))
         share = float(np.mean(np.abs(length - usual) < _LENGTH_TOLERANCE * usual))
         width = 2.0 * float(np.nanmedian([np.median(body.radius_px) for body in bodies]))
@@ -295,10 +308,6 @@ class _Candidate:
         ]
         faint = float(np.mean([detection.may_have_faint_parts for detection in detections]))
         return cls(detector, share, usual, width, float(np.median(edges)), faint)
-
-
-def _best_detector(candidates: Sequence[_Candidate]) -> BodyDetector:
-    return _best_candidate(candidates).detector
 
 
 def _best_candidate(candidates: Sequence[_Candidate]) -> _Candidate:
@@ -341,7 +350,7 @@ def _with_surroundings(
         candidates.append(_Candidate.of(detector, frames[:: max(1, len(frames) // 9)]))
         if candidates[-1].share >= _CLEAR:
             break
-    return _best_detector(candidates)
+    return _best_candidate(candidates).detector
 
 
 def _repainted_detector(detector: BodyDetector, frames: Sequence[DeepImage]) -> BodyDetector | None:

@@ -36,7 +36,6 @@ WORKING_WIDTH = 14.0
 """Width of the body while it is thinned, px."""
 _SMOOTH = 3.0  # of the chain of pixels, working px
 _CENTRINGS = 2
-_TURN_GAIN = 1.0  # of the turn towards the ridge on the way to a tip
 _MOST_TURN = float(np.tan(np.radians(37.0)))  # of that way from the line's own end: beyond lies an
 # eye, or another part next to the body (tried on a film of a larva)
 _WIDE_END = 1.35  # of the median depth: an end with a deeper place is a head with eyes on its sides
@@ -350,9 +349,9 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
         last = float(level[0])
         weight = np.maximum(level[1:] - threshold, 0.0)
         off = float((weight * across).sum() / max(float(weight.sum()), 1e-9))
-        turned = ahead + _TURN_GAIN * off / WORKING_WIDTH * side
+        turned = ahead + off / WORKING_WIDTH * side
         ahead = _bounded_direction(turned, first)
-        tip = there + 0.5 * _TURN_GAIN * off * side
+        tip = there + 0.5 * off * side
         tips.append(tip)
     return np.asarray(tips)
 

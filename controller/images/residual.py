@@ -6,7 +6,7 @@ import numpy as np
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.controller.images.background import surrounding_ground
 from snakewalk.controller.images.medial_axis import Skeleton
-from snakewalk.controller.images.silhouette import Polarity, Silhouette, as_deep_as, contrast
+from snakewalk.controller.images.silhouette import Polarity, Silhouette, soft_contrast
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _MARGIN_LENGTHS = 0.5  # of the length: margin on each side
@@ -49,16 +49,18 @@ def check_residual(
     ground = background[window]
     body = np.zeros(window_image.shape[:2], dtype=bool)
     body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
-    soft_level = _soft(contrast(window_image, ground, polarity))
+    soft_level = soft_contrast(window_image, ground, polarity)
     level = 2.0 * silhouette.threshold
     mass = float(soft_level[body].sum())
     least = max(silhouette.noise_level, _WEAK_LEVEL * level)
     tips = skeleton.points_px[[0, -1]] - [low_x, low_y]
-    if _beyond_tips(soft_level, body, tips, wide, least) > _PART * mass:
+    apart = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5)
+    away_px = np.asarray(apart, dtype=np.float32)
+    if _beyond_tips(soft_level, away_px, tips, wide, least) > _PART * mass:
         return FrameStatus.PART
     if ghosts and polarity is not Polarity.BOTH:
         least = max(silhouette.noise_level, _GHOST_WEAK * level)
-        if _ghost(window_image, ground, polarity, body, wide, least) > _GHOST * mass:
+        if _ghost(window_image, ground, polarity, away_px, wide, least) > _GHOST * mass:
             return FrameStatus.GHOST
     return FrameStatus.GOOD
 
@@ -88,18 +90,17 @@ def _gradient(image: DeepImage, places: Bools) -> Floats:
 
 
 def _beyond_tips(
-    soft_level: DeepImage, body: Bools, tips: Floats, wide: float, least: float
+    soft_level: DeepImage, away_px: DeepImage, tips: Floats, wide: float, least: float
 ) -> float:
     """Summed contrast of residuals that start at a tip and lead away from the body."""
-    distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
-    rest = (soft_level > least) & (distance_px > 1.5)
+    rest = (soft_level > least) & (away_px > 1.5)
     count, label = cv2.connectedComponents(rest.astype(np.uint8), connectivity=8)
     y, x = np.nonzero(rest)
     part = label[rest]
     near = np.zeros(count, dtype=bool)
     for tip in tips:
         near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR_WIDTHS * wide + 2.0]] = True
-    away = rest & (distance_px > _AWAY_WIDTHS * wide)
+    away = rest & (away_px > _AWAY_WIDTHS * wide)
     return float(soft_level[away & near[label]].sum())
 
 
@@ -107,22 +108,16 @@ def _ghost(
     window_image: DeepImage,
     ground: DeepImage,
     polarity: Polarity,
-    body: Bools,
+    away_px: DeepImage,
     wide: float,
     least: float,
 ) -> float:
     """Summed contrast of the wrong sign next to the body, if the ground shows a similar shape."""
-    opposite = Polarity.LIGHT if polarity is Polarity.DARK else Polarity.DARK
-    wrong = _soft(contrast(window_image, ground, opposite))
+    wrong = soft_contrast(ground, window_image, polarity)
     side = 2 * round(1.5 * wide) + 3
-    ground_contrast = contrast(ground, surrounding_ground(ground, polarity, side), polarity)
-    distance_px = np.asarray(cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5))
-    shown = (wrong > least) & (_soft(ground_contrast) > least) & (distance_px > 1.5)
+    ground_level = soft_contrast(ground, surrounding_ground(ground, polarity, side), polarity)
+    shown = (wrong > least) & (ground_level > least) & (away_px > 1.5)
     count, label = cv2.connectedComponents(shown.astype(np.uint8), connectivity=8)
     near = np.zeros(count, dtype=bool)
-    near[label[shown & (distance_px < wide)]] = True
+    near[label[shown & (away_px < wide)]] = True
     return float(wrong[shown & near[label]].sum())
-
-
-def _soft(contrast_image: DeepImage) -> DeepImage:
-    return as_deep_as(contrast_image, cv2.GaussianBlur(contrast_image, (3, 3), 0.0))

@@ -113,16 +113,17 @@ def silhouette_of(
     clear = middle + _CLEAR * spread
     if threshold is not None:
         return cut_out(contrast_image, threshold, min(clear, threshold), middle, margin)
-    parts = connected_parts((contrast_image > clear).astype(np.uint8))
-    if parts is None:
+    threshold = body_threshold(contrast_image, middle, spread)
+    if threshold is None:
         return _no_silhouette()
-    threshold = _threshold_of_body(contrast_image, *parts, middle, middle + 3.0 * spread)
     return cut_out(contrast_image, threshold, clear, middle, margin)
 
 
-def body_threshold(contrast_image: DeepImage) -> float | None:
-    """Half of the strongest body's contrast, from a contrast (H, W); None: no body."""
-    middle, spread = noise_of(contrast_image)
+def body_threshold(contrast_image: DeepImage, middle: float, spread: float) -> float | None:
+    """Half of the strongest body's contrast, from a contrast (H, W) and its ``noise_of``.
+
+    None: no body.
+    """
     parts = connected_parts((contrast_image > middle + _CLEAR * spread).astype(np.uint8))
     if parts is None:
         return None
@@ -142,9 +143,9 @@ def _threshold_of_body(
     is fainter than half of its strong pixels, its contrast is a percentile weighted by squared
     contrast. The sum counts pixels above half of the part's contrast.
     """
-    strength = np.maximum(contrast_image.astype(np.float32) - middle, 0.0)
-    inside = label > 0
-    squares = np.bincount(label[inside], weights=strength[inside] ** 2, minlength=len(stats))
+    inside = np.flatnonzero(label > 0)
+    strength = np.maximum(contrast_image.ravel()[inside].astype(np.float32) - middle, 0.0)
+    squares = np.bincount(label.ravel()[inside], weights=strength**2, minlength=len(stats))
     best = least
     most = -1.0
     for part in np.argsort(squares)[: -_CANDIDATES - 1 : -1]:
@@ -152,7 +153,8 @@ def _threshold_of_body(
             break
         left, top, wide, high, _ = (int(v) for v in stats[part])
         window = (slice(top, top + high), slice(left, left + wide))
-        body_strength = np.sort(strength[window][label[window] == part])
+        body_strength = np.sort(contrast_image[window][label[window] == part].astype(np.float32))
+        body_strength = np.maximum(body_strength - middle, 0.0)
         weight = np.cumsum(body_strength**2)
         level = float(body_strength[np.searchsorted(weight, _SHARE * weight[-1])])
         usual = float(np.percentile(body_strength, 70))
@@ -177,7 +179,10 @@ def connected_parts(mask: DeepImage) -> tuple[Int32s, Int32s] | None:
     if wide * high < _LEAST_AREA_PX:
         return None
     window = (slice(top, top + high), slice(left, left + wide))
-    count, inner, stats, _ = cv2.connectedComponentsWithStats(mask[window], connectivity=8)
+    few = cv2.countNonZero(mask) < np.iinfo(np.uint16).max
+    count, inner, stats, _ = cv2.connectedComponentsWithStats(
+        mask[window], connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S
+    )
     if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_AREA_PX:
         return None
     label = np.zeros(mask.shape, dtype=np.int32)
@@ -200,7 +205,9 @@ def cut_out(
         return _no_silhouette()
     label, stats = parts
     areas = stats[1:, cv2.CC_STAT_AREA]
-    sums = np.bincount(label[above], weights=contrast_image[above] - np.float32(middle))
+    inside = np.flatnonzero(above)
+    strength = contrast_image.ravel()[inside] - np.float32(middle)
+    sums = np.bincount(label.ravel()[inside], weights=strength)
     best = 1 + int(np.argmax(sums[1:]))
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = contrast_image.shape

@@ -23,8 +23,9 @@ from snakewalk.controller.capture.several.blobs import (
 )
 from snakewalk.controller.capture.several.identities import Identity, identities_of
 from snakewalk.controller.capture.several.tracklets import TrackletBuilder
-from snakewalk.controller.images.background import median_background
+from snakewalk.controller.images.background import background_candidates
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
+from snakewalk.controller.images.silhouette import Polarity, as_deep_as
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DIRT = 0.05  # of the usual area: smaller objects are not mentioned
@@ -150,11 +151,18 @@ def with_bare_ground(detector: BodyDetector, frames: Sequence[DeepImage]) -> Bod
             cover[top : top + rows, left : left + columns] |= body.mask
         cover[:] = cv2.morphologyEx(cv2.dilate(cover, box), cv2.MORPH_CLOSE, gap)
     free = len(frames) - covered.sum(axis=0, dtype=int)
-    ground = median_background(frames)
+    grounds = {polarity: ground for ground, polarity, _ in background_candidates(frames)}
+    clear = grounds.get(detector.polarity, grounds[None]).astype(np.float32)
+    clear -= np.median(clear - grounds[None], axis=(0, 1))
+    ground = as_deep_as(first, np.maximum(clear, 0.0))
     learnt = (free >= _FEWEST_FREE) & (free < len(frames))
     levels = stack[:, learnt].astype(np.float32)
     levels[covered[:, learnt] > 0] = np.nan
-    ground[learnt] = np.nanmedian(levels, axis=0)
+    bare = np.nanmedian(levels, axis=0)
+    if detector.polarity is not Polarity.BOTH:  # an unseen part of a tail is not covered
+        lighter = detector.polarity is Polarity.DARK
+        bare = np.maximum(bare, ground[learnt]) if lighter else np.minimum(bare, ground[learnt])
+    ground[learnt] = bare
     if ground.dtype == np.uint8:
         hidden = (free < _FEWEST_FREE).astype(np.uint8)
         ground = np.asarray(cv2.inpaint(ground, hidden, _INPAINT_PX, cv2.INPAINT_TELEA))

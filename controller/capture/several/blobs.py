@@ -10,7 +10,12 @@ from snakewalk.config.arrays import Bools, DeepImage, Floats, Int32s, Ints
 from snakewalk.config.errors import InputError
 from snakewalk.controller.images.background import background_candidates, median_background
 from snakewalk.controller.images.body_detector import BodyDetector, usual_polarity
-from snakewalk.controller.images.silhouette import body_threshold, connected_parts, soft_contrast
+from snakewalk.controller.images.silhouette import (
+    body_threshold,
+    connected_parts,
+    noise_of,
+    soft_contrast,
+)
 
 SMALLEST = 0.3
 """Area of a blob over the usual area of an animal; smaller ones are dirt."""
@@ -52,7 +57,9 @@ def blobs_of(
     contrast_image = soft_contrast(frame, ground, detector.polarity)
     if detector.inside is not None:
         contrast_image = np.where(detector.inside, contrast_image, np.zeros_like(contrast_image))
-    threshold = body_threshold(contrast_image) if detector.threshold is None else detector.threshold
+    threshold = detector.threshold
+    if threshold is None:
+        threshold = body_threshold(contrast_image, *noise_of(contrast_image))
     parts = (
         None
         if threshold is None

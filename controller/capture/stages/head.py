@@ -137,9 +137,9 @@ def head_signs(
     signs: dict[str, tuple[float, float]] = {}
     if fixed:
         step = max(1, round(_TRAVEL_S * rate_hz))
-        usual_px = usual_travel(points, step)
+        score, usual_px = travel_score(points, step)
         if usual_px > 0.0:
-            signs["travel"] = travel_score(points, step), _JITTER_PX / usual_px
+            signs["travel"] = score, _JITTER_PX / usual_px
     if good.sum() >= _WAVE_FRAMES:
         wave = measure_wave(track_from_points("", points, rate_hz))
         signs["wave"] = 1.0 - 2.0 * wave.headward, 0.0
@@ -177,7 +177,7 @@ def contrast_along(skeletons: Sequence[Skeleton], store: FrameStore) -> Floats:
     return np.array(rows)
 
 
-def travel_score(points_px: Floats, step: int) -> float:
+def travel_score(points_px: Floats, step: int) -> tuple[float, float]:
     """Whether the first end leads, -1 to 1: travel along the body's direction over all travel.
 
     Args:
@@ -185,7 +185,8 @@ def travel_score(points_px: Floats, step: int) -> float:
         step: frames over which travel is measured; long enough that noise of a frame is small.
 
     Returns:
-        0 where the body does not travel by more than a hundredth of its length in a step.
+        Score, 0 where the body does not travel by more than a hundredth of its length in a step;
+        and the median distance of the body's middle in a step, px, 0 if it is unknown.
 
     """
     ahead = points_px[:, 0] - points_px[:, -1]
@@ -194,17 +195,7 @@ def travel_score(points_px: Floats, step: int) -> float:
     moved = middle[step:] - middle[:-step]
     along = (moved * unit[:-step]).sum(axis=1)
     distance = np.hypot(*moved.T)
-    use = np.isfinite(along) & (distance > 0.01 * median_length(points_px))
-    return float(along[use].sum() / distance[use].sum()) if use.any() else 0.0
-
-
-def usual_travel(points_px: Floats, step: int) -> float:
-    """Median travel of the middle of the body (T, P, 2) in ``step`` frames; 0: not known."""
-    middle = points_px.mean(axis=1)
-    moved = np.hypot(*(middle[step:] - middle[:-step]).T)
-    return float(np.nanmedian(moved)) if np.isfinite(moved).any() else 0.0
-
-
-def median_length(points_px: Floats) -> float:
-    """Median length of the bodies (T, P, 2)."""
-    return float(np.nanmedian(np.hypot(*np.diff(points_px, axis=1).transpose(2, 0, 1)).sum(axis=1)))
+    length_px = np.hypot(*np.diff(points_px, axis=1).transpose(2, 0, 1)).sum(axis=1)
+    use = np.isfinite(along) & (distance > 0.01 * np.nanmedian(length_px))
+    usual_px = float(np.nanmedian(distance)) if np.isfinite(distance).any() else 0.0
+    return float(along[use].sum() / distance[use].sum()) if use.any() else 0.0, usual_px

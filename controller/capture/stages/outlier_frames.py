@@ -4,7 +4,7 @@ A coil without a hole, or a small animal that touches the body, has no side bran
 body shorter, longer or locally thicker than in most frames, or changes its area.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,7 @@ _LEAST_RADIUS_PX = 0.3
 _STRETCH = 7  # of 101 points over which thickness is averaged
 _TIPS = 6  # points at each end whose thickness is not compared
 _FAINT = 0.25  # of the usual contrast: below, compression and noise of an empty frame
+_TAILED = 4.0  # times these limits: a beating tail is blurred and may be hidden by noise (ours)
 _FEWEST = 5  # least number of frames to find outliers
 
 
@@ -33,7 +34,10 @@ class Compare:
     def run(self, film: StagedFilm) -> StagedFilm:
         """Return the film with aligned ends; outliers have a status instead of points."""
         marked = mark_empty(film.skeletons, np.array(film.detections.contrast))
-        checked = mark_outliers(align_ends(marked), np.array(film.detections.area_px))
+        detections = film.detections
+        checked = mark_outliers(
+            align_ends(marked), np.array(detections.area_px), detections.tip_error_px
+        )
         return replace(film, skeletons=align_ends(checked))
 
 
@@ -58,12 +62,15 @@ def mark_empty(skeletons: Sequence[Skeleton], contrast: Floats) -> list[Skeleton
     ]
 
 
-def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skeleton]:
+def mark_outliers(
+    skeletons: Sequence[Skeleton], area_px: Floats, tailed: Container[int] = ()
+) -> list[Skeleton]:
     """Drop the skeletons of bodies that differ from the film's; their status gives the difference.
 
     Args:
         skeletons: (T) the same end first in all.
         area_px: (T,) of the silhouettes.
+        tailed: frames with a faint tail, whose visible length varies.
 
     """
     out = list(skeletons)
@@ -84,9 +91,10 @@ def mark_outliers(skeletons: Sequence[Skeleton], area_px: Floats) -> list[Skelet
     ]
     thick = np.minimum(*orders)
     for n, k in enumerate(good):
-        if thick[n] > 1.0 or length[n] < -1.0 or area[n] < -1.0:
+        most_off = _TAILED if k in tailed else 1.0
+        if max(thick[n], -length[n], -area[n]) > most_off:
             out[k] = no_skeleton(FrameStatus.SHORT)
-        elif length[n] > 1.0 or area[n] > 1.0:
+        elif max(length[n], area[n]) > most_off:
             out[k] = no_skeleton(FrameStatus.LARGER)
     return out
 

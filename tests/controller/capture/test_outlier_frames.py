@@ -54,6 +54,13 @@ def test_usual_frames_are_kept_and_the_unusual_ones_named() -> None:
     assert found[:3] + found[8:9] + found[10:] == [FrameStatus.GOOD] * 6
 
 
+def test_a_faint_tail_may_be_seen_in_part() -> None:
+    bodies = usual()
+    bodies[3], bodies[4] = straight(88.0, 4.0), straight(70.0, 4.0)
+    found = [one.status for one in mark_outliers(bodies, np.full(12, 800.0), tailed={3, 4})]
+    assert found[3:5] == [FrameStatus.GOOD, FrameStatus.SHORT]
+
+
 def test_a_body_whose_length_changes_all_the_time_is_not_dropped() -> None:
     bodies = [straight(100.0 + 8.0 * np.sin(k), 4.0) for k in range(30)]
     found = mark_outliers(bodies, np.full(30, 800.0))

@@ -8,8 +8,10 @@ from snakewalk.config.arrays import Image
 from snakewalk.controller.capture.several.animal_films import with_bare_ground
 from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.capture.verification.steady_tails import with_steady_tails
-from snakewalk.controller.images.background import median_background
+from snakewalk.controller.images.background import background_candidates, median_background
+from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
+from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 
 FRAMES = 40
@@ -50,15 +52,15 @@ def test_frames_without_a_followed_tail_do_not_change() -> None:
     assert not errors
 
 
-def _plate(moved: float) -> Image:
+def _plate(moved: float, tail: float = 40.0) -> Image:
     """Two animals with dark bodies and faint tails; the first one rests, then moves down."""
     image = np.full((160, 240), 200.0)
     for x, y in ((40.0, 40.0 + moved), (60.0 + 3.0 * moved, 130.0)):
-        for first, last, levels, width in ((0.0, 24.0, 100.0, 8), (24.0, 70.0, 40.0, 4)):
+        for first, last, levels, width in ((0.0, 24.0, 100.0, 8), (24.0, 70.0, tail, 4)):
             line = np.rint([[x + first, y], [x + last, y]]).astype(np.int32)
             cover = cv2.line(np.zeros(image.shape, np.uint8), line[0], line[1], 255, width)
             image = np.minimum(image, 200.0 - levels * (cover / 255.0))
-    noise = np.random.default_rng(round(10.0 * moved)).normal(0.0, 2.0, image.shape)
+    noise = np.random.default_rng(int(image.sum())).normal(0.0, 2.0, image.shape)
     return np.asarray(np.clip(np.rint(image + noise), 0, 255), dtype=np.uint8)
 
 
@@ -70,3 +72,17 @@ def test_an_animal_that_rests_in_half_of_the_frames_leaves_the_background_bare()
     tail = (slice(38, 43), slice(70, 105))
     assert median_background(frames)[tail].mean() < 192.0
     assert abs(float(bare[tail].mean()) - 200.0) < 2.0
+
+
+def test_a_tail_too_faint_to_be_followed_leaves_the_background_bare() -> None:
+    """It rests in 14 of 20 frames, and no frame's outline contains it."""
+    frames = [_plate(float(max(0, k - 13)) * 6.0, tail=6.0) for k in range(20)]
+    (median, *_), (lighter, polarity, _), _ = background_candidates(frames)
+    assert polarity is Polarity.DARK
+    detector = BodyDetector(lighter, polarity, "lighter")
+    bare = with_bare_ground(detector, frames).background
+    assert bare is not None
+    tail = (slice(39, 42), slice(80, 105))
+    ground = float(np.median(bare))
+    assert median[tail].mean() < 196.0
+    assert abs(float(bare[tail].mean()) - ground) < 2.0

@@ -27,6 +27,10 @@ def plate(*bars: tuple[int, int, int, int, int]) -> np.ndarray:
     return image
 
 
+def threshold_in(levels: np.ndarray) -> float | None:
+    return body_threshold(levels, *noise_of(levels))
+
+
 def apart(*bars: tuple[int, int, int, int, int]) -> np.ndarray:
     """Contrast of bars (top, left, rows, columns, contrast) on nothing."""
     return GROUND - plate(*((*place, GROUND - level) for *place, level in bars))
@@ -106,7 +110,7 @@ def test_no_body_has_no_threshold() -> None:
     nothing = silhouette_of(EMPTY, EMPTY)
     assert (nothing.area_px, nothing.noise_level, nothing.origin_px) == (0.0, 0.0, (0.0, 0.0))
     assert not nothing.mask.any()
-    assert body_threshold(apart()) is None
+    assert threshold_in(apart()) is None
 
 
 def test_a_given_threshold_is_the_boundary() -> None:
@@ -195,6 +199,16 @@ def test_parts_below_twelve_pixels_are_noise(pixels: int, is_found: bool) -> Non
         assert stats[2].tolist() == [80, 50, 1, 1, 1]
 
 
+def test_more_parts_than_two_bytes_can_number_are_kept_apart() -> None:
+    mask = np.zeros((600, 600), dtype=np.uint8)
+    mask[::2, ::2] = 1
+    mask[300:310, 300:310] = 1
+    found = connected_parts(mask)
+    assert found is not None
+    label, stats = found
+    assert len(np.unique(label)) == len(stats) > 2**16
+
+
 def test_pixels_that_touch_at_a_corner_are_one_part() -> None:
     mask = np.eye(14, dtype=np.uint8)
     found = connected_parts(mask)
@@ -203,26 +217,26 @@ def test_pixels_that_touch_at_a_corner_are_one_part() -> None:
 
 
 def test_the_threshold_is_half_of_an_even_body() -> None:
-    assert body_threshold(apart(BAR)) == pytest.approx(50.0)
+    assert threshold_in(apart(BAR)) == pytest.approx(50.0)
     uneven = apart(BAR, (20, 30, 10, 20, 80))  # two thirds of it at 80: the 70th percentile is 100
-    assert body_threshold(uneven) == pytest.approx(50.0)
+    assert threshold_in(uneven) == pytest.approx(50.0)
 
 
 def test_a_faint_shade_joined_to_the_body_does_not_lower_the_threshold() -> None:
     """The shade has four times the pixels: its percentile is 20, the body's contrast stays 100."""
     shade = (12, 22, 30, 50, 20)
-    assert body_threshold(apart(shade, BAR)) == pytest.approx(50.0)
+    assert threshold_in(apart(shade, BAR)) == pytest.approx(50.0)
 
 
 def test_the_part_with_most_summed_contrast_sets_the_threshold() -> None:
     """16 * 200 against 300 * 60, though the squares are nearer: 0.64 to 1.08 million."""
     speck, body = (45, 5, 4, 4, 200), (*BAR[:4], 60)
-    assert body_threshold(apart(speck, body)) == pytest.approx(30.0)
-    assert body_threshold(apart((45, 5, 9, 10, 200), (*BAR[:4], 50))) == pytest.approx(100.0)
+    assert threshold_in(apart(speck, body)) == pytest.approx(30.0)
+    assert threshold_in(apart((45, 5, 9, 10, 200), (*BAR[:4], 50))) == pytest.approx(100.0)
 
 
 def test_the_threshold_stays_above_the_noise_of_the_ground() -> None:
     """Ground at 40 on a body of 48: half of the rest is 44, the noise reaches 41.5."""
     picture = apart(BAR)
     ground = np.where(picture > 0, 48, 40).astype(np.uint8)
-    assert body_threshold(ground) == pytest.approx(44.0)
+    assert threshold_in(ground) == pytest.approx(44.0)
