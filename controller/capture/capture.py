@@ -1,7 +1,7 @@
 """A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -126,7 +126,6 @@ def capture(
     name: str = "recording",
     head_px: tuple[float, float] | None = None,
     fixed: bool = True,
-    on_progress: Callable[[], None] | None = None,
 ) -> Capture:
     """Find the animal in every frame, in order.
 
@@ -137,7 +136,6 @@ def capture(
         name: for faults.
         head_px: a place near the head in the first frame that can be used.
         fixed: whether the camera stands still; images cropped to the animal show no travel.
-        on_progress: called after each frame.
 
     Raises:
         InputError: fewer than 2 frames can be used, or nothing moves.
@@ -146,8 +144,6 @@ def capture(
     detections = Detections()
     for frame in frames:
         detections.add(frame, detector.detect(frame))
-        if on_progress is not None:
-            on_progress()
     return captured_from(detections, rate_hz, name=name, head_px=head_px, fixed=fixed)
 
 

@@ -144,7 +144,7 @@ def _threshold_of_body(
     contrast. The sum counts pixels above half of the part's contrast.
     """
     inside = np.flatnonzero(label > 0)
-    strength = np.maximum(contrast_image.ravel()[inside].astype(np.float32) - middle, 0.0)
+    strength = contrast_image.ravel()[inside].astype(np.float32) - middle
     squares = np.bincount(label.ravel()[inside], weights=strength**2, minlength=len(stats))
     best = least
     most = -1.0
@@ -154,7 +154,7 @@ def _threshold_of_body(
         left, top, wide, high, _ = (int(v) for v in stats[part])
         window = (slice(top, top + high), slice(left, left + wide))
         body_strength = np.sort(contrast_image[window][label[window] == part].astype(np.float32))
-        body_strength = np.maximum(body_strength - middle, 0.0)
+        body_strength -= middle
         weight = np.cumsum(body_strength**2)
         level = float(body_strength[np.searchsorted(weight, _SHARE * weight[-1])])
         usual = float(np.percentile(body_strength, 70))

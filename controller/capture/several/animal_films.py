@@ -152,9 +152,9 @@ def with_bare_ground(detector: BodyDetector, frames: Sequence[DeepImage]) -> Bod
         cover[:] = cv2.morphologyEx(cv2.dilate(cover, box), cv2.MORPH_CLOSE, gap)
     free = len(frames) - covered.sum(axis=0, dtype=int)
     grounds = {polarity: ground for ground, polarity, _ in background_candidates(frames)}
-    clear = grounds.get(detector.polarity, grounds[None]).astype(np.float32)
-    clear -= np.median(clear - grounds[None], axis=(0, 1))
-    ground = as_deep_as(first, np.maximum(clear, 0.0))
+    ground = grounds.get(detector.polarity, grounds[None])
+    brighter = np.median(ground.astype(np.float32) - grounds[None], axis=(0, 1))
+    ground = as_deep_as(first, np.maximum(ground - brighter, 0.0))
     learnt = (free >= _FEWEST_FREE) & (free < len(frames))
     levels = stack[:, learnt].astype(np.float32)
     levels[covered[:, learnt] > 0] = np.nan

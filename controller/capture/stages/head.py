@@ -169,11 +169,8 @@ def contrast_along(skeletons: Sequence[Skeleton], store: FrameStore) -> Floats:
     for k in used[:: max(1, -(-len(used) // _PICTURES))]:
         cut_out = store.get(k)
         if cut_out is not None:
-            sides = body_profile(skeletons[k], cut_out).sides
-            known = np.isfinite(sides)
-            count = np.maximum(known.sum(axis=0), 1)
-            mean = np.where(known, sides, 0.0).sum(axis=0) / count
-            rows.append(np.linalg.norm(mean, axis=1))
+            sides = np.ma.masked_invalid(body_profile(skeletons[k], cut_out).sides)
+            rows.append(np.linalg.norm(sides.mean(axis=0).filled(0.0), axis=1))
     return np.array(rows)
 
 

@@ -138,16 +138,12 @@ def verified(skeletons: Sequence[Skeleton], store: FrameStore) -> tuple[list[Ske
             out[k] = no_skeleton(FrameStatus.KNOT)
     _check_lengths(out)
     used = [k for k, skeleton in enumerate(out) if skeleton.status.has_points]
-    some = used[:: max(1, len(used) // _SAMPLE)]
-    shown = {k: _profile(out[k], store, k) for k in some}
-    usual = _usual([shown_profile for shown_profile in shown.values() if shown_profile is not None])
+    shown = {k: profile for k in used if (profile := _profile(out[k], store, k)) is not None}
+    usual = _usual([*shown.values()][:: max(1, len(shown) // _SAMPLE)])
     judged_px = np.zeros(len(out))
     if usual is None:
         return out, judged_px
-    for k in used:
-        profile = shown[k] if k in shown else _profile(out[k], store, k)
-        if profile is None:
-            continue
+    for k, profile in shown.items():
         judged_px[k] = judged_error_px(profile, out[k].length_px)
         status = _verdict(profile, usual)
         if status is not FrameStatus.GOOD:
