@@ -130,7 +130,7 @@ class BodyDetector:
         return best if tailed is not None else replace(detection, may_have_faint_parts=faint)
 
     def _confirmed(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Silhouette:
-        """The silhouette; its status is ``CUT`` or ``GHOST`` if it is no complete animal."""
+        """The silhouette; its status is ``CUT`` or ``GHOST`` if the animal is not complete."""
         if self.inside is not None and body.status is FrameStatus.GOOD:
             left, top = (int(v) for v in body.origin_px)
             rows, columns = body.mask.shape

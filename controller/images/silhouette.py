@@ -15,6 +15,7 @@ _MARGIN = 4
 _WIDE_MARGIN = 20
 _CLEAR = 6.0  # standard deviations of the noise: contrast of an animal's pixel
 _LEAST_AREA_PX = 12
+_MOST_LABELS = 65_535  # of two bytes
 _RIVAL = 0.4  # of the largest body's size: a larger object is a second animal, not dirt
 _CANDIDATES = 4  # number of parts that may be the animal
 _SHARE = 0.4  # quantile, weighted by squared contrast: the contrast of a part
@@ -153,8 +154,7 @@ def _threshold_of_body(
             break
         left, top, wide, high, _ = (int(v) for v in stats[part])
         window = (slice(top, top + high), slice(left, left + wide))
-        body_strength = np.sort(contrast_image[window][label[window] == part].astype(np.float32))
-        body_strength -= middle
+        body_strength = np.sort(contrast_image[window][label[window] == part]) - np.float32(middle)
         weight = np.cumsum(body_strength**2)
         level = float(body_strength[np.searchsorted(weight, _SHARE * weight[-1])])
         usual = float(np.percentile(body_strength, 70))
@@ -179,9 +179,9 @@ def connected_parts(mask: DeepImage) -> tuple[Int32s, Int32s] | None:
     if wide * high < _LEAST_AREA_PX:
         return None
     window = (slice(top, top + high), slice(left, left + wide))
-    few = cv2.countNonZero(mask) < np.iinfo(np.uint16).max
+    kind = cv2.CV_16U if cv2.countNonZero(mask) < _MOST_LABELS else cv2.CV_32S
     count, inner, stats, _ = cv2.connectedComponentsWithStats(
-        mask[window], connectivity=8, ltype=cv2.CV_16U if few else cv2.CV_32S
+        mask[window], connectivity=8, ltype=kind
     )
     if count < 2 or stats[1:, cv2.CC_STAT_AREA].max() < _LEAST_AREA_PX:
         return None
@@ -205,9 +205,7 @@ def cut_out(
         return _no_silhouette()
     label, stats = parts
     areas = stats[1:, cv2.CC_STAT_AREA]
-    inside = np.flatnonzero(above)
-    strength = contrast_image.ravel()[inside] - np.float32(middle)
-    sums = np.bincount(label.ravel()[inside], weights=strength)
+    sums = np.bincount(label[above], weights=contrast_image[above] - np.float32(middle))
     best = 1 + int(np.argmax(sums[1:]))
     left, top, wide, high, area = (int(v) for v in stats[best])
     rows, columns = contrast_image.shape

@@ -182,8 +182,8 @@ def travel_score(points_px: Floats, step: int) -> tuple[float, float]:
         step: frames over which travel is measured; long enough that noise of a frame is small.
 
     Returns:
-        Score, 0 where the body does not travel by more than a hundredth of its length in a step;
-        and the median distance of the body's middle in a step, px, 0 if it is unknown.
+        Score, 0 where the body travels by less than a hundredth of its length in a step. The
+        second value is the median travel of its middle in a step, px; 0 if it is unknown.
 
     """
     ahead = points_px[:, 0] - points_px[:, -1]
