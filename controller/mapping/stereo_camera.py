@@ -19,6 +19,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.file_units import LENGTHS_M, unit_m
 from snakewalk.config.reading import Fact, Facts, answered, by_file, by_user, decided, stated
 from snakewalk.controller.images.calibration_storage import read_storage
+from snakewalk.controller.images.colour_picture import read_colours
 from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 
 _NAMES = {
@@ -235,6 +236,16 @@ def _unit(file: Path, baseline: float, unit: Fact | None) -> Fact:
         unit = Fact("m", "inferred", "no other unit is possible; --unit states another")
     question = f"states no unit of T, whose length is {baseline:.4g}"
     return decided(file, question, "--unit", possible, unit)
+
+
+def read_pair(calibration: StereoCalibration, left: Path, right: Path) -> RectifiedPair:
+    """Read and rectify two colour pictures, blue first.
+
+    Raises:
+        InputError: not two pictures of the calibration's size.
+
+    """
+    return rectify(calibration, read_colours(left), read_colours(right))
 
 
 def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:

@@ -118,6 +118,7 @@ OTHERS: Final = {
     "controller/exchange/ros_bag.py": "writes bags",
     "controller/images/colour_picture.py": "colours",
     "controller/run/commands/gait_fit.py": "columns x_m, y_m, z_m",
+    "controller/view/model_page.py": "draws meshes",
     "controller/view/scene.py": "draws meshes",
 }  # fmt: skip
 """Modules without a question to the user, each with the reason."""

@@ -15,12 +15,14 @@ from snakewalk.controller.animals.mesh.body_look import rig_look
 from snakewalk.controller.animals.mesh.body_skin import Cut, shipped_skin
 from snakewalk.controller.animals.mesh.rig import Rig
 from snakewalk.controller.animals.mesh.skin_file import write_skin
-from snakewalk.controller.animals.synthesis.synthesis_skin import film_over
+from snakewalk.controller.animals.synthesis.synthesis_skin import FPS, film_over
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.run.kinds.walk_run import WalkRun
 
 _FRAMED_LENGTH = 1.2
 """Length in the camera's frame over the body's: legs and horns add to it."""
+_FRAMES = 12
+"""Frames of a cycle that show each step of a foot (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ class AnimalBody:
 
     def film(
         self, animal_motion: SynthesisedAnimal, prepared: WalkRun, file: Path, marks: bool
-    ) -> int:
+    ) -> None:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
@@ -59,8 +61,8 @@ class AnimalBody:
 
         """
         path = animal_motion.path
-        dots = path.position(np.linspace(0.0, path.length_m, max(2, round(path.length_m / 0.05))))
-        return film_over(
+        dots = path.position(np.arange(0.0, path.length_m, 0.05))
+        film_over(
             prepared,
             file,
             animal_bones(animal_motion.animal, animal_motion.motion),
@@ -68,5 +70,10 @@ class AnimalBody:
             robot=as_long_robot(prepared.robot, _FRAMED_LENGTH * animal_motion.animal.length_m),
             reached_s=animal_motion.reached_s(),
             paths=[(0.0, dots)] if marks else None,
-            title=f"{animal_motion.animal.name}, {prepared.run.name}",
+            fps=film_rate(animal_motion.animal.cycle_s),
         )
+
+
+def film_rate(cycle_s: float) -> int:
+    """Frames per second, a multiple of ``FPS`` that shows a cycle in at least ``_FRAMES``."""
+    return FPS * int(np.ceil(_FRAMES / (FPS * cycle_s)))

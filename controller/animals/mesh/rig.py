@@ -35,8 +35,8 @@ def spine_rig(skin: Skin, bone_m: Floats) -> Rig:
 
 def posed_m(rig: Rig, motion: BoneMotion, frame: int) -> Floats:
     """(V, 3) corners in one frame of a motion of the same bones."""
-    bone_weights = rig.held
-    local = rig.mesh.vertices[:, None] - rig.rest_m[bone_weights.bones]
-    turned = np.einsum("vkij,vkj->vki", motion.rotation[frame][bone_weights.bones], local)
-    placed = turned + motion.front_m[frame][bone_weights.bones]
-    return np.asarray((bone_weights.shares[..., None] * placed).sum(axis=1))
+    bones = rig.held.bones
+    local = rig.mesh.vertices[:, None] - rig.rest_m[bones]
+    turned = np.einsum("vkij,vkj->vki", motion.rotation[frame][bones], local)
+    placed = turned + motion.front_m[frame][bones]
+    return np.asarray((rig.held.shares[..., None] * placed).sum(axis=1))

@@ -31,7 +31,8 @@ LENGTH = 0.05
 RADIUS = 0.0018
 """Length and radius of the whole tongue, over the body's length (ours)."""
 _RGB = 191, 26, 38
-_FPS = 30
+FPS = 30
+"""Least frames per second of a film."""
 _ROWS = 8
 """Rows that the texture gets for the tongue's colour."""
 _RING_CORNERS = 8
@@ -155,7 +156,7 @@ class SynthesisSkin:
         rig, texture = rig_with_tongue(rig, bones.length_m, texture)
         return rig, bones_with_tongue(bones, walk.tongue), texture
 
-    def film(self, walk: SynthesisedWalk, prepared: WalkRun, file: Path, marks: bool) -> int:
+    def film(self, walk: SynthesisedWalk, prepared: WalkRun, file: Path, marks: bool) -> None:
         """Draw the film, ``file`` ends in .mp4; shows progress on standard error.
 
         Raises:
@@ -163,15 +164,15 @@ class SynthesisSkin:
 
         """
         rig, bones, texture = self._rig(walk, FILM_SEGMENTS)
-        return film_over(
+        film_over(
             prepared,
             file,
             bones,
-            rig_look(rig, texture, spine=walk.bones(FILM_SEGMENTS).front_m.shape[1]),
+            rig_look(rig, texture, spine=len(bones.bone_m) - self.tongue),
             robot=prepared.robot,
             reached_s=walk.reached_s(),
             paths=walk.targets.paths(walk.rate_hz) if marks else None,
-            title=prepared.run.name,
+            fps=FPS,
         )
 
 
@@ -184,8 +185,8 @@ def film_over(
     robot: RobotConfig,
     reached_s: Sequence[float],
     paths: Sequence[tuple[float, Floats]] | None,
-    title: str,
-) -> int:
+    fps: int,
+) -> None:
     """Draw a skin that moves over a run's world; shows progress on standard error.
 
     Args:
@@ -196,10 +197,7 @@ def film_over(
         robot: the body in the camera's frame, of the skin's length.
         reached_s: time at each waypoint.
         paths: paths (P, 2) from a time on; None draws a film without marks.
-        title: in the picture.
-
-    Returns:
-        The number of frames.
+        fps: frames per second.
 
     Raises:
         InputError: the simulator or PyAV is not installed, or nothing draws here.
@@ -207,19 +205,17 @@ def film_over(
     """
     run = prepared.run
     film = renderer()
-    frames, count = bones.front_m.shape[:2]
     turns = Rotation.from_matrix(bones.rotation.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    poses = np.concatenate([bones.front_m, turns.reshape(frames, count, 4)], axis=2)
+    poses = np.hstack([bones.front_m.reshape(-1, 3), turns]).reshape(len(bones.front_m), -1)
     with atomic_write(file) as part, ProgressBar("film", transient=True) as bar:
-        drawn: int = film.render_film(
+        film.render_film(
             film.Scene(robot, prepared.world, prepared.ground),
             bones.time_s,
-            poses.reshape(frames, -1),
+            poses,
             part,
-            style=film.Style(_FPS, speed_up(float(bones.time_s[-1])), SIZE, title, look),
+            style=film.Style(fps, speed_up(float(bones.time_s[-1])), SIZE, run.name, look),
             marks=None
             if paths is None
             else film.Marks(run.waypoints_m, run.waypoint_radius_m, reached_s, paths),
             on_frame=bar.update,
         )
-        return drawn

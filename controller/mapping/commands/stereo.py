@@ -98,9 +98,6 @@ def stereo(
     The origin of the world is below the left camera; the x axis points where the camera looks.
     """
     require_extra("stereo pictures need", "cv2", "PIL")
-    from snakewalk.controller.images.colour_picture import (  # noqa: PLC0415  an extra
-        read_colours,
-    )
     from snakewalk.controller.mapping import (  # noqa: PLC0415  an extra
         stereo_camera,
         stereo_ground,
@@ -117,8 +114,7 @@ def stereo(
         raise InputError(faults)
     check_world_files(out, picture, [left, right, calibration], force)
     calibrated = stereo_camera.read_calibration(calibration, choice)
-    pictures = (read_colours(side) for side in (left, right))
-    pair = stereo_camera.rectify(calibrated, *pictures)
+    pair = stereo_camera.read_pair(calibrated, left, right)
     stand = None
     if height is not None and tilt is not None:
         stand = stereo_ground.CameraStand(height, math.radians(tilt), math.radians(roll))

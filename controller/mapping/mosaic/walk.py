@@ -149,9 +149,10 @@ class _FaultPlace:
 
 def rectified(folder: Path, left: str, right: str, calibration: StereoCalibration) -> RectifiedPair:
     """Read and rectify a pair of pictures, red first."""
-    pictures = (read_colours(folder / name)[..., ::-1] for name in (left, right))
-    left_picture, two = (np.ascontiguousarray(picture) for picture in pictures)
-    return rectify(calibration, left_picture, two)
+    files = (folder / left, folder / right)
+    return rectify(
+        calibration, *(np.ascontiguousarray(read_colours(file)[..., ::-1]) for file in files)
+    )
 
 
 def _model(

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.animals.legged.animal_film import AnimalBody
+from snakewalk.controller.animals.legged.animal_film import AnimalBody, film_rate
 from snakewalk.controller.animals.legged.animal_rig import animal_bones
 from snakewalk.controller.animals.legged.animal_synthesis import ANIMALS, read_animal
 from snakewalk.controller.animals.legged.motion_transformation import AnimalMotion, transformed
@@ -99,3 +99,9 @@ def test_the_animated_file_moves_as_the_bones_do(name: str, tmp_path: Path) -> N
         np.testing.assert_allclose(
             player.corners(frame) @ Y_UP, posed_m(body.rig, bones, frame), atol=2e-5
         )
+
+
+@pytest.mark.parametrize(("cycle_s", "frames_per_second"), [(1.2, 30), (0.26, 60), (0.1, 120)])
+def test_a_film_shows_each_cycle_in_a_dozen_frames(cycle_s: float, frames_per_second: int) -> None:
+    assert film_rate(cycle_s) == frames_per_second
+    assert film_rate(cycle_s) * cycle_s >= 12.0
