@@ -3,7 +3,8 @@
 Each case draws a ground (floor, hills, ramps, steps, gravel, a floor with ice), one of the three
 friction laws, and friction of 0.5 to 1.4 times the file. The served robot is rehearsed with a
 tracker of 1 cm, 3 degrees and 100 ms of error for at most ``--seconds``. A case rejects a good pose
-if the run ends because of it, holds because of it, or ends with an unconfirmed pose.
+if the run ends because of it, holds because of it, or ends with an unconfirmed pose. A limp body
+that truly slid from its start before torque is counted apart: ``slid_m`` is the way of its head.
 ``--write FILE`` keeps rows as lines of JSON; cases in it are not repeated.
 """
 
@@ -19,6 +20,7 @@ from unittest.mock import patch
 import numpy as np
 
 from benchmarks.wrong_poses import TRACKER
+from snakewalk.config.arrays import Floats
 from snakewalk.config.friction_law import LAWS, LawName
 from snakewalk.controller.pose.tracker import Sent
 from snakewalk.controller.rehearsal import judgement, rehearsal
@@ -48,6 +50,10 @@ GROUNDS: Final[dict[str, tuple[str, dict[str, float]]]] = {
 """Runs and changed keys of the grounds."""
 
 
+SLID_M: Final = 0.05
+"""True way of the head before torque, beyond which a body slid from its start."""
+
+
 @dataclass(frozen=True, slots=True)
 class CleanCase:
     """A ground, a law, and a factor on the friction."""
@@ -72,10 +78,12 @@ def rehearsed(case: CleanCase, seconds: float) -> dict[str, Any]:
     run, keys = GROUNDS[case.ground]
     faults: list[str] = []
     last: list[bool] = []
+    places_m: list[Floats] = []
     true = ServedRobot.due
     deviation = Deviation(case.factor, case.factor, law=case.law)
 
     def due(self: ServedRobot, now_s: float) -> Sequence[Sent]:
+        places_m.append(self.body.head_pose().head_in_world_m.copy())
         if case.ground == "ice":
             body = self.body
             along, across, back, code = body.world.friction.grip
@@ -100,13 +108,16 @@ def rehearsed(case: CleanCase, seconds: float) -> dict[str, Any]:
             {"keys": keys, "time_limit_s": seconds},
         )
     error = row.get("error")
+    slid_m = float(np.linalg.norm(places_m[-1] - places_m[0])) if error else 0.0
     is_confirmed = bool(last) and last[-1]
+    rejected = faults[0] if faults else error or ("" if is_confirmed else "unconfirmed")
     return {
         "number": case.number,
         "ground": case.ground,
         "law": case.law,
         "factor": case.factor,
-        "rejected": faults[0] if faults else error or ("" if is_confirmed else "unconfirmed"),
+        "rejected": "" if slid_m > SLID_M else rejected,
+        "slid_m": round(slid_m, 3),
         "claimed": row.get("claimed", 0),
         "reached_as_stated": row.get("reached_as_stated", 0),
         "truly_reached": row.get("truly_reached", 0),
@@ -140,6 +151,8 @@ def main() -> int:
     print(", ".join(f"{ground} {count}" for ground, count in sorted(counts.items())))
     for row in [*rejected, *false]:
         print(row)
+    slid = sum(row.get("slid_m", 0.0) > SLID_M for row in rows.values())
+    print(f"{slid} bodies slid from their start before torque")
     print(f"{len(rows)} runs; good poses rejected: {len(rejected)}; false claims: {len(false)}")
     return int(bool(rejected or false))
 

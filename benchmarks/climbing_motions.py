@@ -47,6 +47,7 @@ class Motion:
 
 MOTIONS: Final = {
     "wave of 0.7 rad": Motion("lateral-undulation", "yaw16"),
+    "wave of 1.0 rad": Motion("lateral-undulation", "yaw16", 0.0, {"winding_rad": 1.0}),
     "wave of 1.3 rad": Motion("lateral-undulation", "yaw16", 0.0, {"winding_rad": 1.3}),
     "wave of 1.3 rad, diagonal": Motion("lateral-undulation", "yaw16", 30.0, {"winding_rad": 1.3}),
     "wave of 1.3 rad, 8 yaw joints": Motion(

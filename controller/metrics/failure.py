@@ -105,18 +105,17 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     predicted = pose.predicted_speed_m_s[rows].mean()
     share = advanced / predicted if predicted > 0.0 else 1.0
     if share < header.run.safety.advance_fraction:
-        up_rad = float(np.mean(_inclination_rad(pose.links_m[rows])))
+        up_rad = np.mean(_inclination_rad(pose.links_m[rows]))
         said = f"advanced {share:.0%} of the prediction"
         if up_rad <= _holds_rad(record):
             return Failure("slip", f"{said}, no steep climb")
         return _of_climb(record, f"{said}, {np.degrees(up_rad):.0f} deg uphill")
-    times = pose.time_s[rows]
     remaining = _remaining_m(record, rows)
-    progress = float(remaining[0] - remaining[-1])
-    travelled = float(advanced * (times[-1] - times[0]))
+    progress = remaining[0] - remaining[-1]
+    travelled = advanced * np.ptp(pose.time_s[rows])
     if progress < PROGRESS_SHARE * travelled:
         ahead_m = np.linspace(0.0, header.robot.length_m, 5)
-        steep_rad = _steepest_rad(record, -1, float(np.median(pose.path_s_m[rows])) + ahead_m)
+        steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
         if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
             return _of_climb(
                 record,
@@ -137,11 +136,10 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
                 f"its links moved {travelled:.1f} m along themselves, and the body only "
                 f"{forward_m:.1f} m",
             )
-        error = path_error_m(record)[rows]
         return Failure(
             "steering",
             f"advanced {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path; "
-            f"up to {np.nanmax(error):.2f} m off it",
+            f"up to {np.nanmax(path_error_m(record)[rows]):.2f} m off it",
         )
     return Failure("time", f"out of time with {remaining[-1]:.1f} m of path left")
 
@@ -149,9 +147,8 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
 def _of_climb(record: RunRecord, text: str) -> Failure:
     """Return a climb, or the slide that led a body off its first path, which does not climb."""
     body_m = record.header.robot.length_m
-    pose = record.pose
     replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
-    rows = np.flatnonzero(pose.time_s < replanned_s)
+    rows = np.flatnonzero(record.pose.time_s < replanned_s)
     if len(rows) > 1:
         due_m = np.arange(0.0, length_m(record.header.plan.path_m), 0.25 * body_m)
         slid_m, fall_rad = _slide(record, rows)

@@ -118,8 +118,8 @@ def drift_fault(samples: list[PoseSample]) -> str | None:
     if not speed_m_s > max(DRIFT_M_S, DRIFT_SD * sd_m_s):
         return None
     return (
-        f"the robot rests, and its pose moves by {100.0 * speed_m_s:.1f} cm/s; leave the robot "
-        "alone, or wait until the source does not drift"
+        f"the torque is off, and the pose moves by {100.0 * speed_m_s:.1f} cm/s; lay the robot "
+        "where it does not slide, or wait until the source does not drift"
     )
 
 

@@ -8,8 +8,8 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.terrain.path import SplinePath
 
 CLIMBED_RAD = float(np.radians(15.5))
-"""Steepest ground that the walk is known to climb: 20 of 20 runs complete a plane of 15 degrees
-(docs/terrain.md), and 0 of 6 one of 18 degrees."""
+"""Steepest ground that waves of the walk are known to climb: 20 of 20 runs complete a plane of 15
+degrees, and 0 of 6 one of 18 degrees (docs/terrain.md). Rolls climb steeper ground."""
 _STEP_M = 0.02
 
 

@@ -346,13 +346,17 @@ class WalkRun(PathRun):
         return Rollout(self.robot, self.world.friction, self.bridged, POINTS)
 
     @property
-    def _rolls(self) -> bool:
-        """Whether the body may roll sideways: round, without a mast, on joints that carry it."""
+    def _may_roll(self) -> bool:
+        """Whether the body rolls sideways if its joints carry it: round, and without a mast."""
         robot = self.robot
-        if not robot.pitch_joints or robot.belly.shape == "rails" or robot.stereo_head is not None:
-            return False
-        carried_a = min(robot.current_limits_a[joint] for joint in robot.pitch_joints)
-        return self.run.walk.rolls and carried_a >= _ROLLING_A
+        is_round = robot.belly.shape != "rails" and robot.stereo_head is None
+        return self.run.walk.rolls and is_round and bool(robot.pitch_joints)
+
+    @property
+    def _rolls(self) -> bool:
+        """Whether the body may roll, and its pitch joints carry it."""
+        limits_a = np.array(self.robot.current_limits_a)[self.robot.pitch_joints]
+        return self._may_roll and limits_a.min() >= _ROLLING_A
 
     @property
     def pulse_m_s(self) -> float:
@@ -406,12 +410,16 @@ class WalkRun(PathRun):
 
     def _too_steep(self, section: SteepSection) -> str:
         x_m, y_m = self.path.position(section.begin_m)
-        slope = np.degrees(section.slope_rad)
-        climbed_deg = np.degrees(self._steepest_climb_rad)
+        remedy = "move the waypoints, or expect it to stay there"
+        if self.run.motion == "walk" and self._may_roll:
+            remedy = (
+                "it rolls up sideways with run.walk.pitch.p_gain=800 and "
+                "run.walk.pitch.current_limit_a=0.4"
+            )
         return (
-            f"the path climbs {slope:.1f} deg from {section.begin_m:.1f} to {section.end_m:.1f} m, "
-            f"beginning at ({x_m:.2f}, {y_m:.2f}): this body is known to climb {climbed_deg:.1f} "
-            "deg; move the waypoints, or expect it to stay there"
+            f"the path climbs {np.degrees(section.slope_rad):.1f} deg from {section.begin_m:.1f} "
+            f"to {section.end_m:.1f} m, beginning at ({x_m:.2f}, {y_m:.2f}): this body is known "
+            f"to climb {np.degrees(self._steepest_climb_rad):.1f} deg; {remedy}"
         )
 
     @property

@@ -181,7 +181,7 @@ def test_poses_of_a_robot_at_rest_do_not_drift() -> None:
     clock = SimClock()
     (newest,) = await_first_pose("udp:9870", AtRest(0.0), clock, lambda sample: None)
     assert newest.arrival_s == pytest.approx(2.0, abs=0.1)
-    with pytest.raises(InputError, match=r"the robot rests, and its pose moves by (1\.[89]|2\.)"):
+    with pytest.raises(InputError, match=r"the torque is off, and the pose moves by (1\.[89]|2\.)"):
         await_first_pose("udp:9870", AtRest(0.02), SimClock(), lambda sample: None)
 
 

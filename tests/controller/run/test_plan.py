@@ -73,7 +73,7 @@ def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> N
     keys = {"world.ground.slope_deg": 18.0, "world.planner.variance_limit_m2": 0.01}
     words = [word for key, value in keys.items() for word in ("--set", f"{key}={value}")]
     done = snakewalk("plan", "ramp-10-up", "--motion", "serpenoid", *words, "--json")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 1, "the forecast does not arrive"
     found = json.loads(done.stdout)
     (section,) = found["too_steep"]
     assert section["slope_deg"] == 18.0
@@ -86,6 +86,9 @@ def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> N
     prepared = prepare_walk("ramp-10-up", motion="serpenoid", keys=keys)
     prepared.make_source(lambda kind, text: events.append((kind, text)))
     assert events == [("climb", line)]
+    assert line.endswith("move the waypoints, or expect it to stay there")
+    (rolls,) = prepare_walk("ramp-10-up", keys=keys).climb_warnings
+    assert "it rolls up sideways with run.walk.pitch.p_gain=800" in rolls
 
 
 @pytest.mark.parametrize(
