@@ -331,7 +331,7 @@ class ExternalPose:
         self._reason = ""
 
     def _compare_start(self, placed: PlacedPose) -> None:
-        """Compare the first pose, within two deviations of its noise, with the start of the run.
+        """Compare the first pose, within a standard deviation, with the start of the run.
 
         Raises:
             InputError: the robot lies elsewhere, or points elsewhere.
@@ -342,7 +342,7 @@ class ExternalPose:
         away_m = math.hypot(*(placed.position_m[:2] - placed.odometry_m))
         self._start_off = away_m, placed.turn_rad
         turned_deg = math.degrees(placed.turn_rad)
-        most_deg = config.start_deg + 2.0 * math.degrees(placed.turn_sd_rad)
+        most_deg = config.start_deg + math.degrees(placed.turn_sd_rad)
         if away_m <= config.start_m and abs(turned_deg) <= most_deg:
             return
         raise InputError(

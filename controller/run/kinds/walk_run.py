@@ -355,8 +355,8 @@ class WalkRun(PathRun):
     @property
     def _rolls(self) -> bool:
         """Whether the body may roll, and its pitch joints carry it."""
-        limits_a = np.array(self.robot.current_limits_a)[self.robot.pitch_joints]
-        return self._may_roll and limits_a.min() >= _ROLLING_A
+        carried_a = (self.robot.current_limits_a[joint] for joint in self.robot.pitch_joints)
+        return self._may_roll and min(carried_a) >= _ROLLING_A
 
     @property
     def pulse_m_s(self) -> float:
@@ -401,7 +401,7 @@ class WalkRun(PathRun):
     @property
     def climb_warnings(self) -> tuple[str, ...]:
         """One line for each of the ``steep_sections``."""
-        return tuple(self._too_steep(section) for section in self.steep_sections)
+        return tuple(map(self._too_steep, self.steep_sections))
 
     @property
     def _steepest_climb_rad(self) -> float:
@@ -412,10 +412,7 @@ class WalkRun(PathRun):
         x_m, y_m = self.path.position(section.begin_m)
         remedy = "move the waypoints, or expect it to stay there"
         if self.run.motion == "walk" and self._may_roll:
-            remedy = (
-                "it rolls up sideways with run.walk.pitch.p_gain=800 and "
-                "run.walk.pitch.current_limit_a=0.4"
-            )
+            remedy = "run.walk.pitch.p_gain=800, run.walk.pitch.current_limit_a=0.4 let it roll up"
         return (
             f"the path climbs {np.degrees(section.slope_rad):.1f} deg from {section.begin_m:.1f} "
             f"to {section.end_m:.1f} m, beginning at ({x_m:.2f}, {y_m:.2f}): this body is known "

@@ -88,7 +88,7 @@ def test_a_section_that_the_body_cannot_climb_is_reported_by_plan_and_run() -> N
     assert events == [("climb", line)]
     assert line.endswith("move the waypoints, or expect it to stay there")
     (rolls,) = prepare_walk("ramp-10-up", keys=keys).climb_warnings
-    assert "it rolls up sideways with run.walk.pitch.p_gain=800" in rolls
+    assert rolls.endswith("run.walk.pitch.current_limit_a=0.4 let it roll up")
 
 
 @pytest.mark.parametrize(
