@@ -91,26 +91,26 @@ def write_truth(log: Path, path: Path, times: int) -> None:
 def main() -> None:
     """Measure, and print a row for each command and length."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.long_logs", description=__doc__)
-    parser.add_argument("--hours", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--hours", type=float, nargs="+", default=[1.0, 2.0])
     parser.add_argument("--commands", nargs="+", choices=COMMANDS, default=list(COMMANDS))
     parser.add_argument("--folder", type=Path, required=True, help="logs are kept there")
     given = parser.parse_args()
     print("| command | hours | log, MB | peak memory, MB | CPU, s | exit code |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |", flush=True)
     for hours in given.hours:
-        log = given.folder / f"log{hours}.mcap"
-        truth = given.folder / f"truth{hours}.jsonl"
+        log = given.folder / f"log{hours:g}.mcap"
+        truth = given.folder / f"truth{hours:g}.jsonl"
         if not log.exists():
-            repeat_log(RECORDED, log, REPEATS_PER_HOUR * hours)
+            repeat_log(RECORDED, log, round(REPEATS_PER_HOUR * hours))
         if "log judge" in given.commands and not truth.exists():
-            write_truth(RECORDED, truth, REPEATS_PER_HOUR * hours)
+            write_truth(RECORDED, truth, round(REPEATS_PER_HOUR * hours))
         for name in given.commands:
-            out = given.folder / f"out{hours}"
+            out = given.folder / f"out{hours:g}"
             words = [word.format(log=log, truth=truth, out=out) for word in COMMANDS[name]]
             memory_mb, cpu_s, code = measured(words)
             size_mb = log.stat().st_size / 1e6
-            row = f"| `{name}` | {hours} | {size_mb:.0f} | {memory_mb:.0f} | {cpu_s:.0f} | {code} |"
-            print(row, flush=True)
+            row = f"| `{name}` | {hours:g} | {size_mb:.0f} | {memory_mb:.0f} | {cpu_s:.0f} "
+            print(f"{row}| {code} |", flush=True)
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3, "MB here", file=sys.stderr)
 
 
