@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 
 from benchmarks.rows import Row, cpu_s
-from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.equipartition import equipartition
 from snakewalk.controller.images.silhouette import Polarity
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import distance, point_error, swapped
 

@@ -20,11 +20,12 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.coil_fit import COILS
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.resample import body_points, equal_arc_length
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, coiled_midlines, film
 from tests.oracles.skeleton_accuracy import point_error
 

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.images.body_detector import make_detector
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

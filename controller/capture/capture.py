@@ -1,22 +1,21 @@
 """A whole recording captured: bodies detected, outliers marked, head and tail kept."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from snakewalk.config.archive import read_arrays
-from snakewalk.config.arrays import Bools, DeepImage, Floats
+from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image_file import scaled
 from snakewalk.controller.capture.staged_film import StagedFilm
 from snakewalk.controller.capture.stages.pipeline import stages
-from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -36,7 +35,11 @@ _ADVICE = {
 }
 
 
-class UnusableFilmError(InputError):
+class RejectedFilmError(InputError):
+    """A film from which no track can be made with these options."""
+
+
+class UnusableFilmError(RejectedFilmError):
     """Too few frames can be used; the commonest reason, and what would help."""
 
     def __init__(self, name: str, skeletons: Sequence[Skeleton]) -> None:
@@ -112,39 +115,16 @@ class Capture:
             status=tuple(rough.get(frame_status, frame_status) for frame_status in self.status),
         )
 
+    def skeleton(self, k: int) -> Skeleton:
+        """Return the body of a frame, independent of these arrays."""
+        length_px = float(self.length_px[k])
+        points_px, radius_px = self.points_px[k].copy(), self.radius_px[k].copy()
+        return Skeleton(points_px, radius_px, length_px, self.status[k])
+
     @property
     def counts(self) -> dict[str, int]:
         """Frames of each status that occurs."""
         return {str(v): self.status.count(v) for v in FrameStatus if v in self.status}
-
-
-def capture(
-    frames: Iterable[DeepImage],
-    detector: BodyDetector,
-    rate_hz: float,
-    *,
-    name: str = "recording",
-    head_px: tuple[float, float] | None = None,
-    fixed: bool = True,
-) -> Capture:
-    """Find the animal in every frame, in order.
-
-    Args:
-        frames: (H, W) or (H, W, 3), 8 bit.
-        detector: from ``make_detector``.
-        rate_hz: frames a second.
-        name: for faults.
-        head_px: a place near the head in the first frame that can be used.
-        fixed: whether the camera stands still; images cropped to the animal show no travel.
-
-    Raises:
-        InputError: fewer than 2 frames can be used, or nothing moves.
-
-    """
-    detections = Detections()
-    for frame in frames:
-        detections.add(frame, detector.detect(frame))
-    return captured_from(detections, rate_hz, name=name, head_px=head_px, fixed=fixed)
 
 
 def captured_from(
@@ -172,7 +152,7 @@ def captured_from(
             raise UnusableFilmError(name, film.skeletons)
     captured = _captured(film)
     if not part and _change(captured.points_px) < _STILL_BODY:
-        raise InputError(
+        raise RejectedFilmError(
             f"{name}: no motion: the body changes by less than {_STILL_BODY:.0%} of its length in "
             f"{len(film.skeletons)} frames"
         )
@@ -228,6 +208,11 @@ class CaptureFile:
         return hashlib.sha256(points.tobytes()).hexdigest()[:16]
 
 
+_FIELDS = fields(Capture)
+_KEYS = {"status": "verdict", "margin": "head_margin", "distractors": "company"}
+"""Names in a file of fields that have other names there."""
+
+
 def save_capture(path: Path, file: CaptureFile) -> None:
     """Write an .npz that ``load_track`` reads, with the track and the data of every frame.
 
@@ -245,29 +230,20 @@ def save_capture(path: Path, file: CaptureFile) -> None:
     length_m = np.nan if file.m_per_px is None else float(np.nanmedian(captured.length_px)) * scale
     doubts = file.identity_uncertain_after
     more: dict[str, Any] = {"identity_uncertain_after": np.array(doubts)} if doubts else {}
+    values = {_KEYS.get(entry.name, entry.name): getattr(captured, entry.name) for entry in _FIELDS}
+    values["verdict"] = np.array([*map(str, captured.status)])
     with path.open("wb") as stream:
         np.savez_compressed(
             stream,
+            **values,
             points=scaled(captured.points_px, (scale, -scale), (0.0, 0.0), path.parent),
-            rate_hz=captured.rate_hz,
-            time_s=captured.time_s,
             rate_assumed=file.rate_assumed,
             length_m=length_m,
             name=file.name,
             source=file.source,
             licence=file.licence,
-            verdict=np.array([str(frame_status) for frame_status in captured.status]),
-            points_px=captured.points_px,
-            radius_px=captured.radius_px,
-            length_px=captured.length_px,
-            head_margin=captured.margin,
-            expected_px=captured.expected_px,
-            company=captured.distractors,
             m_per_px=np.nan if file.m_per_px is None else file.m_per_px,
-            head_by=captured.head_by,
-            head_sure=captured.head_sure,
             head_probability=captured.head_probability,
-            places_recorded=captured.places_recorded,
             **more,
         )
 
@@ -287,15 +263,18 @@ def load_capture(path: Path) -> CaptureFile:
         raise InputError(
             f"{path}: is no .npz; a track that `animal capture` wrote is needed"
         ) from None
+    arrays = {"time_s": np.empty(0), "places_recorded": np.array(True)} | arrays
     frames = len(arrays["verdict"]) if "verdict" in arrays and arrays["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
     shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
-    shapes |= dict.fromkeys(("rate_hz", "m_per_px", "head_sure", "rate_assumed"), ())
+    shapes |= dict.fromkeys(
+        ("rate_hz", "m_per_px", "head_sure", "rate_assumed", "places_recorded"), ()
+    )
     shapes |= {"points_px": (frames, SEGMENTS + 1, 2), "radius_px": (frames, SEGMENTS + 1)}
-    verdicts = {str(frame_status) for frame_status in FrameStatus}
+    verdicts = {*map(str, FrameStatus)}
     is_complete = (
         frames > 0
-        and {str(verdict) for verdict in arrays["verdict"]} <= verdicts
+        and {*map(str, arrays["verdict"])} <= verdicts
         and all(
             name in arrays and arrays[name].shape == shape and arrays[name].dtype.kind in "biuf"
             for name, shape in shapes.items()
@@ -308,24 +287,16 @@ def load_capture(path: Path) -> CaptureFile:
             "missing; choose another file"
         )
     scale = float(arrays["m_per_px"])
-    rate_hz = float(arrays["rate_hz"])
-    even_s = np.arange(frames) / rate_hz  # files of before held no times
-    time_s = np.asarray(arrays.get("time_s", even_s), dtype=float)
+    if arrays["time_s"].shape != (frames,):  # files of before held no times
+        arrays["time_s"] = np.arange(frames) / arrays["rate_hz"]
+    values: dict[str, Any] = {}
+    for entry in _FIELDS:
+        value = arrays[_KEYS.get(entry.name, entry.name)]
+        is_list = entry.type == Floats
+        values[entry.name] = np.asarray(value, dtype=float) if is_list else value.tolist()
+    values["status"] = tuple(map(FrameStatus, values["status"]))
     return CaptureFile(
-        Capture(
-            points_px=np.asarray(arrays["points_px"], dtype=float),
-            radius_px=np.asarray(arrays["radius_px"], dtype=float),
-            length_px=np.asarray(arrays["length_px"], dtype=float),
-            status=tuple(FrameStatus(str(verdict)) for verdict in arrays["verdict"]),
-            expected_px=np.asarray(arrays["expected_px"], dtype=float),
-            distractors=np.asarray(arrays["company"], dtype=float),
-            margin=np.asarray(arrays["head_margin"], dtype=float),
-            rate_hz=rate_hz,
-            time_s=time_s if time_s.shape == (frames,) else even_s,
-            head_by=str(arrays["head_by"]),
-            head_sure=float(arrays["head_sure"]),
-            places_recorded=bool(np.all(arrays.get("places_recorded", True))),
-        ),
+        Capture(**values),
         name=str(arrays["name"]),
         m_per_px=scale if np.isfinite(scale) else None,
         rate_assumed=bool(arrays["rate_assumed"]),

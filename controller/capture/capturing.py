@@ -16,6 +16,7 @@ from snakewalk.config.reading import Fact, Facts, by_user, texts
 from snakewalk.controller.capture.capture import (
     Capture,
     CaptureFile,
+    RejectedFilmError,
     UnusableFilmError,
     load_capture,
     save_capture,
@@ -32,7 +33,6 @@ from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.plots.capture import step_picture, trail_picture
 from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.verification.film_check import REJECTED
-from snakewalk.controller.capture.verification.remedies import remedy
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
@@ -46,9 +46,7 @@ from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
 
-_MANY_UNEXPLAINED = (
-    1.0 / 3.0
-)  # share of frames that are not used from which the capture needs a look
+MANY_LOST = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
 _EXPLAINED_STATUSES = {
     FrameStatus.NOTHING,
     FrameStatus.CUT,
@@ -108,6 +106,8 @@ class CaptureFacts:
     """Images whose number is missing in their folder; the times of the others keep the gaps."""
     places_recorded: bool
     """False where the images were cropped to the animal: they contain no travel."""
+    frames_lost: int
+    """Frames that should show a whole animal, and have no points."""
     frames_rejected: int
     """Frames whose finished skeleton their own pixels contradict; ``verdicts`` has the reasons."""
     warning: str | None
@@ -143,13 +143,8 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
     """
     if options.corrections is None:
         raise ValueError("--corrections: needs a file of corrections")
-    plain = CaptureOptions(
-        recording=options.recording,
-        output=options.output,
-        corrections=options.corrections,
-        force=options.force,
-    )
-    if options != plain:
+    others = {"recording", "output", "corrections", "force"}
+    if options.model_dump(exclude_defaults=True, exclude=others):
         raise InputError(
             "--corrections: works with TRACK.npz of an earlier capture, -o and --force only; "
             "leave the other options out"
@@ -202,11 +197,7 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         scale = picture_scale(film.some[::3], footage.count, str(options.recording))
     parts = _parts(options, film, folder, finished)
     with ProgressBar("frames", footage.count, transient=True, remaining=True) as bar:
-        try:
-            captured = _captured_clearly(options, parts, film, detector, bar)
-        except InputError as error:
-            better = remedy(options, film, detector)
-            raise error if better is None else InputError(f"{error}; {better}") from None
+        captured = _captured_clearly(options, parts, film, detector, bar)
         captured = in_whole_film(options, film, captured)
         if options.length_m is not None:
             m_per_px = scale_of_length(options.length_m, captured.length_px)
@@ -223,10 +214,6 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
         parts.folder.clear()
     facts = facts_of(options, footage, detector, captured, m_per_px, options.output)
     warn_of(options, footage, facts)
-    if len(_unexplained_statuses(captured)) >= _MANY_UNEXPLAINED * len(captured.status):
-        better = remedy(options, film, detector)
-        if better is not None:
-            LOGGER.warning("%s: %s", options.recording, better)
     return facts
 
 
@@ -248,7 +235,7 @@ def _parts(
         film.footage.rate_hz,
         film.footage.count,
         str(options.recording),
-        film.head_px,
+        film.heads_px[0] if film.heads_px else None,
         not options.cropped and film.one_size,
         folder,
         finished=finished,
@@ -264,7 +251,7 @@ def _captured_clearly(
     bar: ProgressBar,
 ) -> Capture:
     """Capture the film; an animal as bright as its ground, whose outline is unseen, is a fault."""
-    fault = InputError(
+    fault = RejectedFilmError(
         f"{options.recording}: the animal is about as bright as its ground, or dark and light "
         "shapes are in view; use other light, or give --background, --roi or --threshold"
     )
@@ -288,7 +275,7 @@ def check_chance_finds(options: CaptureOptions, captured: Capture) -> None:
     unclear = [frame_status for frame_status in captured.status if frame_status in _UNCLEAR]
     if used < _FEW_ROUGH * (used + len(unclear)) and good <= 0.5 * used:
         reason = max(dict.fromkeys(unclear), key=unclear.count)
-        raise InputError(
+        raise RejectedFilmError(
             f"{options.recording}: only {used} of {len(captured.status)} frames show a complete "
             f"body, and these are rough; mostly: {reason}; use other light, or give --background, "
             "--roi or --threshold"
@@ -409,6 +396,7 @@ def facts_of(
         frames_with_unsure_head=_unsure_heads(captured),
         frames_missing=footage.missing,
         places_recorded=captured.places_recorded,
+        frames_lost=len(_unexplained_statuses(captured)),
         frames_rejected=sum(frame_status in REJECTED for frame_status in captured.status),
         warning=warning_of(options, captured),
         facts=texts(film_facts(options, footage, captured, m_per_px)),
@@ -437,18 +425,19 @@ def film_facts(
 def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
     """Doubts about the recording, in one sentence each; None without a doubt."""
     doubts = []
+    x, y = captured.points_px[np.argmax(captured.used), -1]
     if captured.head_sure < UNSURE_HEAD:
         doubts.append(
             f"head and tail may be exchanged (the head is right with a probability of "
             f"{captured.head_probability:.2f}, from the {captured.head_by}); look at --sheet or "
-            "--review, and give --head X,Y"
+            f"--review, and if they are, give --head {x:.0f},{y:.0f}"
         )
     if len(captured.status) < FEWEST_FRAMES:
         doubts.append(
             f"fewer than {FEWEST_FRAMES} frames show no usual length to compare with; film longer"
         )
     unused = _unexplained_statuses(captured)
-    if len(unused) >= _MANY_UNEXPLAINED * len(captured.status):
+    if len(unused) >= MANY_LOST * len(captured.status):
         reason = max(dict.fromkeys(unused), key=unused.count)
         doubts.append(
             f"{len(unused)} of {len(captured.status)} frames are not used, mostly because "

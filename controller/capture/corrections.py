@@ -107,10 +107,8 @@ def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) ->
     left_out = set(corrections.left_out)
     expected = captured.expected_px.copy()
     skeletons: list[Skeleton] = []
-    for k, status in enumerate(captured.status):
-        before = Skeleton(
-            captured.points_px[k], captured.radius_px[k], float(captured.length_px[k]), status
-        )
+    for k in range(count):
+        before = captured.skeleton(k)
         if k in left_out:
             after = no_skeleton(FrameStatus.LEFT_OUT)
         elif k in drawn:

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
-from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, captured_from
+from snakewalk.controller.capture.capture import Capture, RejectedFilmError, captured_from
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import margin_of, margins
 from snakewalk.controller.capture.image_file import large_array
@@ -140,7 +139,7 @@ def joined(
     sign = _signs(parts)
     score, by = _head_of(parts, sign)
     if sum(film_part.used for film_part in parts) < 2:
-        raise InputError(f"{name}: the body is never completely visible; look at --sheet")
+        raise RejectedFilmError(f"{name}: the body is never completely visible; look at --sheet")
     count = sum(film_part.frames for film_part in parts)
     arrays: dict[str, Floats] = {}
     status: list[FrameStatus] = []

@@ -9,7 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.film.film_options import CaptureOptions
-from snakewalk.controller.capture.options import place_of
+from snakewalk.controller.capture.options import places_of
 from snakewalk.controller.images.region import WHOLE, Region, region_of
 from snakewalk.controller.images.silhouette import as_deep_as
 from snakewalk.controller.images.video import Footage, frame_times, open_footage
@@ -34,8 +34,8 @@ class OpenedFilm:
     """Background that the user gave, cut to the region."""
     threshold: float | None
     """Contrast threshold that the user gave, in the levels of 8 bit."""
-    head_px: tuple[float, float] | None
-    """Place of the head in the region that the user gave."""
+    heads_px: tuple[tuple[float, float], ...]
+    """Places of heads in the region that the user gave."""
     stated_s: "array[float]" = field(default_factory=lambda: array("d"))
     """Times of the frames, as the film states them; filled by ``frames``."""
 
@@ -65,7 +65,7 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
 
     """
     footage = open_footage(options.recording, options.rate_hz)
-    head_px = None if options.head is None else place_of(options.head)
+    heads_px = places_of(options)
     sample = footage.spread(_SAMPLE)
     one_size = len({frame.shape[:2] for frame in sample}) == 1
     if (options.roi or options.mask) and not one_size:
@@ -73,7 +73,7 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
             f"{options.recording}: --roi and --mask need images of one size; these differ"
         )
     region = region_of(options.roi, options.mask, sample[0].shape)
-    if head_px is not None:
+    for head_px in heads_px:
         _refuse_outside(head_px, region, sample, str(options.head))
     in_colour = any(frame.ndim == 3 for frame in sample)
     background = None
@@ -88,7 +88,7 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
         in_colour,
         background,
         _threshold(options, footage),
-        None if head_px is None else region.place(*head_px),
+        tuple(region.place(*head_px) for head_px in heads_px),
     )
 
 

@@ -82,16 +82,9 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
         raise InputError(
             f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
         )
-    given = {
-        "--head": options.head,
-        "--steps": options.steps,
-        "--trail": options.trail,
-    }
-    given_names = [name for name, value in given.items() if value is not None]
-    if given_names:
-        raise InputError(
-            f"--animals and {given_names[0]}: this option is for one animal; leave it out"
-        )
+    for name, value in (("--steps", options.steps), ("--trail", options.trail)):
+        if value is not None:
+            raise InputError(f"--animals and {name}: this option is for one animal; leave it out")
     if options.cropped:
         raise InputError("--animals and --cropped: several animals need a camera that stands still")
 
@@ -113,24 +106,30 @@ def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool |
 def track_files(options: CaptureOptions, count: int) -> list[Path]:
     """Return the files of the tracks: one per animal, or one table of all."""
     if options.output.suffix.lower() != ".npz":
-        return [options.output]
+        return [options.output] * count
     return [
         options.output.with_name(f"{options.output.stem}-{number}.npz")
         for number in range(1, count + 1)
     ]
 
 
-def place_of(text: str) -> tuple[float, float]:
-    """Return the place of ``--head X,Y``.
+def places_of(options: CaptureOptions) -> list[tuple[float, float]]:
+    """Return the places of ``--head``.
 
     Raises:
-        InputError: not two numbers.
+        InputError: not two finite numbers each, or several places for one animal.
 
     """
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"--head {text}: expected X,Y in pixels") from None
-    if not np.isfinite([x, y]).all():
-        raise InputError(f"--head {text}: expected X,Y in pixels")
-    return x, y
+    places: list[tuple[float, float]] = []
+    for text in [] if options.head is None else options.head.split(";"):
+        try:
+            x, y = (float(part) for part in text.split(","))
+        except ValueError:
+            x = y = np.nan
+        if not np.isfinite([x, y]).all() or (places and options.animals is None):
+            raise InputError(
+                f"--head {options.head}: expected X,Y in pixels; with --animals X,Y;X,Y for "
+                "several heads"
+            )
+        places.append((x, y))
+    return places

@@ -4,19 +4,23 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_arrays, read_bytes
+from snakewalk.config.archive import MOST_JSON_BYTES, parse_json, read_bytes
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.capture.capture import (
+    Capture,
+    CaptureFile,
+    load_capture,
+    save_capture,
+)
 from snakewalk.controller.console.result_files import atomic_write, write_result
 from snakewalk.controller.images.medial_axis import Skeleton
-from snakewalk.controller.track.frame_status import FrameStatus
 
 _SETTINGS = "settings.json"
 
@@ -42,7 +46,7 @@ class FinishedPart:
     def of(cls, part: Capture, file: Path | None = None) -> "FinishedPart":
         """Summarise a part; without a file, its content stays in memory."""
         numbers = np.flatnonzero(part.used).tolist()
-        ends = [_skeleton(part, k) for k in (numbers[0], numbers[-1])] if numbers else [None, None]
+        ends = [part.skeleton(k) for k in (numbers[0], numbers[-1])] if numbers else [None, None]
         return cls(
             len(part.status),
             len(numbers),
@@ -62,13 +66,6 @@ class FinishedPart:
 
         """
         return self.content if isinstance(self.content, Capture) else _read_part(self.content)
-
-
-def _skeleton(part: Capture, k: int) -> Skeleton:
-    """Return the body of a frame, independent of the part's arrays."""
-    points = part.points_px[k].copy()
-    radius = part.radius_px[k].copy()
-    return Skeleton(points, radius, float(part.length_px[k]), part.status[k])
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,11 +124,9 @@ class PartFolder:
         """Keep a finished part."""
         if number == 0:
             self._begin()
-        values = {field.name: getattr(part, field.name) for field in fields(part)}
-        values["status"] = np.array([str(frame_status) for frame_status in part.status])
         path = self.path / f"{number:05d}.npz"
-        with atomic_write(path) as file, file.open("wb") as stream:
-            np.savez(stream, **values)
+        with atomic_write(path) as file:
+            save_capture(file, CaptureFile(part, name=""))
         return FinishedPart.of(part, path)
 
     @property
@@ -168,19 +163,6 @@ class PartFolder:
 
 def _read_part(file: Path) -> Capture:
     try:
-        part_arrays, _ = read_arrays(file)
-        arrays: dict[str, Floats] = {
-            field.name: np.asarray(part_arrays[field.name], dtype=float)
-            for field in fields(Capture)
-            if field.type in {Floats, "Floats"}
-        }
-        return Capture(
-            **arrays,
-            status=tuple(FrameStatus(str(verdict)) for verdict in part_arrays["status"]),
-            rate_hz=float(part_arrays["rate_hz"]),
-            head_by=str(part_arrays["head_by"]),
-            head_sure=float(part_arrays["head_sure"]),
-            places_recorded=bool(part_arrays["places_recorded"]),
-        )
-    except (OSError, ValueError, KeyError):
+        return load_capture(file).captured
+    except InputError:
         raise InputError(f"{file}: is damaged; start again with --force") from None

@@ -107,18 +107,8 @@ def _of_animal(file: CaptureFile, track: Path) -> dict[str, Any]:
         "name": file.name,
         "track": file.fingerprint,
         "corrections": corrections,
-        "command": shlex.join(
-            [
-                "snakewalk",
-                "animal",
-                "capture",
-                str(track),
-                "--corrections",
-                corrections,
-                "-o",
-                str(corrected),
-            ]
-        ),
+        "command": f"snakewalk animal capture {shlex.quote(str(track))} --corrections "
+        f"{shlex.quote(corrections)} -o {shlex.quote(str(corrected))}",
         "length": round(float(np.nanmedian(captured.length_px)), 2),
         "status": [_STATUS_TEXTS.index(str(frame_status)) for frame_status in captured.status],
         "points": [

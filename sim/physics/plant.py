@@ -204,15 +204,6 @@ class MujocoPlant:
         return potential_j, 0.5 * float(moved @ d.qvel)
 
     @property
-    def momentum(self) -> tuple[Floats, Floats]:
-        """Linear, N s, and angular about the centre of mass, N m s; (3,) each."""
-        m, d = self.mechanics.model, self._data
-        self._update_kinematics()
-        mujoco.mj_comVel(m, d)
-        mujoco.mj_subtreeVel(m, d)
-        return m.body_subtreemass[1] * d.subtree_linvel[1], d.subtree_angmom[1].copy()
-
-    @property
     def slip_m(self) -> float:
         """Mean distance slipped across the links since the reset."""
         return float(self.mechanics.totals[1])

@@ -1,5 +1,6 @@
 """Bodies, servos and a wave for the tests of the physics."""
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,6 +39,15 @@ def link_rotations(plant: MujocoPlant) -> Floats:
     """Columns (L, 3, 3): each link's forward, left and up axes in the world."""
     count = len(plant.link_positions_m)
     return np.array([plant.link_motion(link).rotation for link in range(count)])
+
+
+def momentum(plant: MujocoPlant) -> tuple[Floats, Floats]:
+    """Linear, N s, and angular about the centre of mass, N m s; (3,) each."""
+    m, d = plant.mechanics.model, plant.mechanics.data
+    assert len(plant.link_positions_m), "updates the kinematics"
+    mujoco.mj_comVel(m, d)
+    mujoco.mj_subtreeVel(m, d)
+    return m.body_subtreemass[1] * d.subtree_linvel[1], d.subtree_angmom[1].copy()
 
 
 def a_drive(*, torque_on: bool = True) -> ServoDrive:

@@ -3,9 +3,13 @@
 from dataclasses import asdict
 
 from snakewalk.config.reading import answered
-from snakewalk.controller.capture.capturing import capture_recording, correct_recording
+from snakewalk.controller.capture.capturing import (
+    CaptureFacts,
+    correct_recording,
+)
 from snakewalk.controller.capture.film.film_options import CaptureOptions, FootageChoice
-from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
+from snakewalk.controller.capture.several.recording import AnimalsFacts
+from snakewalk.controller.capture.verification.remedies import capture_film, captures
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
     Json,
@@ -32,24 +36,23 @@ def capture(as_json: Json = False, *, options: CaptureOptions) -> None:
         show(asdict(correct_recording(options)), as_json)
         return
     film = FootageChoice(**options.model_dump(include={*FootageChoice.model_fields}))
-    read = capture_recording if options.animals is None else capture_several
     facts = answered(
-        options.recording, film, lambda answers: read(options.model_copy(update=dict(answers)))
+        options.recording,
+        film,
+        lambda answers: capture_film(options.model_copy(update=dict(answers))),
     )
-    if isinstance(facts, AnimalsFacts):
-        show_several(facts, as_json=as_json)
-    else:
-        show(asdict(facts), as_json)
+    show_facts(facts, as_json=as_json)
 
 
-def show_several(facts: AnimalsFacts, *, as_json: bool) -> None:
-    """Show the animals, as rows or as JSON; exit with code 1 if one of them has no track."""
-    if as_json:
+def show_facts(facts: CaptureFacts | AnimalsFacts, *, as_json: bool) -> None:
+    """Show rows or JSON; exit with code 1 if an animal has no track, or one without good frames."""
+    if as_json or isinstance(facts, CaptureFacts):
         show(asdict(facts), as_json)
     else:
         _print_animals(facts)
-    if any(animal.capture is None for animal in facts.animals):
-        raise SystemExit(1)
+    for animal in captures(facts):
+        if animal is None or animal.frames_used == animal.frames_rough:
+            raise SystemExit(1)
 
 
 def _print_animals(facts: AnimalsFacts) -> None:

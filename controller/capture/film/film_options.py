@@ -26,7 +26,9 @@ class FootageChoice(Answers):
         description="frame rate in frames per second; default: the rate that the film states",
     )
     head: str | None = Field(
-        None, description="X,Y in pixels near the head in the first usable frame"
+        None,
+        description="X,Y in pixels near the head in the first usable frame; with --animals X,Y;X,Y "
+        "for several heads",
     )
 
 

@@ -6,17 +6,15 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bools, DeepImage, Floats, SignedInts
+from snakewalk.config.arrays import DeepImage, Floats, SignedInts
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.capture.capture import Capture, RejectedFilmError
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
 from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.capture.several.blobs import (
     SMALLEST,
     Blobs,
     blobs_of,
-    count_of,
-    detector_of_several,
     mask_of_other_animals,
     own_window,
     usual_area,
@@ -94,7 +92,7 @@ def find_animals(
     usual = usual_area(blob_frames)
     sample = [blobs.area_px for blobs in blob_frames]
     if usual <= 0.0:
-        raise InputError(
+        raise RejectedFilmError(
             f"{name}: no contrast or no motion: nothing stands out from the background; give "
             "--background, or better light"
         )
@@ -111,7 +109,7 @@ def find_animals(
         kept = every[:requested_count]
     if not kept or (requested_count is not None and len(kept) < requested_count):
         asked = "auto" if requested_count is None else str(requested_count)
-        raise InputError(
+        raise RejectedFilmError(
             f"{name}: --animals {asked}: {len(kept)} animals can be followed; give --background, "
             "or another number"
         )
@@ -169,31 +167,6 @@ def with_bare_ground(detector: BodyDetector, frames: Sequence[DeepImage]) -> Bod
     return replace(detector, background=ground)
 
 
-def share_of_several(
-    frames: Sequence[DeepImage],
-    background: DeepImage | None,
-    inside: Bools | None,
-    threshold: float | None,
-) -> float:
-    """Share of whole animals among all in some frames; 0 if they show fewer than two."""
-    detector = detector_of_several(frames, background, inside=inside, threshold=threshold)
-    grounds = [detector.ground_of(frame) for frame in frames]
-    blob_frames = [
-        blobs_of(frame, ground, detector) for frame, ground in zip(frames, grounds, strict=True)
-    ]
-    count, _ = count_of(blob_frames)
-    if count < 2:
-        return 0.0
-    least = SMALLEST * usual_area(blob_frames)
-    total = sum(
-        _detected_animal(frame, ground, detector, blobs, int(number))[1].skeleton.status
-        is FrameStatus.GOOD
-        for frame, ground, blobs in zip(frames, grounds, blob_frames, strict=True)
-        for number in np.flatnonzero(blobs.area_px >= least)[:count]
-    )
-    return total / (count * len(frames))
-
-
 def films_of(
     animals_found: AnimalsFound,
     rate_hz: float,
@@ -202,14 +175,19 @@ def films_of(
     *,
     resume: bool = False,
     part_frames: int = PART_FRAMES,
+    heads_px: Sequence[tuple[float, float]] = (),
 ) -> list[FilmParts]:
     """One film for each animal, with the parts that an interrupted capture has finished.
+
+    Each place in ``heads_px`` is near the head of the animal that is first seen nearest to it.
 
     Raises:
         InputError: a finished part is damaged.
 
     """
     out = []
+    first_px = np.array([identity.tracklets[0].middles[0] for identity in animals_found.identities])
+    heads = {int(np.argmin(np.hypot(*(first_px - head).T))): head for head in heads_px}
     for number in range(1, len(animals_found.identities) + 1):
         animal_folder = None if folder is None else folder.of_animal(number)
         finished = [] if animal_folder is None or not resume else animal_folder.parts()
@@ -218,6 +196,7 @@ def films_of(
                 rate_hz,
                 animals_found.frames,
                 f"{name}: animal {number}",
+                heads.get(number - 1),
                 folder=animal_folder,
                 finished=finished,
                 part_frames=part_frames,

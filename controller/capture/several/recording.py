@@ -7,7 +7,7 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture import film_parts
-from snakewalk.controller.capture.capture import CaptureFile
+from snakewalk.controller.capture.capture import CaptureFile, RejectedFilmError
 from snakewalk.controller.capture.capturing import (
     CaptureFacts,
     facts_of,
@@ -80,7 +80,7 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
     check_options(options)
     folder = part_folder(options)
     folder.start(resume=options.resume, force=options.force)
-    requested_count = None if options.animals in {None, AUTO} else int(str(options.animals))
+    requested_count = None if options.animals == AUTO else int(str(options.animals))
     if requested_count is not None:
         refuse_to_overwrite(track_files(options, requested_count), options.force)
     with stderr_console().status("learning the background ..."):
@@ -119,6 +119,7 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
             folder,
             resume=options.resume,
             part_frames=film_parts.PART_FRAMES,
+            heads_px=film.heads_px,
         )
         with folder.kept_if_interrupted():
             animals = capture_animals(
@@ -146,27 +147,24 @@ def _files(
     """
     good = [animal.captured for animal in animals if animal.captured is not None]
     if not good:
-        raise InputError(str(animals[0].fault))
+        raise RejectedFilmError(str(animals[0].fault))
     m_per_px = marker_scale(options, detector, film)
     if options.length_m is not None:
         lengths = np.concatenate([captured.length_px for captured in good])
         m_per_px = scale_of_length(options.length_m, lengths)
-    out: list[CaptureFile | None] = []
-    for number, animal in enumerate(animals, start=1):
-        if animal.captured is None:
-            out.append(None)
-            continue
-        out.append(
-            CaptureFile(
-                in_whole_film(options, film, animal.captured),
-                name=f"{options.recording.stem}-{number}",
-                m_per_px=m_per_px,
-                rate_assumed=film.footage.rate_assumed,
-                source=f"captured from {options.recording.name}, animal {number}",
-                identity_uncertain_after=animal.identity.uncertain_after,
-            )
+    return [
+        None
+        if animal.captured is None
+        else CaptureFile(
+            in_whole_film(options, film, animal.captured),
+            name=f"{options.recording.stem}-{number}",
+            m_per_px=m_per_px,
+            rate_assumed=film.footage.rate_assumed,
+            source=f"captured from {options.recording.name}, animal {number}",
+            identity_uncertain_after=animal.identity.uncertain_after,
         )
-    return out
+        for number, animal in enumerate(animals, start=1)
+    ]
 
 
 def _write(
@@ -177,18 +175,16 @@ def _write(
     scale: float,
 ) -> None:
     files = track_files(options, len(capture_files))
+    by_file = {
+        file: capture_file
+        for file, capture_file in zip(files, capture_files, strict=True)
+        if capture_file is not None
+    }
     good = [capture_file for capture_file in capture_files if capture_file is not None]
-    if options.output.suffix.lower() != ".npz":
-        write_captures(options.output, good, wide=options.wide)
-    else:
-        files = [
-            file
-            for file, capture_file in zip(files, capture_files, strict=True)
-            if capture_file is not None
-        ]
-        for file, capture_file in zip(files, good, strict=True):
-            write_captures(file, [capture_file])
-    write_looks(options, film, good, files, bar, scale)
+    for file, capture_file in by_file.items():
+        several = [capture_file] if file.suffix.lower() == ".npz" else good
+        write_captures(file, several, wide=options.wide)
+    write_looks(options, film, good, list(by_file), bar, scale)
 
 
 def _facts(
@@ -199,13 +195,14 @@ def _facts(
     animals: Sequence[CapturedAnimal],
     capture_files: Sequence[CaptureFile | None],
 ) -> AnimalsFacts:
-    files = track_files(options, len(capture_files))
     listed = []
-    for number, (animal, file) in enumerate(zip(animals, capture_files, strict=True), start=1):
+    tracks = track_files(options, len(capture_files))
+    for number, (animal, file, track) in enumerate(
+        zip(animals, capture_files, tracks, strict=True), start=1
+    ):
         facts = None
         merged = 0
         if file is not None:
-            track = files[min(number, len(files)) - 1]
             captured = file.captured
             facts = facts_of(options, film.footage, detector, captured, file.m_per_px, track)
             merged = captured.status.count(FrameStatus.MERGED)

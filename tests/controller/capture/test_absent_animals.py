@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Floats, Image
-from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.images.background import contrast_polarity
 from snakewalk.controller.images.body_detector import BodyDetector, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Image
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.coil_film import CoilFilm, solve_coils
 from snakewalk.controller.capture.coil_fit import Outline
 from snakewalk.controller.capture.identity import align_ends
@@ -15,6 +15,7 @@ from snakewalk.controller.capture.stages.outlier_frames import mark_outliers
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, coiled_midlines, empty, film
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.video import open_footage
+from tests.helpers.captured import capture
 from tests.oracles.skeleton_accuracy import distance, swapped
 
 

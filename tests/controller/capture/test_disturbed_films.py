@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.small_body.crop import crop_body
 from snakewalk.controller.capture.stages.head import head_end, travel_score
 from snakewalk.controller.images.background import median_background, surrounding_ground
@@ -18,6 +18,7 @@ from snakewalk.controller.images.body_detector import (
 )
 from snakewalk.controller.images.silhouette import Polarity, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error

@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, UnusableFilmError, capture
+from snakewalk.controller.capture.capture import Capture, UnusableFilmError
 from snakewalk.controller.capture.capturing import (
     capture_recording,
     check_chance_finds,
@@ -27,6 +27,7 @@ from snakewalk.controller.images.body_detector import BodyDetector, make_detecto
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.helpers.film_options import film_options
 from tests.oracles.rendered_snake import (
     SnakeScene,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.small_body.film_fit import (
     FittedFilm,
     with_tip_errors,
@@ -16,6 +16,7 @@ from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
 

@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.capture import capture
 from snakewalk.controller.capture.small_body.blur_estimate import (
     axis_error_px,
     edge_blur_px,
@@ -15,6 +14,7 @@ from snakewalk.controller.capture.stages.outlier_frames import mark_outliers
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.oracles.rendered_snake import SnakeScene, empty, film
 
 SCENE = SnakeScene(rows=240, columns=320, length_px=140.0, frames=20, wave_hz=0.6)

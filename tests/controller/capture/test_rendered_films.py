@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.images.body_detector import make_detector
 from snakewalk.controller.images.silhouette import Polarity
+from tests.helpers.captured import capture
 from tests.helpers.tiers import slow_except
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped

@@ -13,9 +13,8 @@ from benchmarks.crossings import compare, identities_in
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture import film_parts
-from snakewalk.controller.capture.capture import capture, load_capture, save_capture
-from snakewalk.controller.capture.capturing import capture_recording
-from snakewalk.controller.capture.commands.capture import show_several
+from snakewalk.controller.capture.capture import load_capture, save_capture
+from snakewalk.controller.capture.commands.capture import show_facts
 from snakewalk.controller.capture.film.results import write_captures
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.several.animal_films import find_animals, merged_status
@@ -23,11 +22,13 @@ from snakewalk.controller.capture.several.blobs import blobs_of, detector_of_sev
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
 from snakewalk.controller.capture.several.tracklets import Tracklet, TrackletBuilder
+from snakewalk.controller.capture.verification.remedies import capture_film
 from snakewalk.controller.images.body_detector import BodyDetector, Detection, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.choice import Choice
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.readers.load import load_file
+from tests.helpers.captured import capture
 from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_crossings import CrossingScene, crossing_film, crossing_midlines
 from tests.oracles.skeleton_accuracy import point_error
@@ -156,10 +157,10 @@ def test_the_command_exits_with_a_code_if_an_animal_has_no_track(
     dish: tuple[Path, AnimalsFacts], *, as_json: bool
 ) -> None:
     _, facts = dish
-    show_several(facts, as_json=as_json)
+    show_facts(facts, as_json=as_json)
     lost = replace(facts.animals[0], capture=None, fault="the body is never completely visible")
     with pytest.raises(SystemExit) as stopped:
-        show_several(replace(facts, animals=(lost, *facts.animals[1:])), as_json=as_json)
+        show_facts(replace(facts, animals=(lost, *facts.animals[1:])), as_json=as_json)
     assert stopped.value.code == 1
 
 
@@ -215,8 +216,9 @@ def test_a_film_that_is_mostly_lost_names_the_option_that_captures_it(
     """The fixture shows that the option gives a track of each animal."""
     folder, _ = dish
     options = film_options(folder / "dish.avi", tmp_path / "t.npz")
-    capture_recording(options)
-    assert "with --animals auto; try: snakewalk animal capture" in caplog.text
+    capture_film(options)
+    assert "with --animals auto; look at" in caplog.text
+    assert (tmp_path / "t-tried.png").exists()
 
 
 @pytest.mark.slow
@@ -229,8 +231,8 @@ def test_what_does_not_fit_several_animals_is_rejected(
         capture_several(changed(plain, animals="5"))
     with pytest.raises(InputError, match="--animals many: expected a number"):
         capture_several(changed(plain, animals="many"))
-    with pytest.raises(InputError, match="--animals and --head"):
-        capture_several(changed(plain, head="3,4"))
+    with pytest.raises(InputError, match="--animals and --steps"):
+        capture_several(changed(plain, steps=tmp_path / "s.png"))
     with pytest.raises(InputError, match="--wide"):
         capture_several(changed(plain, wide=True))
     with pytest.raises(InputError, match="--review"):

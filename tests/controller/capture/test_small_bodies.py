@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snakewalk.controller.capture.capture import Capture, capture
+from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.small_body.crop import bends_of, crop_body, reversed_body
 from snakewalk.controller.capture.small_body.film_body import Patch, film_body, fit_frame
@@ -26,6 +26,7 @@ from snakewalk.controller.images.medial_axis import no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.images.thin_body_fit import fitted
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers.captured import capture
 from tests.helpers.tiers import slow_after
 from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error, swapped
