@@ -249,7 +249,7 @@ def read_film(file: Path) -> Any:
     """Facts and notes of the command."""
     out = file.with_name("track.npz")
     shown = snakewalk("animal", "capture", str(file), "-o", str(out), "--force", "--json")
-    assert shown.returncode == 0, shown.stderr
+    assert shown.returncode == 1, "a film of 12 frames has no good frame"
     return json.loads(shown.stdout)
 
 
