@@ -89,6 +89,7 @@ OTHERS: Final = {
             "controller/bench/guided_setup.py", "controller/bench/loop_compiler.py",
             "controller/capture/capture.py", "controller/capture/corrections.py",
             "controller/capture/part_folder.py", "controller/capture/review.py",
+            "controller/capture/verification/remedies.py",
             "controller/console/command.py", "controller/console/interrupted_progress.py",
             "controller/console/table.py",
             "controller/learning/policy_trials.py",

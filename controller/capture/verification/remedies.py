@@ -33,7 +33,7 @@ _GIVEN = {"background", "rate_hz", "cropped", "roi", "mask", "threshold", "anima
 _FRAMES = 20
 _TRIALS_HZ = 10.0
 _THRESHOLDS = (0.4, 0.6, 1.6)  # of the contrast at the boundary
-_LEAST_GAIN = 0.25  # of the frames: this share more must show a whole animal
+_LEAST_GAIN = 0.25  # of the frames: this number of whole animals more must be captured
 _LEAST_SHARE = 0.5  # of the frames, at least
 _CLEAR_SHARE = 0.9  # of the frames: no other option is tried
 _MARGIN = 12  # of the smaller side of the picture: twice the margin around places of an animal
@@ -84,11 +84,11 @@ def remedy(options: CaptureOptions) -> str | None:
         usual = most = _used(options, best, scratch)
         for change in _changes(options, frames):
             used = _used(options, change, scratch)
-            if used[0] > most[0] and used[1] >= usual[1]:
+            if used[1] > most[1] and used[0] >= _LEAST_SHARE:
                 most, best = used, change
             if most[0] > _CLEAR_SHARE:
                 break
-        if most[0] < max(_LEAST_SHARE, usual[0] + _LEAST_GAIN):
+        if most[1] < usual[1] + _LEAST_GAIN * len(frames):
             return None
         sheet = options.output.with_name(f"{options.output.stem}-tried.png")
         shutil.copy(scratch / f"{best[1]}.png", sheet)
