@@ -1,4 +1,4 @@
-"""``python -m benchmarks.films FOLDER [--rendered] [--only WORD]``: capture all films of a folder.
+"""``python -m benchmarks.films FOLDER [--rendered] [--seed N] [--only WORD]``: capture all films.
 
 A TOML file beside a film, or in this package, states source, licence and truth
 (``described_film.py``). Prints a Markdown table: frames used, good, above twice the expected error,
@@ -29,6 +29,7 @@ def main() -> int:
     )
     parser.add_argument("folder", type=Path, nargs="?", help="folder of films")
     parser.add_argument("--rendered", action="store_true", help="also run rendered films")
+    parser.add_argument("--seed", type=int, default=0, help="other rendered films, above 0")
     parser.add_argument("--only", default="", metavar="WORD", help="only films with this word")
     given = parser.parse_args()
     if given.folder is None and not given.rendered:
@@ -42,7 +43,7 @@ def main() -> int:
         folders = [] if given.folder is None else [given.folder.resolve()]
         if given.rendered:
             folders.append(Path(scratch, "rendered"))
-            write_rendered(folders[-1])
+            write_rendered(folders[-1], given.seed)
         for film in (one for folder in folders for one in films_of(folder)):
             if given.only in str(film.path):
                 done.append(judge(film, Path(scratch)))
@@ -99,6 +100,13 @@ def summary(done: list[JudgedFilm]) -> str:
             f"\n{above} of {len(good)} good frames with truth ({above / len(good):.1%}) are above "
             f"twice their expected error; median expected over median true error {ratio:.2f}."
         )
+        for quarter in np.array_split(np.argsort(expected), min(4, len(good))):
+            share = float((true[quarter] > 2.0 * expected[quarter]).mean())
+            low, high = expected[quarter[[0, -1]]]
+            lines.append(
+                f"Expected {low:.2f} to {high:.2f} px: {len(quarter)} frames, median true error "
+                f"{np.median(true[quarter]):.2f} px, above twice {share:.1%}."
+            )
     judged = [(0.5 + 0.5 * one.head_sure, np.mean(one.heads) > 0.5) for one in done if one.heads]
     if judged:
         for low, high in ((0.5, 0.8), (0.8, 0.9), (0.9, 0.97), (0.97, 1.01)):

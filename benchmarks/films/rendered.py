@@ -20,13 +20,34 @@ SCENES: dict[str, SnakeScene] = {
 }
 
 
-def write_rendered(folder: Path) -> None:
+def scenes(seed: int = 0) -> dict[str, SnakeScene]:
+    """Scenes by name; seeds above 0 change noise, ground and the body's length, width and waves.
+
+    Constants were chosen on seed 0.
+    """
+    if not seed:
+        return SCENES
+    drawn = {}
+    for number, (name, usual) in enumerate(SCENES.items()):
+        rng = np.random.default_rng([seed, number])
+        drawn[name] = replace(
+            usual,
+            seed=int(rng.integers(1_000_000)),
+            length_px=usual.length_px * float(rng.uniform(0.8, 1.25)),
+            slender=usual.slender * float(rng.uniform(0.8, 1.25)),
+            waves=float(rng.uniform(0.9, 1.6)),
+            taper=float(rng.uniform(0.15, 0.5)),
+        )
+    return drawn
+
+
+def write_rendered(folder: Path, seed: int = 0) -> None:
     """Write each scene as a folder of pictures, its midlines and its description."""
-    for name, scene in SCENES.items():
+    for name, scene in scenes(seed).items():
         place = folder / name / "frames"
         place.mkdir(parents=True)
-        for number, image in enumerate(film(scene)):
-            cv2.imwrite(str(place / f"{number:05d}.png"), image)
+        for k, image in enumerate(film(scene)):
+            cv2.imwrite(str(place / f"{k:05d}.png"), image)
         np.savez(folder / name / "midlines.npz", midlines=true_midlines(scene))
         text = (
             f'film = "frames"\nlines = "midlines.npz"\noptions = ["--rate", "{scene.rate_hz:g}"]\n'

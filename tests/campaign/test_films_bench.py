@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.films.__main__ import summary
 from benchmarks.films.described_film import SHIPPED, DescribedFilm, Marks, films_of
 from benchmarks.films.judged_film import JudgedFilm, compare_lines, compare_marks
+from benchmarks.films.rendered import SCENES, scenes
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -40,6 +42,23 @@ def test_a_description_is_found_beside_its_film_and_in_the_package(tmp_path):
     assert larva.licence == "MIT"
     assert len(larva.animals[0].ends_px) == 12
     assert (own.licence, own.length_px) == ("MIT", 80.0)
+
+
+def test_a_seed_draws_other_scenes_and_always_the_same():
+    assert scenes(0) == SCENES
+    assert scenes(7) == scenes(7)
+    assert scenes(7).keys() == SCENES.keys()
+    assert all(scenes(7)[name] != scenes(8)[name] != SCENES[name] for name in SCENES)
+
+
+def test_the_summary_has_the_calibration_of_each_quarter():
+    expected = [0.5] * 4 + [1.0] * 4 + [2.0] * 4 + [4.0] * 4
+    true = [0.4] * 4 + [0.9, 0.9, 0.9, 2.1] + [1.0] * 4 + [3.0] * 4
+    film = JudgedFilm("a", true_px=true, expected_px=expected, are_good=[True] * 16)
+    above, *quarters = summary([film]).strip().splitlines()
+    assert above.startswith("1 of 16 good frames")
+    assert len(quarters) == 4
+    assert "median true error 3.00 px, above twice 0.0%" in quarters[-1]
 
 
 def test_an_unknown_key_is_a_fault(tmp_path):
