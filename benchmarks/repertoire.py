@@ -20,12 +20,12 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
-from snakewalk.controller.repertoire.crowd_film import SIZE, SIZE_PX, CrowdScene, species_of
+from snakewalk.controller.repertoire.crowd_film import SIZE_PX, CrowdScene, species_of
+from snakewalk.controller.repertoire.habit import SIZE, Habit
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_physics import FRAME_S, PhysicsBody
 from snakewalk.controller.repertoire.repertoire_planning import plan_route
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
-from snakewalk.controller.repertoire.species import Habit
 from snakewalk.sim.rendering.crowd_film import CrowdShot, CrowdView
 
 TITLE = "Repertoire: 17 links, 60 frames a second, one core"

@@ -10,10 +10,11 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.kinematics.frame import Frame
 from snakewalk.controller.kinematics.rotations import wrap
 from snakewalk.controller.repertoire.crowd import Crowd
+from snakewalk.controller.repertoire.habit import Habit
 from snakewalk.controller.repertoire.secondary import SecondaryController
 from snakewalk.controller.repertoire.segment import REVERSE
 from snakewalk.controller.repertoire.separation import SeparatedCrowd
-from snakewalk.controller.repertoire.species import Habit, Species, joined
+from snakewalk.controller.repertoire.species import Species, joined
 
 STEEP_RAD = 0.6
 """Slopes beyond are avoided (ours)."""

@@ -13,8 +13,9 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.mechanics.ground_step import GroundStep
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd import Crowd
+from snakewalk.controller.repertoire.habit import Habit
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.repertoire.species import Habit, Species
+from snakewalk.controller.repertoire.species import Species
 from snakewalk.sim.rendering.crowd_film import BodyChain, CrowdShot, CrowdView, render_crowd
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
@@ -81,8 +82,6 @@ class DetailedCrowd:
 
 FPS = 20
 SIZE_PX = (960, 540)
-SIZE = 0.32
-"""Mean length of the animals over the recorded robot's (ours): the world is a model of 9 m."""
 _SPREAD = 0.3
 """Largest difference of a size from the mean, as a share of it (ours)."""
 FLIGHT_S = 40.0

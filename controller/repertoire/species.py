@@ -2,25 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
 from snakewalk.config.arrays import Floats
+from snakewalk.controller.repertoire.habit import Habit
 from snakewalk.controller.repertoire.repertoire import Repertoire
-
-
-class Habit(StrEnum):
-    """Goal of a body that neither flees nor avoids another one."""
-
-    WANDER = "wander"
-    """A place of its own."""
-    SCHOOL = "school"
-    """A place of all, in the direction of the neighbours, towards their middle."""
-    FEED = "feed"
-    """The nearest food."""
-    PURSUE = "pursue"
-    """The nearest body of a species that does not pursue."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,6 @@
 # fmt: off
 PLUGINS = (
     ("command", "demo", "Show a recorded run in the browser at once; offer the same run live.", "snakewalk.controller.view.commands.demo:demo"),
-    ("command", "view", "Show a log in the browser: body, path, servos and curves; or play a glTF.", "snakewalk.controller.view.commands.view:view"),
+    ("command", "view", "Show a log in the browser: body, path, servos, curves; or a glTF.", "snakewalk.controller.view.commands.view:view"),
     ("observer", "page", "Live web page of a run, with a stop button.", "snakewalk.controller.view.live_view:open_page"),
 )

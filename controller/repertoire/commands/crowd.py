@@ -18,14 +18,13 @@ from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd_film import (
     FPS,
-    SIZE,
     SIZE_PX,
     CrowdScene,
     film_crowd,
     species_of,
 )
+from snakewalk.controller.repertoire.habit import SIZE, Habit
 from snakewalk.controller.repertoire.repertoire import load_repertoire
-from snakewalk.controller.repertoire.species import Habit
 from snakewalk.sim.rendering.crowd_film import CrowdView
 from snakewalk.sim.rendering.crowd_mesh import COLOURS
 

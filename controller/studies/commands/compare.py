@@ -74,7 +74,15 @@ def _print_tables(runs: "list[ComparedRun]", changed: dict[str, list[Any]]) -> N
     else:
         console.print("Run, robot and world are the same.\n")
     numbers = _table("number", "Numbers that differ, the largest difference first", runs)
-    summaries = [flat({"verdict": run.verdict.to_dict()} | run.summary.to_dict()) for run in runs]
+    summaries = [
+        flat(run.summary.to_dict())
+        | {
+            "verdict": run.verdict.sentence,
+            "exit_code": run.verdict.exit_code,
+            "cause": run.verdict.cause,
+        }
+        for run in runs
+    ]
     keys = dict.fromkeys(key for summary in summaries for key in summary)
     values_by_key = {key: [summary.get(key) for summary in summaries] for key in keys}
     for key in sorted(keys, key=lambda key: _spread(values_by_key[key]), reverse=True):

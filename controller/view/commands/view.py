@@ -32,7 +32,7 @@ def view(
     ],
     view_at: ViewAt = VIEW_AT,
 ) -> None:
-    """Show a log in the browser: body, path, servos and curves; or play a glTF.
+    """Show a log in the browser: body, path, servos, curves; or a glTF.
 
     A slider sets the time. ^C ends it. Two logs are shown side by side, or over each other if they
     have the same ground. The camera flies through a glTF of a place.

@@ -251,7 +251,7 @@ def _scene(frames: int) -> SnakeScene:
 
 def _film(to: Path) -> None:
     writer = cv2.VideoWriter(str(to), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (200, 160))
-    for frame in film(_scene(9)):
+    for frame in film(_scene(24)):
         writer.write(cv2.cvtColor(frame, cv2.COLOR_GRAY2BGR))
     writer.release()
 

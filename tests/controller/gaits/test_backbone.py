@@ -139,8 +139,8 @@ def test_the_chain_is_that_of_the_physics() -> None:
 @pytest.mark.parametrize(
     ("curve", "words"),
     [
-        (np.zeros((3, 3)), "four points"),
-        (np.zeros((9, 2)), "four points"),
+        (np.zeros((3, 3)), "4 or more points"),
+        (np.zeros((9, 2)), "4 or more points"),
         (np.linspace(0, 1, 9)[:, None] * [0.5, 0, 0], "0.500 m long"),
         (np.repeat(np.arange(5.0), 2)[:, None] * [1.0, 0, 0], "neighbours must differ"),
     ],

@@ -8,9 +8,10 @@ from snakewalk.config.ground import build_ground, water_surface_m
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.repertoire.behaviour import DEPTH_LENGTHS, PITCH_RAD, Wandering
+from snakewalk.controller.repertoire.habit import Habit
 from snakewalk.controller.repertoire.repertoire import Repertoire
 from snakewalk.controller.repertoire.repertoire_recording import ACTIONS, record
-from snakewalk.controller.repertoire.species import Habit, Species, joined
+from snakewalk.controller.repertoire.species import Species, joined
 
 pytestmark = pytest.mark.costs("the first test compiles the loops of a crowd")
 

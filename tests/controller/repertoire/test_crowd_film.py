@@ -23,8 +23,9 @@ from snakewalk.controller.repertoire.crowd_film import (
     detail_levels,
     film_crowd,
 )
+from snakewalk.controller.repertoire.habit import Habit
 from snakewalk.controller.repertoire.repertoire import Repertoire
-from snakewalk.controller.repertoire.species import Habit, Species
+from snakewalk.controller.repertoire.species import Species
 from snakewalk.sim.rendering.view_frustum import ViewFrustum
 
 

@@ -80,7 +80,7 @@ def test_drift_and_heading_are_compared_as_in_a_run() -> None:
     assert re.match(r"the robot is 0\.40 m behind its start and 0\.0\d m to the left", said)
     assert re.search(r"turned by \+17\d degrees if its body is straight", said)
     found = watch(Drifting(), SimClock(), 5.0, PoseConfig(), lambda line: None)
-    assert re.search(r"its pose moves by 2\.\d cm/s", start_faults(found, lambda sample: None)[0])
+    assert re.search(r"the pose moves by 2\.\d cm/s", start_faults(found, lambda sample: None)[0])
 
 
 class Wrong:
