@@ -20,7 +20,13 @@ from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skele
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _DISTRACTOR = 0.08  # of the body's area: more than dirt and noise
-_OF_FRAMES = ("length_px", "head_margin", "expected_px", "company")  # arrays (T,) of a file
+_OF_FRAMES = (
+    "length_px",
+    "head_margin",
+    "expected_px",
+    "company",
+    "time_s",
+)  # arrays (T,) of a file
 _STILL_BODY = 0.02  # of the length: a smaller change does not count as motion
 
 
@@ -151,7 +157,7 @@ def captured_from(
                 return _without_body(film)
             raise UnusableFilmError(name, film.skeletons)
     captured = _captured(film)
-    if not part and _change(captured.points_px) < _STILL_BODY:
+    if not part and _change(captured) < _STILL_BODY:
         raise RejectedFilmError(
             f"{name}: no motion: the body changes by less than {_STILL_BODY:.0%} of its length in "
             f"{len(film.skeletons)} frames"
@@ -263,7 +269,6 @@ def load_capture(path: Path) -> CaptureFile:
         raise InputError(
             f"{path}: is no .npz; a track that `animal capture` wrote is needed"
         ) from None
-    arrays = {"time_s": np.empty(0), "places_recorded": np.array(True)} | arrays
     frames = len(arrays["verdict"]) if "verdict" in arrays and arrays["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
     shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
@@ -287,8 +292,6 @@ def load_capture(path: Path) -> CaptureFile:
             "missing; choose another file"
         )
     scale = float(arrays["m_per_px"])
-    if arrays["time_s"].shape != (frames,):  # files of before held no times
-        arrays["time_s"] = np.arange(frames) / arrays["rate_hz"]
     values: dict[str, Any] = {}
     for entry in _FIELDS:
         value = arrays[_KEYS.get(entry.name, entry.name)]
@@ -308,8 +311,8 @@ def load_capture(path: Path) -> CaptureFile:
     )
 
 
-def _change(points: Floats) -> float:
+def _change(captured: Capture) -> float:
     """Greatest mean change of place or shape since the first frame, in body lengths."""
-    good = points[np.isfinite(points[:, 0, 0])]
-    length = float(np.hypot(*np.diff(good[0], axis=0).T).sum())
+    good = captured.points_px[captured.used]
+    length = float(captured.length_px[captured.used][0])
     return float(np.hypot(*(good - good[0]).transpose(2, 0, 1)).mean(axis=1).max()) / length

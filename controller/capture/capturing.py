@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import Fact, Facts, by_user, texts
+from snakewalk.config.reading import Fact, Facts, by_file, by_user, texts
 from snakewalk.controller.capture.capture import (
     Capture,
     CaptureFile,
@@ -206,7 +206,8 @@ def capture_recording(options: CaptureOptions) -> CaptureFacts:
             name=options.recording.stem,
             m_per_px=m_per_px,
             rate_assumed=footage.rate_assumed,
-            source=f"captured from {options.recording.name}",
+            source=f"captured from {options.recording.name}"
+            + (f", positions from {options.keypoints.name}" if options.keypoints else ""),
         )
         write_captures(options.output, [capture_file], wide=options.wide)
         _write_pictures(options, film, detector, capture_file, bar, scale)
@@ -316,7 +317,10 @@ def _captured_parts(
     kept = nullcontext() if parts.folder is None else parts.folder.kept_if_interrupted()
     with kept:
         for frame in film.frames(first):
-            parts.add(frame, detector.detect(frame), film.stated_s[-1])
+            detection = detector.detect(frame)
+            if film.keypoints is not None:
+                detection = film.keypoints.placed(detection, len(film.stated_s) - 1)
+            parts.add(frame, detection, film.stated_s[-1])
             bar.advance()
     return parts.done()
 
@@ -408,11 +412,14 @@ def film_facts(
 ) -> Facts:
     """Return the facts about a film, each with its source."""
     scale = None if m_per_px is None else f"{m_per_px:.4g} m a pixel"
+    file = None if options.keypoints is None else str(options.keypoints)
     return {
-        "quantity": Fact("silhouettes of an animal", "file", "its pictures"),
+        "quantity": by_file(str(file), file and "keypoints of an animal")
+        or Fact("silhouettes of an animal", "file", "its pictures"),
         "unit": by_user("--length-m or --marker", scale)
         or Fact("px", "inferred", "no scale is given"),
         "order": by_user("--head", options.head and "head first")
+        or by_file(str(file), file and "head first")
         or Fact(
             "head first",
             "inferred",

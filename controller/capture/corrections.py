@@ -142,7 +142,7 @@ def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) ->
 def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats) -> Skeleton:
     """The drawn line at equal chords, with the usual thickness."""
     line = np.array(drawn.points_px, dtype=float)
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum()) if np.isfinite(line).all() else 0.0
+    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
     if not 1.0 < length < _LONGEST_LINE * usual_px:
         raise InputError(
             f"{where}: the line is {length:.1f} px long, the body usually {usual_px:.1f} px; "

@@ -74,7 +74,11 @@ class Detections:
         body = detection.skeleton
         silhouette = detection.silhouette
         self.skeletons.append(body)
-        self.area_px.append(silhouette.area_px)
+        line_px = detection.line_error_px
+        area_px = silhouette.area_px
+        if line_px is not None:
+            area_px = 2.0 * float(body.radius_px.mean()) * body.length_px
+        self.area_px.append(area_px)
         self.contrast.append(silhouette.threshold)
         is_visible = silhouette.area_px > 0.0
         self.noise.append(silhouette.noise_level / silhouette.threshold if is_visible else 0.0)
@@ -82,7 +86,9 @@ class Detections:
         expected = axis_px = np.nan
         ends_px = NO_ENDS
         is_tailed = detection.tip_error_px > 0.0
-        if body.status is FrameStatus.GOOD:
+        if line_px is not None:
+            axis_px = line_px
+        elif body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
             if is_tailed:
@@ -97,12 +103,13 @@ class Detections:
                 axis_px = max(_FAINT_PARTS * axis_px, _HIDDEN_PART * hidden**2 * body.length_px)
                 self.bands_px.append(_longest_band_px(body, detection))
                 self.faint_error_px[number] = axis_px
-        may_coil = body.status in COILS and silhouette.status is FrameStatus.GOOD
-        if may_coil or (body.status is FrameStatus.GOOD and not is_tailed):
+        is_whole = body.status is FrameStatus.GOOD and not is_tailed
+        if silhouette.status is FrameStatus.GOOD and (is_whole or body.status in COILS):
             width_px = 2.0 * float(np.max(body.radius_px))
             self.outlines[number] = Outline.of(silhouette, np.nan_to_num(width_px))
         self._keep_surroundings(number, frame, detection)
-        if body.length_px <= LONGEST_PX and not (detection.faint_parts or is_tailed):
+        is_clear = line_px is None and not (detection.faint_parts or is_tailed)
+        if body.length_px <= LONGEST_PX and is_clear:
             self._last = number
             self._points = body.points_px
             self.crops.put(number, frame, detection.background, self._points)

@@ -47,16 +47,12 @@ class FilmParts:
     part_frames: int = PART_FRAMES
     finished: list[FinishedPart] = field(default_factory=list)
     _detections: Detections = field(default_factory=Detections)
-    _done: int = 0
+    done_frames: int = 0
+    """Frames so far."""
 
     def __post_init__(self) -> None:
         """Count the frames of parts that were finished before."""
-        self._done = sum(part.frames for part in self.finished)
-
-    @property
-    def done_frames(self) -> int:
-        """Frames so far."""
-        return self._done
+        self.done_frames = sum(part.frames for part in self.finished)
 
     def add(self, frame: DeepImage, detection: Detection, at_s: float = float("nan")) -> None:
         """Add the next frame; ``at_s`` is the time that the film states."""
@@ -70,9 +66,9 @@ class FilmParts:
 
     def _count_frames(self, at_s: float) -> None:
         self._detections.stated_s.append(at_s)
-        self._done += 1
+        self.done_frames += 1
         bodies = self._detections.skeletons
-        if len(bodies) < self.part_frames or self.count - self._done < self.part_frames // 2:
+        if len(bodies) < self.part_frames or self.count - self.done_frames < self.part_frames // 2:
             return
         calm = all(body.status is FrameStatus.GOOD for body in bodies[-_CALM:])
         if calm or len(bodies) >= max(_LONGEST_PART, 2 * self.part_frames):
@@ -80,24 +76,23 @@ class FilmParts:
 
     def _finish(self) -> None:
         detections = self._detections
-        part = captured_from(
-            detections,
-            self.rate_hz,
-            name=self.name,
-            head_px=self._head(),
-            fixed=self.fixed,
-            part=True,
-        )
-        part = replace(part, time_s=np.array(detections.stated_s))
+        part = replace(self._captured(part=True), time_s=np.array(detections.stated_s))
         number = len(self.finished)
         kept = FinishedPart.of(part) if self.folder is None else self.folder.add(number, part)
         self.finished.append(kept)
         self._detections = Detections()
 
-    def _head(self) -> tuple[float, float] | None:
-        """The given place of the head, in the first part with a body only."""
-        has_bodies = any(part.used for part in self.finished)
-        return None if has_bodies else self.head_px
+    def _captured(self, *, part: bool) -> Capture:
+        """Capture what was added; the place of the head belongs to the first part with a body."""
+        has_bodies = any(finished.used for finished in self.finished)
+        return captured_from(
+            self._detections,
+            self.rate_hz,
+            name=self.name,
+            head_px=None if has_bodies else self.head_px,
+            fixed=self.fixed,
+            part=part,
+        )
 
     def done(self) -> Capture:
         """Capture of all frames.
@@ -107,14 +102,8 @@ class FilmParts:
 
         """
         if not self.finished:
-            captured = captured_from(
-                self._detections,
-                self.rate_hz,
-                name=self.name,
-                head_px=self.head_px,
-                fixed=self.fixed,
-            )
-            return captured if self._done >= FEWEST_FRAMES else captured.roughened(ROUGH)
+            captured = self._captured(part=False)
+            return captured if self.done_frames >= FEWEST_FRAMES else captured.roughened(ROUGH)
         if self._detections.skeletons:
             self._finish()
         folder = None if self.folder is None else self.folder.large_files

@@ -9,6 +9,7 @@ import numpy as np
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.film.film_options import CaptureOptions
+from snakewalk.controller.capture.film.keypoint_lines import KeypointLines
 from snakewalk.controller.capture.options import places_of
 from snakewalk.controller.images.region import WHOLE, Region, region_of
 from snakewalk.controller.images.silhouette import as_deep_as
@@ -36,6 +37,8 @@ class OpenedFilm:
     """Contrast threshold that the user gave, in the levels of 8 bit."""
     heads_px: tuple[tuple[float, float], ...]
     """Places of heads in the region that the user gave."""
+    keypoints: KeypointLines | None
+    """Bodies of another program, in the region."""
     stated_s: "array[float]" = field(default_factory=lambda: array("d"))
     """Times of the frames, as the film states them; filled by ``frames``."""
 
@@ -75,6 +78,12 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
     region = region_of(options.roi, options.mask, sample[0].shape)
     for head_px in heads_px:
         _refuse_outside(head_px, region, sample, str(options.head))
+    keypoints = None
+    heads = tuple(region.place(*head_px) for head_px in heads_px)
+    if options.keypoints is not None:
+        keypoints = KeypointLines.of(options.keypoints, region.origin_px)
+        x, y = next(iter(keypoints.bodies.values())).points_px[0].tolist()
+        heads = heads or ((x, y),)
     in_colour = any(frame.ndim == 3 for frame in sample)
     background = None
     if options.background is not None:
@@ -88,7 +97,8 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
         in_colour,
         background,
         _threshold(options, footage),
-        tuple(region.place(*head_px) for head_px in heads_px),
+        heads,
+        keypoints,
     )
 
 

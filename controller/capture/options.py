@@ -24,21 +24,14 @@ def check_options(options: CaptureOptions) -> None:
         InputError: an unusable option, or an existing result.
 
     """
-    if options.cropped and options.background is not None:
+    if options.cropped and options.background:
         raise InputError(
             "--cropped and --background: a moving camera has no background; leave one out"
         )
-    if options.cropped and options.trail is not None:
+    if options.cropped and options.trail:
         raise InputError("--cropped and --trail: the camera must stand still; leave one out")
-    if options.length_m is not None and options.marker is not None:
+    if options.length_m and options.marker:
         raise InputError("--length-m and --marker both give the scale; leave one out")
-    if options.length_m is not None and not 0.0 < options.length_m < float("inf"):
-        raise InputError(f"--length-m: the animal must be longer than 0 m, not {options.length_m}")
-    if options.threshold is not None and not 0.0 < options.threshold < float("inf"):
-        raise InputError(
-            f"--threshold {options.threshold:g}: expected the grey levels, above 0, by which the "
-            "body stands out from its background at its boundary"
-        )
     _check_files(options)
     if options.animals is not None:
         _check_animals(options, options.animals)
@@ -82,21 +75,16 @@ def _check_animals(options: CaptureOptions, animals: str) -> None:
         raise InputError(
             f"--animals {animals}: expected a number from 1 to {MOST_ANIMALS}, or {AUTO}"
         )
-    for name, value in (("--steps", options.steps), ("--trail", options.trail)):
-        if value is not None:
-            raise InputError(f"--animals and {name}: this option is for one animal; leave it out")
-    if options.cropped:
-        raise InputError("--animals and --cropped: several animals need a camera that stands still")
+    for name in ("steps", "trail", "keypoints", "cropped"):
+        if getattr(options, name):
+            raise InputError(f"--animals and --{name}: this option is for one animal; leave it out")
 
 
 def settings_of(options: CaptureOptions) -> dict[str, str | int | float | bool | None]:
     """Return the film and the options on which the skeletons depend."""
     film = options.recording
-    names = ("background", "rate_hz", "head", "cropped", "roi", "mask", "threshold", "animals")
-    values = {name: getattr(options, name) for name in names}
-    texts = {
-        name: str(value) if isinstance(value, Path) else value for name, value in values.items()
-    }
+    names = {"background", "rate_hz", "head", "cropped", "roi", "mask", "threshold", "animals"}
+    texts = options.model_dump(mode="json", include=names | {"keypoints"})
     size = 0
     if film.exists():
         size = sum(1 for _ in film.iterdir()) if film.is_dir() else film.stat().st_size

@@ -64,7 +64,7 @@ def review_page(
     scale: float,
     tracks: Sequence[Path],
     origin_px: tuple[int, int] = (0, 0),
-    on_progress: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> str:
     """Write the page.
 
@@ -83,8 +83,7 @@ def review_page(
     for frame in frames:
         sizes.append((frame.shape[1], frame.shape[0]))
         pictures.append(base64.b64encode(_packed_picture(frame, scale)).decode())
-        if on_progress is not None:
-            on_progress()
+        on_progress()
     data = {
         "name": animals[0].name if len(animals) == 1 else f"{len(animals)} animals",
         "rate_hz": captured.rate_hz,

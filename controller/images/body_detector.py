@@ -60,6 +60,8 @@ class Detection:
     """Whether something fainter than the silhouette goes on beyond it."""
     tip_error_px: float = 0.0
     """Expected error of the tip of a faint tail, along the body; 0 without one."""
+    line_error_px: float | None = None
+    """Expected error of a line that another program has found; None for the medial axis."""
     core_threshold: float | None = None
     """Half of the contrast of the strongest part, for a body with faint parts; None for others."""
 

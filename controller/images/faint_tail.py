@@ -79,7 +79,7 @@ def follow_tail(
         return None
     is_limited = noise < faintest / _CLEAR
     noise = max(noise, faintest / _CLEAR)
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    length = float(arc_lengths(line)[-1])
     back = max(1, round(_DIRECTION_PX * (len(line) - 1) / max(length, 1e-6)))
     ahead = line[-1] - line[max(0, len(line) - 1 - back)]
     angle = float(np.arctan2(ahead[1], ahead[0]))

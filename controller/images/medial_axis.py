@@ -279,7 +279,7 @@ def _wide_end(line: Floats, deep: Floats) -> int | None:
     if most < _WIDE_END * float(np.median(deep)):
         return None
     place = int(np.flatnonzero(near >= _AS_DEEP * most)[-1])
-    if np.hypot(*np.diff(line[: place + 1], axis=0).T).sum() > _SHORT_END * most:
+    if arc_lengths(line[: place + 1])[-1] > _SHORT_END * most:
         return None
     behind = min(place + max(2, round(1.5 * most)), len(line) - 1)
     ahead = line[place] - line[behind]

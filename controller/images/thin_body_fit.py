@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from snakewalk.config.arrays import Floats, Singles
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.drivers.compiling import compiled
 
 THIN_PX = 6.0
@@ -66,7 +67,7 @@ def fitted(line: Floats, level: Singles, width: float) -> tuple[Floats, float] |
         [np.interp(np.linspace(0, 1, 401), np.linspace(0, 1, len(line)), v) for v in line.T]
     )
     controls = np.linalg.lstsq(_FINE_BASIS, start.T, rcond=None)[0]
-    length = float(np.hypot(*np.diff(line, axis=0).T).sum())
+    length = float(arc_lengths(line)[-1])
     spot = max(0.4 * width, 1.0)
     weights = np.full(_STATIONS, picture.sum() / _SPOTS)
     values = np.concatenate([controls.T.ravel(), weights, [spot]])
@@ -107,7 +108,7 @@ def fitted(line: Floats, level: Singles, width: float) -> tuple[Floats, float] |
     curve = _FINE_BASIS @ kept[: 2 * _CONTROLS].reshape(2, -1).T
     shown, _ = _picture(kept, picture.shape)
     left = float(np.linalg.norm(picture - shown) / max(float(np.linalg.norm(picture)), 1e-9))
-    grown = float(np.hypot(*np.diff(curve, axis=0).T).sum()) / length
+    grown = float(arc_lengths(curve)[-1]) / length
     reach = _TAPER * length
     ends = [
         reach * (a - b) / float(np.hypot(*(a - b))) for a, b in (curve[[0, 8]], curve[[-1, -9]])

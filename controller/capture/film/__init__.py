@@ -1,1 +1,1 @@
-"""Film of a capture: its options, its facts and its scale."""
+"""Film of a capture: its options, its keypoints, its results and its scale."""

@@ -14,7 +14,7 @@ class FootageChoice(Answers):
     """Rate, scale and head of a film of an animal."""
 
     length_m: float | None = Field(
-        None, description="length of the animal in metres, which sets the scale"
+        None, gt=0.0, description="length of the animal in metres, which sets the scale"
     )
     marker: str | None = Field(
         None,
@@ -58,8 +58,14 @@ class CaptureOptions(FootageChoice):
     )
     threshold: float | None = Field(
         None,
+        gt=0.0,
         description="grey levels between body and background at the boundary; default: half of the "
         "body's contrast",
+    )
+    keypoints: Annotated[Path | None, Flag(metavar="FILE")] = Field(
+        None,
+        description="positions of the body from a file of SLEAP or DeepLabCut, in the order of its "
+        "names or of its stored answers",
     )
     overlay: Path | None = Field(
         None, description="write a film with the skeleton on it (.mp4, .avi)"

@@ -16,14 +16,7 @@ _FAMILIES = (
 
 
 def scale_of_length(length_m: float, length_px: Floats) -> float:
-    """Metres a pixel, from the animal's ``length_m`` and its length in every frame.
-
-    Raises:
-        InputError: not a length.
-
-    """
-    if not 0.0 < length_m < float("inf"):
-        raise InputError(f"--length-m: the animal must be longer than 0 m, not {length_m}")
+    """Metres a pixel, from the animal's ``length_m`` and its length in every frame."""
     return length_m / float(np.nanmedian(length_px))
 
 

@@ -54,9 +54,8 @@ def draw_body(canvas: Image, image: DeepImage, points_px: Floats) -> Int32s:
     """Draw a body of a frame onto its canvas; returns its line there, sixteenths of a pixel."""
     high_px, wide_px = canvas.shape[:2]
     factor = min(wide_px / image.shape[1], (high_px - 18) / image.shape[0])
-    size = (round(image.shape[1] * factor), round(image.shape[0] * factor))
     line = np.rint(((points_px + 0.5) * factor - 0.5) * 16.0).astype(np.int32)
-    thick = 2 if max(size) > 2 * _TILE_PX else 1
+    thick = 2 if max(canvas.shape) > 2 * _TILE_PX else 1
     _draw_line(canvas, line, thick, 4)
     return np.asarray(line, dtype=np.int32)
 
@@ -249,7 +248,7 @@ def overlay_film(
     path: Path,
     frames: Iterable[DeepImage],
     animals: Sequence[Capture],
-    on_progress: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> None:
     """The recording with the skeletons on it, every frame with its number and status.
 
@@ -259,9 +258,7 @@ def overlay_film(
         InputError: no film of this ending can be written here.
 
     """
-    kind = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "mp4v"}.get(path.suffix.lower())
-    if kind is None:
-        raise InputError(f"{path}: an overlay film is an .mp4, .mkv or .avi")
+    kind = "MJPG" if path.suffix.lower() == ".avi" else "mp4v"
     with atomic_write(path) as part:
         film: cv2.VideoWriter | None = None
         wide = high = 0
@@ -275,8 +272,7 @@ def overlay_film(
                 if not film.isOpened():
                     raise InputError(f"{path}: this OpenCV cannot write such a film; try .avi")
             film.write(_film_frame(image, animals, number, (wide, high)))
-            if on_progress is not None:
-                on_progress()
+            on_progress()
         if film is not None:
             film.release()
 

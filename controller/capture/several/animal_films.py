@@ -70,7 +70,7 @@ def find_animals(
     *,
     requested_count: int | None,
     name: str,
-    on_progress: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> AnimalsFound:
     """Follow all animals through a film.
 
@@ -101,8 +101,7 @@ def find_animals(
     for frame in frames:
         builder.add(blobs_of(frame, detector.ground_of(frame), detector, usual))
         count += 1
-        if on_progress is not None:
-            on_progress()
+        on_progress()
     every = identities_of(builder.done())
     kept = [identity for identity in every if identity.is_animal(count)]
     if requested_count is not None:
@@ -211,7 +210,7 @@ def capture_animals(
     animals_found: AnimalsFound,
     films: Sequence[FilmParts],
     *,
-    on_progress: Callable[[], None] | None = None,
+    on_progress: Callable[[], None] = lambda: None,
 ) -> list[CapturedAnimal]:
     """Capture each animal as if it were alone; frames in which it is not alone have no points.
 
@@ -228,9 +227,8 @@ def capture_animals(
     places = [identity.tracklets[0].middles[0] for identity in identities]
     before = [animal_film.done_frames for animal_film in films]
     first = min(before)
-    if on_progress is not None:
-        for _ in range(first):
-            on_progress()
+    for _ in range(first):
+        on_progress()
     for number, frame in enumerate(frames(first), start=first):
         ground = detector.ground_of(frame)
         blobs = blobs_of(frame, ground, detector, animals_found.usual_px)
@@ -250,8 +248,7 @@ def capture_animals(
             else:
                 shown, detection = _detected_animal(frame, ground, detector, blobs, index)
                 film.add(shown, detection)
-        if on_progress is not None:
-            on_progress()
+        on_progress()
     return [
         _captured_animal(*identity_and_film)
         for identity_and_film in zip(identities, films, strict=True)

@@ -5,6 +5,7 @@ A trial is the command itself on a folder of these frames.
 
 import shlex
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -72,6 +73,8 @@ def remedy(options: CaptureOptions) -> str | None:
 
     Its contact sheet goes into the folder of the output.
     """
+    if options.keypoints is not None:
+        return None
     footage = open_footage(options.recording, options.rate_hz)
     step = max(1, min(round(footage.rate_hz / _TRIALS_HZ), footage.count // _FRAMES))
     frames = list(map(in_8_bits, islice(footage.read(), 0, _FRAMES * step, step)))
@@ -95,8 +98,8 @@ def remedy(options: CaptureOptions) -> str | None:
     words = "--{} {}".format(*best).removesuffix(" True")
     return (
         f"of {len(frames)} frames, {usual[0]:.0%} show a whole animal, and {most[0]:.0%} with "
-        f"{words}; look at {sheet}; try: snakewalk animal capture "
-        f"{shlex.quote(str(options.recording))} -o {shlex.quote(str(options.output))} {words}"
+        f"{words}; look at {sheet}; try: "
+        f"{shlex.join(['snakewalk', *sys.argv[1:]])} {words}"
     )
 
 

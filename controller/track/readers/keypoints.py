@@ -88,8 +88,8 @@ class Keypoints:
             )
         return places
 
-    def track(self, choice: Choice) -> Track:
-        """Make a track of the midline; an unknown rate is assumed, and marked as such.
+    def midline(self, choice: Choice) -> tuple[Floats, Bools]:
+        """(T, N, 2) keypoints of the midline by ``bridge``, and the frames in which one was set.
 
         Raises:
             InputError: as ``sure``, an unknown keypoint, or an order that cannot be a body's.
@@ -102,8 +102,17 @@ class Keypoints:
                 f"{self.file}: its keypoints do not lie one after the other along a body: "
                 f"{', '.join(self.nodes)}; give --keypoints with those of the midline, head first"
             )
-        bridged, which = bridge(places)
-        number = np.arange(len(places)) if self.frame is None else self.frame
+        return bridge(places)
+
+    def track(self, choice: Choice) -> Track:
+        """Make a track of the midline; an unknown rate is assumed, and marked as such.
+
+        Raises:
+            InputError: as ``midline``, or of ``track_from_points``.
+
+        """
+        bridged, which = self.midline(choice)
+        number = np.arange(len(bridged)) if self.frame is None else self.frame
         is_complete = np.asarray(np.isfinite(bridged).all(axis=(1, 2)))
         bridged = bridged.copy()
         bridged[is_complete], exchanged = with_ends_in_place(

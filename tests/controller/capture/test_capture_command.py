@@ -262,7 +262,6 @@ def test_bad_files_end_with_exit_code_2_and_one_line(tmp_path: Path) -> None:
         ({"output": "no/folder/t.npz"}, "no/folder: no such folder"),
         ({"overlay": "o.gif"}, "an overlay film is one of"),
         ({"sheet": "s.doc"}, "a picture is one of"),
-        ({"length_m": 0.0}, "longer than 0 m"),
         ({"length_m": 0.2, "marker": "0.05"}, "leave one out"),
         ({"rate_hz": 0.0}, "frame rate must be above 0"),
         ({"head": "left"}, "expected X,Y"),

@@ -40,11 +40,15 @@ def folder_of(frames: Iterator[Image], folder: Path) -> CaptureOptions:
 
 
 @pytest.mark.slow
-def test_the_command_that_captures_more_is_printed_with_its_contact_sheet(tmp_path: Path) -> None:
+def test_the_command_that_captures_more_is_printed_with_its_contact_sheet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     options = folder_of(with_hand(film(SCENE)), tmp_path)
+    words = ["animal", "capture", str(options.recording), "--rate", "15", "--length-m", "0.4"]
+    monkeypatch.setattr("sys.argv", ["snakewalk", *words])
     with pytest.raises(RejectedFilmError) as rejected:
         capture_film(options)
-    said = re.search(r"try: snakewalk animal capture \S+ -o \S+ --roi (\S+)$", str(rejected.value))
+    said = re.search(rf"try: snakewalk {' '.join(words)} --roi (\S+)$", str(rejected.value))
     assert said, rejected.value
     assert cv2.imread(str(tmp_path / "t-tried.png")) is not None
     (animal,) = captures(capture_film(changed(options, roi=said[1])))

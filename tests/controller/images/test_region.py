@@ -103,5 +103,3 @@ def test_without_either_the_whole_picture_is_taken_and_nonsense_is_told(tmp_path
         cv2.imwrite(str(mask), image.astype(np.uint8))
         with pytest.raises(InputError, match=told):
             region_of(None, mask, shape)
-    with pytest.raises(InputError, match="--threshold -3: expected the grey levels"):
-        capture_recording(film_options(tmp_path, tmp_path / "t.npz", threshold=-3.0))
