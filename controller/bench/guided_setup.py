@@ -5,6 +5,7 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import typer
@@ -14,8 +15,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.console.result_files import write_result
 
 _GAIT = "lateral-undulation"
-_GENTLE = ("-p", "frequency_hz=0.2", "--set", "run.safety.current_limit_a=0.6")
-"""Options of the first motion: slow, and with little torque (ours)."""
+_SLOW = ("-p", "frequency_hz=0.2")
+"""Frequency of the first motion (ours)."""
+_SHORT = ("--seconds", "10", "--set", "run.safety.current_limit_a=0.6", "--force", "--no-film")
+"""Duration and torque limit of the first motion (ours)."""
 _DEAD_RECKONED = 3
 """Exit code of a successful run without a measured pose."""
 _INTERRUPTED = 130
@@ -58,8 +61,9 @@ class SetupStep:
 
 
 def _find(files: RobotFiles) -> list[str]:
-    axes = ("--axes", files.axes) if files.axes else ()
-    return files.on_port("bus", "inventory", *axes, "-o", str(files.first_robot), "--force")
+    return files.on_port(
+        "bus", "inventory", "--axes", files.axes or "y", "-o", str(files.first_robot), "--force"
+    )
 
 
 def _examine(files: RobotFiles) -> list[str]:
@@ -69,21 +73,17 @@ def _examine(files: RobotFiles) -> list[str]:
 def _calibrate(files: RobotFiles) -> list[str]:
     begun = files.robot.with_name(f"{files.robot.name}.part").exists()
     again = "--resume" if begun else "--force"
-    robot = ("--robot", str(files.first_robot), "-o", str(files.robot), again)
-    return files.on_port("bus", "calibrate", *robot)
+    return files.on_port(
+        "bus", "calibrate", "--robot", str(files.first_robot), "-o", str(files.robot), again
+    )
 
 
-def _limits(files: RobotFiles) -> list[str]:
-    return ["gait", "show", _GAIT, "--robot", str(files.robot)]
+def _gait(verb: str, files: RobotFiles) -> list[str]:
+    return ["gait", verb, _GAIT, "--robot", str(files.robot), *_SLOW]
 
 
 def _motion(files: RobotFiles, folder: str) -> list[str]:
-    robot = ("--robot", str(files.robot), "--seconds", "10", *_GENTLE)
-    return ["gait", "run", _GAIT, *robot, "-o", str(files.folder / folder), "--force", "--no-film"]
-
-
-def _rehearse(files: RobotFiles) -> list[str]:
-    return _motion(files, "rehearsal")
+    return [*_gait("run", files), *_SHORT, "-o", str(files.folder / folder)]
 
 
 def _pose(files: RobotFiles) -> list[str]:
@@ -104,8 +104,16 @@ STEPS = (
         _calibrate,
         "the order of the joints is that of the IDs, every direction is +1, every zero is 0",
     ),
-    SetupStep("limits", "Compute angles and speeds of the first motion. Nothing moves.", _limits),
-    SetupStep("rehearse", "The same motion with simulated servos and real packets.", _rehearse),
+    SetupStep(
+        "limits",
+        "Compute angles and speeds of the first motion. Nothing moves.",
+        partial(_gait, "show"),
+    ),
+    SetupStep(
+        "rehearse",
+        "The same motion with simulated servos and real packets.",
+        partial(_motion, folder="rehearsal"),
+    ),
     SetupStep("pose", "Check the external pose. Nothing moves.", _pose),
     SetupStep(
         "move",

@@ -126,6 +126,32 @@ def test_every_command_that_a_page_names_exists() -> None:
     assert [each for each in sorted(names) if not exists(each[1])] == []
 
 
+def options(command: Any) -> set[str]:
+    """Return the options of a command, or of all commands of a family."""
+    if isinstance(command, TyperGroup):
+        names = command.list_commands(CONTEXT)
+        return set().union(*(options(subcommand(command, name)) for name in names))
+    return {option for each in command.params for option in (*each.opts, *each.secondary_opts)}
+
+
+def test_every_option_that_a_how_to_names_exists() -> None:
+    of_others = {
+        "--help",
+        "--limiter",
+        "--dry-run",
+        "--teleop",
+    }  # the last: benchmarks, pip, LeRobot
+    pages = (ROOT / "docs" / "how-to").glob("*.md")
+    names = {
+        (page.name, option)
+        for page in pages
+        for option in re.findall(r"`(--[a-z][a-z-]*)", inline(page))
+    }
+    assert len(names) > 30
+    known = options(PROGRAM) | of_others
+    assert [each for each in sorted(names) if each[1] not in known] == []
+
+
 @pytest.mark.slow
 def test_every_command_that_a_help_or_a_message_names_exists() -> None:
     names = {

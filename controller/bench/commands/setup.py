@@ -10,7 +10,7 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.bench.guided_setup import GuidedSetup
 from snakewalk.controller.console.child_process import run_command
 from snakewalk.controller.console.command import command
-from snakewalk.controller.console.options import RunPort
+from snakewalk.controller.console.options import check_port_name
 
 
 @command("setup", examples=("setup", "setup mine --port /dev/ttyUSB0"))
@@ -18,7 +18,12 @@ def setup(
     folder: Annotated[
         Path, typer.Argument(help="folder of the robot's files; an earlier setup goes on there")
     ] = Path("snake"),
-    port: RunPort = None,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            callback=check_port_name, help="serial port, or a URL such as socket://pi:5000"
+        ),
+    ] = None,
 ) -> None:
     """Set up a new chain of servos, step by step, up to its first motion.
 

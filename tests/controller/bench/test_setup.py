@@ -67,8 +67,9 @@ def test_it_leads_from_the_bus_to_a_motion(
     for words in bench.ran:
         if words[0] in ("bus", "doctor") or words is bench.ran[-1]:
             assert words[words.index("--port") + 1] == "/dev/ttyUSB7"
-    rehearsal = bench.ran[4]
+    limits, rehearsal = bench.ran[3:5]
     assert "--port" not in rehearsal
+    assert {"-p", "frequency_hz=0.2"} <= set(limits) & set(rehearsal)  # of the same motion
     assert bench.sets_up() == []  # all of it is done
 
 
@@ -129,6 +130,11 @@ def test_wrong_axes_are_asked_again_and_a_missing_file_ends_it(
     with pytest.raises(InputError, match="the other steps need this file"):
         bench.sets_up("yaw", "y", "s")
     assert "'yaw': only the letters y and p" in capsys.readouterr().out
+
+
+def test_its_port_has_no_default() -> None:
+    _, help_text, _ = snakewalk("setup", "--help")
+    assert "default: the simulator" not in " ".join(help_text.split())
 
 
 def test_without_a_terminal_it_says_so(tmp_path: Path) -> None:
