@@ -101,7 +101,7 @@ def flow_table(walk: StereoWalk, known: list[Truth], off_m: float) -> None:
     pose = walk.morphs[0].pose
     turn = Rotation.from_rotvec([0.0, 0.1 * off_m, 0.0]).as_matrix()
     shift = pose.translation_m + off_m * np.array([0.6, 0.0, 0.8])
-    pose = RelativePose(turn @ pose.rotation, shift, pose.inliers, pose.error_px)
+    pose = RelativePose(turn @ pose.rotation, shift, pose.inliers)
     problem = flow_problem(first, second, pose, search_px=8 if off_m else 6)
     level = np.zeros_like(problem.base)
     flow_row("geometry and pose alone", problem, problem.expected_px, known[0], "")

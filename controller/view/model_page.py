@@ -29,11 +29,10 @@ def open_model(file: Path, host: str, port: int) -> tuple[viser.ViserServer, str
     scene.set_up_direction("+z")
     scene.configure_default_lights(cast_shadow=False)
     scene.configure_environment_map(None)
-    scene.add_glb(
-        "/model", read_bytes(file), wxyz=_UPRIGHT, cast_shadow=False, receive_shadow=False
-    )
-    camera = server.initial_camera
-    camera.look_at = tuple(0.5 * (least_m + most_m))
+    scene.add_glb("/model", read_bytes(file), wxyz=_UPRIGHT)
+    centre_m = 0.5 * (least_m + most_m)
     size_m = float(np.linalg.norm(most_m - least_m))
-    camera.position = tuple(0.5 * (least_m + most_m) + size_m * np.array([-0.6, -0.7, 0.4]))
+    camera = server.initial_camera
+    camera.look_at = tuple(centre_m)
+    camera.position = tuple(centre_m + size_m * np.array([-0.6, -0.7, 0.4]))
     return server, url

@@ -81,15 +81,15 @@ def walkthrough(
     check_fill(fill, faults)
     if out.suffix != ".mp4":
         faults.append(f"{out}: a film ends in .mp4; choose another name")
-    if mesh is not None and mesh.suffix.lower() != ".glb":
+    if mesh and mesh.suffix.lower() != ".glb":
         faults.append(f"{mesh}: a mesh ends in .glb; choose another name")
-    if picture is not None and world is None:
+    if picture and not world:
         faults.append("--picture: draws the world; add --world")
     size_px = _size(size, faults)
     if faults:
         raise InputError(faults)
-    refuse_to_overwrite([out, *([mesh] if mesh is not None else [])], force)
-    if world is not None:
+    refuse_to_overwrite([out, *([mesh] if mesh else [])], force)
+    if world:
         check_world_files(world, picture, [positions, out], force)
     config = load(positions, WalkthroughConfig)
     from snakewalk.controller.mapping.mosaic import (  # noqa: PLC0415  an extra
@@ -102,9 +102,9 @@ def walkthrough(
     with ProgressBar("models", transient=True) as bar:
         walk_steps = walk.read_walk(positions, config, bar.update)
     ground = None
-    if world is not None:
+    if world:
         ground = walk_ground.walk_ground(walk_steps, spacing, error, fill)
-    if mesh is not None:
+    if mesh:
         with atomic_write(mesh) as part:
             place_mesh.write_place(part, walk_steps, error)
     per_step = max(1, round(seconds * fps))
@@ -114,7 +114,7 @@ def walkthrough(
         )
     shown = {
         "film": str(out),
-        **({"mesh": str(mesh)} if mesh is not None else {}),
+        **({"mesh": str(mesh)} if mesh else {}),
         "frames": facts.frames,
         "frame_ms": round(1000.0 * facts.frame_s, 1),
         "hole_share": round(facts.hole_share, 4),
@@ -123,7 +123,7 @@ def walkthrough(
         "facts": texts(walk_steps.calibration.facts),
         "notes": list(walk_steps.calibration.notes),
     }
-    if world is None or ground is None:
+    if not world or not ground:
         show(shown, as_json)
         return
     written = MapWorld.of(world, ground)

@@ -41,8 +41,6 @@ class RelativePose:
     """(3,) translation from the first position to the second, m."""
     inliers: Bools
     """(n,) matches that agree with the pose."""
-    error_px: float
-    """Root mean square of the inliers' reprojection errors."""
 
     def moved(self, points_m: Floats) -> Floats:
         """Points (..., 3) of the first position in the axes of the second."""
@@ -92,8 +90,7 @@ def relative_pose(first: LocalModel, second: LocalModel, matches: ScaleMatches) 
         projected_px = project(second.camera, points_m @ rotation.T + translation_m)
         off_px = np.linalg.norm(projected_px - matches.second_px, axis=1)
         kept = off_px <= _TOLERANCE_PX * np.sqrt(matches.scale)
-    error_px = float(np.sqrt((off_px[kept] ** 2).mean())) if kept.any() else float("nan")
-    return RelativePose(np.asarray(rotation, float), translation_m, kept, error_px)
+    return RelativePose(np.asarray(rotation, float), translation_m, kept)
 
 
 def estimated_motion(

@@ -1,6 +1,7 @@
 """Local models of all positions, joined along the route ([KP] 3.1)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -88,7 +89,7 @@ def read_walk(
     total = 3 * count - 2
     models = []
     for k, position in enumerate(config.positions):
-        with _FaultPlace(f"{file}: position {k + 1}"):
+        with _fault_place(f"{file}: position {k + 1}"):
             models.append(_model(file.parent, position, calibration, config.disparities))
         on_step(k + 1, total)
     if count == 1:
@@ -96,7 +97,7 @@ def read_walk(
     motions = []
     groups = []
     for k in range(count - 1):
-        with _FaultPlace(f"{file}: positions {k + 1} and {k + 2}"):
+        with _fault_place(f"{file}: positions {k + 1} and {k + 2}"):
             motion, matches = estimated_motion(
                 models[k], models[k + 1], config.positions[k].distance_m
             )
@@ -105,18 +106,15 @@ def read_walk(
         on_step(count + k + 1, total)
     morphs = []
     steps = []
-    poses = [np.eye(3, 4)]
     joint = _jointly(models, groups, motions)
+    from_first = [composed(joint.motions, 0, k) for k in range(count)]
+    poses = np.linalg.inv([[*motion, (0, 0, 0, 1)] for motion in from_first])[:, :3]
     for k in range(count - 1):
         morph, step = _step(joint, k, groups[k], models[k : k + 2], config.positions[k : k + 2])
         morphs.append(morph)
         steps.append(step)
-        turn = morph.pose.rotation.T
-        shift = morph.pose.back(np.zeros(3))
-        last = poses[-1]
-        poses.append(np.column_stack([last[:, :3] @ turn, last[:, :3] @ shift + last[:, 3]]))
         on_step(2 * count + k, total)
-    return StereoWalk(tuple(models), tuple(morphs), np.array(poses), tuple(steps), calibration)
+    return StereoWalk(tuple(models), tuple(morphs), poses, tuple(steps), calibration)
 
 
 def _jointly(
@@ -133,18 +131,13 @@ def _jointly(
     return adjusted(groups, np.array(motions))
 
 
-class _FaultPlace:
+@contextmanager
+def _fault_place(where: str) -> Iterator[None]:
     """Put a place in front of the faults of a block."""
-
-    def __init__(self, where: str) -> None:
-        self._where = where
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, InputError):
-            raise InputError(f"{self._where}: {error}") from None
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def rectified(folder: Path, left: str, right: str, calibration: StereoCalibration) -> RectifiedPair:
@@ -177,11 +170,11 @@ def _step(
     moved_m = moved(sightings.points_m[agrees], motion)
     off_px = (sightings.predicted_px(moved_m) - sightings.seen_px[agrees])[:, :2]
     error_px = float(np.sqrt((off_px**2).sum(axis=1).mean()))
-    pose = RelativePose(motion[:, :3], motion[:, 3], agrees, error_px)
+    pose = RelativePose(motion[:, :3], motion[:, 3], agrees)
     first, second = models
     morph = morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
     errors: tuple[float | None, float | None] = (None, None)
-    if positions[0].pose is not None and positions[1].pose is not None:
+    if positions[0].pose and positions[1].pose:
         errors = pose_error(pose, *(np.array(position.pose) for position in positions))
     step = Step(
         len(agrees),

@@ -16,7 +16,7 @@ VIEW = K @ np.eye(3, 4)
 def approach(ahead_m: float = 0.5) -> MorphableModel:
     first = wall()
     second = nearer(first, ahead_m)
-    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -ahead_m]), np.ones(1, bool), 0.0)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -ahead_m]), np.ones(1, bool))
     return morphable(first, second, pose, solve_flow(flow_problem(first, second, pose)))
 
 
@@ -47,7 +47,7 @@ def test_flow_at_one_scale_is_worse() -> None:
     """Fig. 4 (c)."""
     first = wall()
     second = nearer(first, 1.0)
-    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -1.0]), np.ones(1, bool), 0.0)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -1.0]), np.ones(1, bool))
     exact = {}
     for name, scales in (("all", (1.0, 1.25, 1.67, 2.0, 2.5)), ("one", (1.0,))):
         flow = solve_flow(flow_problem(first, second, pose, scales))
@@ -63,7 +63,7 @@ def test_flow_at_one_scale_is_worse() -> None:
 def test_the_printed_potts_term_is_less_exact() -> None:
     first = wall()
     second = nearer(first, 0.5)
-    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -0.5]), np.ones(1, bool), 0.0)
+    pose = RelativePose(np.eye(3), np.array([0.0, 0.0, -0.5]), np.ones(1, bool))
     problem = flow_problem(first, second, pose)
     exact = []
     for printed in (False, True):

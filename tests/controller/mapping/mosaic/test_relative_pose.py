@@ -99,7 +99,7 @@ def test_the_pose_survives_matches_that_are_wrong() -> None:
     place_m, angle_rad = pose_error(pose, first, second)
     assert place_m < 1e-6
     assert angle_rad < 1e-6
-    off = RelativePose(turn, shift + turn @ [0.0, 0.003, 0.004], pose.inliers, 0.0)
+    off = RelativePose(turn, shift + turn @ [0.0, 0.003, 0.004], pose.inliers)
     assert pose_error(off, first, second)[0] == pytest.approx(0.005)
     assert pose.back(pose.moved(model.points_m)) == pytest.approx(model.points_m)
     wrong = rng.uniform(0, 170, (60, 2))

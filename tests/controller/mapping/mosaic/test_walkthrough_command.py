@@ -74,6 +74,7 @@ def test_two_positions_become_a_film_and_a_world(route: Path, tmp_path: Path) ->
     assert len(place.geometry) == 2
     assert all(part.visual.material.baseColorTexture.size == (240, 180)
                for part in place.geometry.values())  # fmt: skip
+    assert b"KHR_materials_unlit" in mesh.read_bytes()
     column = np.rint((-back - ground.x0_m) / ground.spacing_m).astype(int)
     row = np.rint((-right - ground.y0_m) / ground.spacing_m).astype(int)
     off = up - ground.z_m[row, column]  # the lowest sample of a map is 0
