@@ -37,6 +37,9 @@ class PageView:
         self.dead_man = DeadMan(lambda: self.now_s)
         self.page = _LivePage(self.server, ObserverEnd(far), self.gamepad, stop, freshness)
 
+    def on_course(self) -> None:
+        LiveView.on_course(self)  # type: ignore[arg-type]
+
     def on_row(self, topic: str, row: bytes) -> None:
         LiveView.on_row(self, topic, row)  # type: ignore[arg-type]
 

@@ -72,6 +72,7 @@ class SteppedPage:
         hands = Hands([self.view], self.view)  # type: ignore[list-item, arg-type]
         if self._walks:
             prepared = prepare_walk("flat-slalom", motion="serpenoid", waypoints_m=((0.1, 0.0),))
+            self.view.on_course()
             options: dict[str, Any] = {"waypoint_commands": self.view.pressed}
         else:
             gait = prepare_gait("lateral-undulation", **self._gait)

@@ -51,6 +51,7 @@ from tests.helpers.browser import IN_A_BROWSER, PATIENCE_S, chromium, new_tab
 from tests.helpers.bus import PATIENT
 from tests.helpers.page_view import PageView
 from tests.helpers.proxy import Proxied
+from tests.helpers.stepped_page import SteppedPage
 
 ROOT = Path(__file__).parents[3]
 COMMAND = "from snakewalk.controller.cli.main import main; main()"
@@ -622,6 +623,44 @@ def test_a_gamepad_at_the_browser_steers_a_gait_and_its_button_stops_it(tmp_path
     record = read_log(tmp_path / "run" / "log.mcap")
     said = [event.text for event in record.events if event.kind == "operator"]
     assert said[:2] == ["button released: the body holds its shape", "held: it moves"]
+
+
+@pytest.mark.slow
+@IN_A_BROWSER
+def test_a_run_plans_a_path_to_a_waypoint_that_is_clicked_in_a_browser(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In simulated time, which waits for the browser."""
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    run = SteppedPage(tmp_path / "run", walks=True)
+    try:
+        with chromium() as browser:
+            page = new_tab(browser, viewport={"width": 700, "height": 500})
+            page.set_default_timeout(60_000.0)
+            page.goto(run.url)
+            run.start()
+            page.get_by_role("tab", name="walk").click()
+            page.get_by_role("button", name="add a waypoint").click()
+            armed = page.get_by_text("now click on the ground")
+            armed.wait_for()
+            for _ in range(40):  # a page that draws its first picture receives no click
+                page.mouse.click(300, 300)
+                page.wait_for_timeout(500.0)
+                if not armed.is_visible():
+                    break
+            run.go(1.0)
+            page.get_by_text("waypoint 2 at").wait_for()
+        run.go(4.0)
+    finally:
+        run.close()
+    record = read_log(tmp_path / "run" / "log.mcap")
+    said = [event.text for event in record.events]
+    point = next(text for text in said if text.startswith("waypoint 2 at ("))
+    assert record.header.plan.waypoints_m[1] == pytest.approx(
+        tuple(float(number) for number in re.findall(r"-?[0-9.]+", point)[1:]), abs=0.01
+    )
+    assert any("another path to waypoint" in text for text in said), said
 
 
 @pytest.mark.nightly("a browser and a run in real time, which a busy computer delays")
