@@ -142,7 +142,7 @@ def climbing_table(rows: Mapping[str, Facts]) -> str:
         up_m = facts["up_body_lengths_cycle"] * load_robot(facts["robot"]).length_m
         cells = [
             *(f"`{name}`", f"{up_m:.3f}", f"{around_m * math.cos(rise_rad):.3f}", *turns),
-            *(f"{facts['slowed_to']:.0%}", f"{facts['peak_current_a']:.2f} A"),
+            *(f"{facts['lowest_rate']:.0%}", f"{facts['peak_current_a']:.2f} A"),
         ]
         lines.append(cells)
     return markdown(head, lines)

@@ -62,7 +62,10 @@ class ProgressBar:
 
     def __exit__(self, *raised: Any) -> None:
         """Leave the last state, or nothing of a transient bar."""
-        self._progress.__exit__(*raised)
+        if self._progress.live.transient:
+            self._progress.live.stop()  # the other way leaves an empty line in a file
+        else:
+            self._progress.stop()
 
     def update(
         self,
@@ -84,7 +87,6 @@ class ProgressBar:
     def hide(self) -> None:
         """Remove the bar, because its task failed."""
         self._progress.live.transient = True
-        self._progress.console.quiet = not self._progress.console.is_interactive
         self._progress.update(self._task, visible=False)
 
     def on_event(self, kind: str, text: str) -> None:

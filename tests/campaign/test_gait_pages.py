@@ -8,7 +8,7 @@ FACTS = {
     "robot": "alternating16",
     "world": "isotropic",
     "frequency_hz": 0.5,
-    "slowed_to": 0.63,
+    "lowest_rate": 0.63,
     "forward_body_lengths_cycle": -0.001,
     "left_body_lengths_cycle": 0.158,
     "up_body_lengths_cycle": 0.2,

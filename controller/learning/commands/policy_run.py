@@ -48,7 +48,7 @@ def run_policy(
     facts: dict[str, object] = {
         "policy": name,
         **run_facts(result),
-        "slowed_to": round(result.outcome.least_rate, 3),
+        "lowest_rate": round(result.outcome.least_rate, 3),
         **summarized(result.summary, "travelled_m"),
         "electrical_energy_j": result.summary.electrical_energy_j,
         "peak_current_a": result.summary.peak_current_a,

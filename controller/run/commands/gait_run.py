@@ -116,7 +116,7 @@ def _facts(prepared: GaitRun, result: RunResult) -> dict[str, object]:
     facts: dict[str, object] = {
         "gait": prepared.config.name,
         **run_facts(result),
-        "slowed_to": round(result.outcome.least_rate, 3),
+        "lowest_rate": round(result.outcome.least_rate, 3),
     }
     if prepared.config.then:
         facts["then"] = [f"{change.name}@{change.at_s:g}" for change in prepared.config.then]
@@ -128,7 +128,7 @@ def _facts(prepared: GaitRun, result: RunResult) -> dict[str, object]:
         displacement = result.travel.gait or gait_displacement(result.record)
         facts |= {
             "frequency_hz": round(displacement.frequency_hz, 3),
-            "cycles": displacement.cycles,
+            "cycles_between_ramps": displacement.cycles,
         }
         moved = {
             "forward_body_lengths_cycle": rounded(displacement.forward_bl, 4),
