@@ -95,11 +95,12 @@ def travelled_m(pose: PoseTable, first: int = 0, last: int = -1) -> float:
 
 
 def ground_speed_m_s(pose: PoseTable) -> Floats:
-    """Speed (P,) of the centre of mass over the ground, mean of the last 2 s; NaN before."""
+    """Speed (P,) of the centre of mass over the ground, mean of the last 2 s; NaN else."""
     time_s = pose.time_s
     row = np.searchsorted(time_s, time_s - _SMOOTH_S)
-    span_s = np.where(row, time_s - time_s[row], np.nan)
-    return np.asarray(np.hypot(*(pose.centre_m - pose.centre_m[row])[:, :2].T) / span_s)
+    span_s = row.clip(0, 1) * (time_s - time_s[row])
+    span_s[span_s == 0.0] = np.nan
+    return np.asarray(np.hypot(*(pose.centre_m - pose.centre_m[row]).T[:2]) / span_s)
 
 
 def smooth_track_m(pose: PoseTable) -> Floats:

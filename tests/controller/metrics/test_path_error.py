@@ -71,6 +71,13 @@ def test_a_body_that_goes_sideways_has_the_speed_of_its_centre() -> None:
     assert ground_speed_m_s(pose_along(points[:0], times[:0])).shape == (0,)
 
 
+def test_the_first_pose_after_a_long_gap_has_no_speed() -> None:
+    times = np.r_[np.linspace(0.0, 3.0, 31), 6.0, 6.1]
+    speed_m_s = ground_speed_m_s(pose_along(np.column_stack([0.1 * times, 0.0 * times]), times))
+    assert np.flatnonzero(np.isnan(speed_m_s[30:])).tolist() == [1]
+    assert speed_m_s[32] == pytest.approx(0.1)
+
+
 def test_lengths() -> None:
     phi = np.linspace(0.0, np.pi, 5000)
     half = np.column_stack([np.cos(phi), np.sin(phi), 3.0 * phi])
