@@ -7,9 +7,7 @@ A package lists its plug-ins in a manifest: a module without imports whose ``PLU
 ``docs/how-to/add-a-plug-in.md`` shows one of each kind.
 """
 
-import gc
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -19,28 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from snakewalk.config.errors import InputError
-
-
-@contextmanager
-def without_collections() -> Iterator[None]:
-    """Pause Python's garbage collection while modules are imported.
-
-    Imports make some 300,000 objects that live until the end. Python searches them for garbage
-    again and again, which needs a seventh of the time of a start. Afterwards they belong to the
-    oldest generation, so that the next collection of new objects does not search them.
-    """
-    if not gc.isenabled():  # by the caller
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        if gc.get_freeze_count() == 0:
-            gc.freeze()
-            gc.unfreeze()
-        gc.enable()
-
+from snakewalk.controller.console.import_speed import without_collections
 
 ENTRY_POINTS = "snakewalk.plugins"
 """Group of the entry points of other distributions."""
