@@ -61,14 +61,14 @@ class CrowdPage:
         self.frame = scene.add_frame("/crowd", show_axes=False)
         scene.add_mesh_trimesh("/crowd/ground", ground_mesh(ground))
         draw_water(scene, "/crowd/water", water_surface_m(world, ground))
-        grid = TubeGrid(*MESHES[MIDDLE - 1])
+        self._grid = grid = TubeGrid(*MESHES[MIDDLE - 1])
         numbers = np.arange(len(wandering.species))
         groups = [numbers[:1]]
         groups += [numbers[1:][wandering.species[1:] == k] for k in np.unique(wandering.species)]
         shades = [colours.rgba(colours.HEAD)[:3], *(back[:3] for back, _ in COLOURS)]
-        self.drawn: list[tuple[Ints, TubeGrid, viser.MeshHandle]] = []
-        """Bodies, grid and mesh of each group."""
-        tubes = self._tubes(grid)
+        self.drawn: list[tuple[Ints, viser.MeshHandle]] = []
+        """Bodies and mesh of each group."""
+        tubes = self._tubes()
         for k, group in enumerate(groups):
             if not len(group):
                 continue
@@ -80,7 +80,7 @@ class CrowdPage:
                 color=shades[k % len(shades)],
                 cast_shadow=False,
             )
-            self.drawn.append((group, grid, mesh))
+            self.drawn.append((group, mesh))
         gui = self.server.gui
         self.follow = gui.add_checkbox("follow your animal", False)
         gui.add_markdown(_HINT)
@@ -98,19 +98,20 @@ class CrowdPage:
             self._inputs.get()()
         self.wandering.step(frames)
         place_m = self.wandering.crowd.origin_m[0]
+        tubes = self._tubes().astype(np.float32)
         with self.server.atomic():
             self.frame.position = (
                 (-place_m[0], -place_m[1], 0.0) if self.follow.value else (0.0, 0.0, 0.0)
             )
-            for group, grid, mesh in self.drawn:
-                mesh.vertices = self._tubes(grid)[group].reshape(-1, 3).astype(np.float32)
+            for group, mesh in self.drawn:
+                mesh.vertices = tubes[group].reshape(-1, 3)
 
-    def _tubes(self, grid: TubeGrid) -> Floats:
+    def _tubes(self) -> Floats:
         """(N, corners, 3) of all bodies."""
         crowd = self.wandering.crowd
         chains = self._chains.chains(crowd, np.full(len(crowd.scale), MIDDLE))
         points_m = np.array([chain.points_m for chain in chains])
-        return grid.tubes(points_m, np.array([chain.radius_m for chain in chains]))[0]
+        return self._grid.tubes(points_m, np.array([chain.radius_m for chain in chains]))[0]
 
     def steering(self, change: tuple[int, int, int]) -> Callable[[object], None]:
         """Return the callback of a key."""
