@@ -14,7 +14,7 @@ from typing import IO
 
 from snakewalk.config.loader import load_robot, load_world
 from snakewalk.controller.console.child_process import start_module
-from snakewalk.controller.console.import_speed import without_collections
+from snakewalk.controller.console.imports import without_collections
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.drivers.compilation import observe_compilation

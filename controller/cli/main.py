@@ -17,8 +17,7 @@ from typing import IO, Any
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
 from snakewalk.config.plain_text import plain
-from snakewalk.controller.console.import_speed import without_collections
-from snakewalk.controller.console.safe_path import make_path_safe
+from snakewalk.controller.console.imports import make_path_safe, without_collections
 from snakewalk.drivers.clock import WallClock
 from snakewalk.drivers.compilation import observe_compilation
 from snakewalk.drivers.errors import DriverError, PortError, notes_of

@@ -20,7 +20,7 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import Any
 
-from snakewalk.controller.console.safe_path import module_folders
+from snakewalk.controller.console.imports import module_folders
 
 _CONTEXT = get_context("spawn")
 """A forked child would inherit the threads of MuJoCo and numba in an unknown state."""

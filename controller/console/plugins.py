@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.console.import_speed import without_collections
+from snakewalk.controller.console.imports import without_collections
 
 ENTRY_POINTS = "snakewalk.plugins"
 """Group of the entry points of other distributions."""

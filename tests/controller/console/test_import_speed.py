@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from snakewalk.controller.console.import_speed import without_collections
+from snakewalk.controller.console.imports import without_collections
 from tests.helpers.frozen import frozen_objects
 
 

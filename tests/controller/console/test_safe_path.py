@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from snakewalk.controller.console.child_process import child_environ, run_code
-from snakewalk.controller.console.safe_path import make_path_safe
+from snakewalk.controller.console.imports import make_path_safe
 
 ROOT = Path(__file__).parents[3]
 PROGRAM = (

@@ -110,7 +110,8 @@ def test_a_run_keeps_the_order_of_its_steps(tmp_path: Path) -> None:
 def test_few_functions_and_files_lead_from_a_command_to_its_loop(tmp_path: Path) -> None:
     file = tmp_path / "rows.json"
     words = [sys.executable, "-m", "benchmarks", "run_path", "--json", str(file)]
-    subprocess.run(words, check=True, capture_output=True)
+    ended = subprocess.run(words, check=False, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
     rows = json.loads(file.read_text())["rows"]["run_path"]
     judged = {row["what"]: row["met"] for row in rows if row["target"] is not None}
     assert judged == {"functions": True, "files of cli/ console/ run/": True}
