@@ -8,7 +8,7 @@ PLUGINS = (
     ("command", "gait run", "Run a gait on servos or in the simulator; leaves a log, a report and a film.", "snakewalk.controller.run.commands.gait_run:run_gait"),
     ("command", "gait show", "Show a gait's parameters with ranges and units, its source, and the joint speeds it needs.", "snakewalk.controller.run.commands.gait_show:show_gait"),
     ("command", "init", "Write run, robot and world files to edit, with schemas for editors.", "snakewalk.controller.run.commands.init:init"),
-    ("command", "list", "List runs, robots, worlds, recordings, policies and plug-ins.", "snakewalk.controller.run.commands.list:list_"),
+    ("command", "list", "List runs, robots, worlds, recordings, policies, gaits and plug-ins.", "snakewalk.controller.run.commands.list:list_"),
     ("command", "plan", "Check states, path and joint limits of a run; nothing moves.", "snakewalk.controller.run.commands.plan:plan"),
     ("command", "play", "Play a recording or joint angles on servos or in the simulator.", "snakewalk.controller.run.commands.play:play"),
     ("command", "pose calibrate", "Swing the head for 10 s, and find the source's axes, scale, mount and delay.", "snakewalk.controller.run.commands.pose_calibrate:calibrate_source"),

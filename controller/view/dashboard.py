@@ -125,17 +125,18 @@ class Dashboard:
             ahead_rad, steepest_rad = ground_slope(self._ground, where.links_m[pose][None])
             if np.isfinite(ahead_rad[0]) and not self.checks_pose:
                 ahead, steepest = np.degrees([ahead_rad[0], steepest_rad[0]])
-                facts.append(f"slope {steepest:.0f}°, {ahead:+.0f}° ahead")
+                facts.append(f"slope {steepest:.0f}°, {ahead:+z.0f}° ahead")
         if np.isfinite(share := carrier_share(record)):
             facts.append(f"{share:.0%} of the walk on wide waves")
         evidence = record.header.pose_evidence
-        believes = "" if evidence.is_measured or not facts else "believed: "
+        believes = "" if evidence.is_measured else "believed: "
+        progress = f", {believes}{', '.join(facts)}" if facts else ""
         colour = _INK if evidence.is_measured else _BAD_COLOUR
         evidence_html = f"<span style='color:{colour}'>pose: {escape(evidence.text)}</span>"
         self._state.content = (
             f"<div style='padding:0 .8em .4em'><b>{escape(self._run.name)}</b> on "
-            f"{escape(self._robot.name)}<br>{time_s:.1f} s, "
-            f"{believes}{', '.join(facts)}<br>{evidence_html}"
+            f"{escape(self._robot.name)}<br>{time_s:.1f} s"
+            f"{progress}<br>{evidence_html}"
             f"{self._contours}<br>{escape(text)}</div>"
         )
 
@@ -195,7 +196,7 @@ class Dashboard:
         last_s = float(record.cycle.time_s[cycle])
         record = record.between(last_s - SPAN_S, last_s)
         rows = record.cycle
-        pick = _spread(0, len(rows.time_s) - 1)
+        pick = _spread(len(rows.time_s))
         time_s = rows.time_s[pick]
         joint = self._names.index(self.joint.value)
         self._angle.data = (time_s, rows.sent_rad[pick, joint], rows.measured_rad[pick, joint])
@@ -279,9 +280,9 @@ def _current_difference_a(record: RunRecord, rows: np.ndarray) -> Floats:
     )
 
 
-def _spread(first: int, last: int) -> np.ndarray:
-    count = min(last - first + 1, _POINTS)
-    return np.unique(np.linspace(first, last, max(count, 2)).astype(int))
+def _spread(rows: int) -> np.ndarray:
+    points = max(min(rows, _POINTS), 2)
+    return np.unique(np.linspace(0, rows - 1, points).astype(int))
 
 
 def _of_joints(names: Sequence[str]) -> dict[str, str]:
@@ -297,8 +298,13 @@ def _of_joints(names: Sequence[str]) -> dict[str, str]:
 
 def _curve_colours(panel: Panel) -> dict[str, str]:
     """Names of all curves of a panel with their colours, which the report shares."""
-    columns = [column for table in TABLES for column in table.topic.columns.values()]
-    curves = [curve for column in columns for curve in column.curves if curve.panel == panel]
+    curves = [
+        curve
+        for table in TABLES
+        for column in table.topic.columns.values()
+        for curve in column.curves
+        if curve.panel == panel
+    ]
     curves += [_SPEED] if panel is Panel.SPEED else []
     return {curve.name: colours.COLOURS[curve.colour] for curve in curves}
 

@@ -3,7 +3,7 @@
   const look_of_page = document.createElement("style");
   look_of_page.textContent = `
     html.snakewalk-old body > :not(#snakewalk-stop) { filter: grayscale(1) opacity(.6) }
-    .mantine-Notifications-root { margin-top: 170px }  /* viser's notices: below the E-STOP */
+    body:has(#snakewalk-stop) .mantine-Notifications-root { margin-top: 170px }  /* viser's notices: below the E-STOP */
     @media (prefers-color-scheme: dark) {  /* viser draws its panels in one scheme for all browsers */
       html { background: #000 }
       body > :not(#snakewalk-stop) { filter: invert(1) hue-rotate(180deg) }
@@ -11,6 +11,7 @@
       body canvas, body img { filter: invert(1) hue-rotate(180deg) }
     }
     @media (max-width: 600px) {  /* viser's panel of a phone: at its full width, below the body */
+      body .mantine-Notifications-root { margin: 0 !important; top: auto !important; bottom: 46% }  /* below a verdict of many lines */
       .mantine-Paper-root[style*="position: fixed"] { width: 100% !important; max-height: 45% !important }
       .mantine-Paper-root[style*="position: fixed"] .mantine-ScrollArea-content > * { width: 100% !important }
     }`;

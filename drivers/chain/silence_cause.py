@@ -44,7 +44,7 @@ def silence_cause(bus: ChainBus, robot: RobotConfig, silent: Sequence[int]) -> s
     least_s = min((min(p.late_s) for p in asked if p.answered), default=None)
     if least_s is not None:
         if least_s <= part.latency_s:
-            return "it replies again: a loose contact"
+            return "it replies again: a loose contact" if others else _pause_cause(part.port)
         where = "network" if is_url(part.port.name) else "adapter"
         return f"each reply is at least {1e3 * least_s:.0f} ms late: high latency of the {where}"
     if part.find([worst.servo_id]):
@@ -54,6 +54,13 @@ def silence_cause(bus: ChainBus, robot: RobotConfig, silent: Sequence[int]) -> s
     if len(silent) > 1 and [*silent] == [*range(silent[0], robot.joint_count)]:
         return f"all behind {robot.joint_label(silent[0] - 1)} are silent: the cable there"
     return "it sends no byte: its connection is lost"
+
+
+def _pause_cause(port: BytePort) -> str:
+    """Cause of a pause of the whole line; a served bus has no contacts."""
+    if any(holder.has_other_end for holder in holders_of(port.name)):
+        return "servos reply again: the program that simulates them paused; close other programs"
+    return "servos reply again: supply or first cable failed briefly, or this computer was busy"
 
 
 def _dead_line_cause(port: BytePort) -> str:

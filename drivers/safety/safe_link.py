@@ -238,11 +238,11 @@ class SafeLink:
             self._note_doubt(doubt)
         if doubt is not None or (self._recovery is not None and self.tripped is None):
             stale = stale_fault(state, self._limits, self._clock.now_s())
-            if stale is not None and doubt is None:
-                return self._recover(stale, None)
-            if stale is not None and doubt is not None:  # servos may be exchanged: not recoverable
+            if stale is not None:
                 self._state = state
-                self._trip(self._explain(self._steps.joint) or doubt)
+                if doubt is None:
+                    return self._recover(stale, None)
+                self._trip(self._explain(self._steps.joint) or doubt)  # may be exchanged servos
                 return state
         self._state = state
         joint = self._overloaded_joint(state, self._memory)

@@ -12,7 +12,7 @@ from snakewalk.controller.console.plugins import OWN, plugins
 
 @command("list", examples=("list --json",))
 def list_(as_json: Json = False) -> None:
-    """List runs, robots, worlds, recordings, policies and plug-ins."""
+    """List runs, robots, worlds, recordings, policies, gaits and plug-ins."""
     rows = {
         "runs": [[n, f"{(r := load_run(n)).robot} on {r.world}"] for n in shipped("runs")],
         "robots": [

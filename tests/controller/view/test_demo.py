@@ -3,6 +3,7 @@
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -75,3 +76,27 @@ def test_enter_runs_the_same_live(tmp_path: Path) -> None:
         assert any("token=" in line for line in lines)
         child.kill()
     os.close(ours)
+
+
+@pytest.mark.slow
+def test_an_interrupt_of_it_alone_ends_its_compiling_children(tmp_path: Path) -> None:
+    """They went on, and printed a traceback (BrokenPipeError) each. The text ends with them."""
+    ours, theirs = pty.openpty()
+    variables = {"NUMBA_CACHE_DIR": str(tmp_path), "TERM": "xterm", "COLUMNS": "200"}
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "demo", "--view-at", "127.0.0.1:0"],
+        cwd=tmp_path,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | variables,
+    ) as child:
+        os.close(theirs)
+        lines = lines_of(ours)
+        assert any(re.search(r"compiling loops .*[1-9]%", line) for line in lines)
+        child.send_signal(signal.SIGINT)
+        said = "\n".join(lines)
+        assert child.wait() == 130
+    os.close(ours)
+    assert "interrupted" in said
+    assert "Traceback" not in said

@@ -157,6 +157,15 @@ def test_legs_move_with_their_joints(record: RunRecord) -> None:
     page.server.stop()
 
 
+def test_a_time_without_a_fact_has_no_comma(record: RunRecord) -> None:
+    """A gait on the floor showed "47.8 s," until its speed was known."""
+    none = replace(record, waypoints=((0.0, np.zeros((0, 2))),))
+    page = LogPage({"log": none}, "127.0.0.1", 0)
+    page.step(0.05, 0.0)
+    page.server.stop()
+    assert re.search(r" s +pose:", state(page))
+
+
 def test_texts_of_a_log_steer_no_page(record: RunRecord) -> None:
     run = record.header.run.model_copy(update={"name": "<img src=x onerror=alert(1)>"})
     named = replace(record, header=replace(record.header, run=run))
