@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import Bytes, Floats, Ints, Singles
+from snakewalk.config.arrays import Bytes, Floats, Ints
 from snakewalk.controller.capture.small_body.crop import bends_of
 from snakewalk.controller.capture.small_body.ribbon import bend_basis
-from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton
+from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, resized
 from snakewalk.controller.images.silhouette import Silhouette
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.compiling import compiled
@@ -64,24 +64,10 @@ class Outline:
         scale = 1.0 if width_px == 0.0 else min(1.0, 2.0 * WIDTH_PX / width_px)
         level = silhouette.level
         if scale < 1.0:
-            level = np.asarray(_resized_picture(level, scale), dtype=np.float32)
+            level = resized(level, scale)
         grey = np.clip(np.rint(level * (_THRESHOLD_GREY / silhouette.threshold)), 0.0, 255.0)
         packed = cv2.imencode(".png", grey.astype(np.uint8))[1]
         return cls(np.asarray(packed, dtype=np.uint8), silhouette.origin_px, scale)
-
-
-def _resized_picture(level: Singles, scale: float) -> Singles:
-    """The resized picture; pixel centres at ``(x + 0.5) scale - 0.5``."""
-    if scale < 1.0:
-        level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
-    rows, columns = (max(1, int(np.ceil(side * scale))) for side in level.shape)
-    off = 0.5 * scale - 0.5
-    matrix = np.array([[scale, 0.0, off], [0.0, scale, off]])
-    how = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_LINEAR
-    fine = cv2.warpAffine(
-        level, matrix, (columns, rows), flags=how, borderMode=cv2.BORDER_REPLICATE
-    )
-    return np.asarray(fine, dtype=np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +87,7 @@ class Shape:
     def of(cls, outline: Outline, scale: float) -> "Shape":
         """Unpack a silhouette at ``scale`` working pixels a pixel."""
         level = np.asarray(cv2.imdecode(outline.packed, cv2.IMREAD_GRAYSCALE), dtype=np.float32)
-        fine = np.pad(_resized_picture(level, scale / outline.scale), _MARGIN_PX)
+        fine = np.pad(resized(level, scale / outline.scale), _MARGIN_PX)
         solid = (fine > _THRESHOLD_GREY).astype(np.uint8)
         count, label, stats, _ = cv2.connectedComponentsWithStats(1 - solid, connectivity=8)
         for k in range(1, count):

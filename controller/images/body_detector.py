@@ -23,13 +23,9 @@ from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhoue
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _HIDING = 0.5  # of the threshold: noise of single pixels hides a faint tail
-_TAILED_LENGTH = (
-    1.15  # times the length without a faint tail that is followed; less may be dirt at a tip
-)
-_LONGER_THAN_TAILED = 1.12  # the same, for parts that a followed tail does not contain
+_LONGER = 1.15  # times the length without a faint part: it belongs to the body; less may be dirt
 _NEAR_TIP = slice(2, 6)  # stations
 _THIN_END = 0.45  # of the median radius, near a tip: half of the contrast may end it too early
-_LONGER_THAN_CORE = 1.15  # times the length without the faint parts: they belong to the body
 _LENGTH_TOLERANCE = 0.15  # of the length: frames agree on it
 _BETTER_SHARE = 0.04  # of the frames: this many more must agree for another ground than the median
 _FEWEST = 5  # frames to estimate a ground
@@ -125,9 +121,7 @@ class BodyDetector:
             if fuller is not None:
                 fuller = self._confirmed(image, background, fuller)
                 other = self._checked_detection(image, background, fuller, _skeleton_of(fuller))
-                length = np.nan_to_num(best.skeleton.length_px)
-                least = _LONGER_THAN_CORE if tailed is None else _LONGER_THAN_TAILED
-                if other.skeleton.length_px > least * length:
+                if other.skeleton.length_px > _LONGER * np.nan_to_num(best.skeleton.length_px):
                     return replace(other, faint_parts=True, core_threshold=body.threshold)
         return best if tailed is not None else replace(detection, may_have_faint_parts=faint)
 
@@ -161,7 +155,7 @@ class BodyDetector:
         if core.status is not FrameStatus.GOOD:
             return None
         tailed = with_tails(image, background, self.polarity, body, core)
-        if tailed is None or tailed.skeleton.length_px < _TAILED_LENGTH * core.length_px:
+        if tailed is None or tailed.skeleton.length_px < _LONGER * core.length_px:
             return None
         checked = self._checked_detection(image, background, tailed.silhouette, tailed.skeleton)
         if checked.skeleton.status is not FrameStatus.GOOD:

@@ -102,20 +102,10 @@ def skeleton_of(mask: Bools) -> Skeleton:
     Never raises: an empty, round, looped or branching mask has a status other than ``GOOD``, and
     NaN points. The order of the ends is arbitrary.
     """
-    shape = np.ascontiguousarray(mask, dtype=np.uint8)
-    rows, columns = np.flatnonzero(shape.any(axis=1)), np.flatnonzero(shape.any(axis=0))
-    if not rows.size:
+    if not mask.any():
         return no_skeleton(FrameStatus.NOTHING)
-    top = int(rows[0])
-    left = int(columns[0])
-    body = shape[top : rows[-1] + 1, left : columns[-1] + 1]
-    level = cv2.copyMakeBorder(body, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
-    return skeleton_of_level(
-        level.astype(np.float32),
-        0.5,
-        (float(left - _MARGIN), float(top - _MARGIN)),
-        grey=False,
-    )
+    level = np.pad(mask.astype(np.float32), _MARGIN)
+    return skeleton_of_level(level, 0.5, (-float(_MARGIN), -float(_MARGIN)), grey=False)
 
 
 def skeleton_of_level(
@@ -140,7 +130,8 @@ def skeleton_of_level(
     if width is None:
         return no_skeleton(FrameStatus.BLOB)
     step = min(WORKING_WIDTH / width, _LARGEST_SIDE_PX / max(level.shape))
-    fine = _rescaled_level(level, step)
+    framed = np.pad(resized(level, step), _MARGIN)
+    fine = np.asarray(cv2.GaussianBlur(framed, (0, 0), 1.0), dtype=np.float32)
     solid = _largest_part(fine > threshold)
     if solid is None:
         return no_skeleton(FrameStatus.NOTHING)
@@ -219,17 +210,18 @@ def _width(mask: Bools) -> float | None:
     return float(wide) if half > _LONG_WIDTHS * wide + wide else None
 
 
-def _rescaled_level(level: Level, scale: float) -> Level:
+def resized(level: Level, scale: float) -> Level:
+    """(h, w) picture, ``scale`` pixels a pixel."""
     if scale < 1.0:
         level = np.asarray(cv2.GaussianBlur(level, (0, 0), 0.4 / scale), dtype=np.float32)
-    rows, columns = (max(1, round(side * scale)) for side in level.shape)
+    rows, columns = (max(1, int(np.ceil(side * scale))) for side in level.shape)
+    off = 0.5 * scale - 0.5
+    matrix = np.array([[scale, 0.0, off], [0.0, scale, off]])
     how = cv2.INTER_CUBIC if scale > 1.0 else cv2.INTER_LINEAR
-    matrix = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]]) * scale - [[0, 0, 0.5], [0, 0, 0.5]]
     fine = cv2.warpAffine(
         level, matrix, (columns, rows), flags=how, borderMode=cv2.BORDER_REPLICATE
     )
-    fine = cv2.copyMakeBorder(fine, *(_MARGIN,) * 4, cv2.BORDER_CONSTANT, value=0)
-    return np.asarray(cv2.GaussianBlur(fine, (0, 0), 1.0), dtype=np.float32)
+    return np.asarray(fine, dtype=np.float32)
 
 
 def _to_the_tips(

@@ -6,7 +6,12 @@ import numpy as np
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.controller.images.background import surrounding_ground
 from snakewalk.controller.images.medial_axis import Skeleton
-from snakewalk.controller.images.silhouette import Polarity, Silhouette, soft_contrast
+from snakewalk.controller.images.silhouette import (
+    Polarity,
+    Silhouette,
+    edge_width_px,
+    soft_contrast,
+)
 from snakewalk.controller.track.frame_status import FrameStatus
 
 _MARGIN_LENGTHS = 0.5  # of the length: margin on each side
@@ -14,6 +19,10 @@ _WEAK_LEVEL = 0.2  # share of the body's contrast: a weaker residual is ground
 _NEAR_WIDTHS = 1.5  # widths from a tip: a nearer residual may belong to the body
 _AWAY_WIDTHS = 1.2  # widths from the body: a shadow stays nearer
 _PART = 0.02  # of the body's summed contrast: a larger residual beyond a tip is a part of it
+_OTHER_PART_WIDTHS = 2.5  # widths along the body from which a part is another one
+_GAP_WIDTHS = 2.0  # widths from a tip: a farther part is not next to it
+_GAP_SAMPLES = 101
+_GAP_BLURS = 3.4  # widths of a blurred edge: an empty gap that holds as much is narrower (measured)
 _GHOST = 0.05  # the same for objects that only the background shows
 _GHOST_WEAK = 0.3  # of the body's contrast
 _EDGES = 0.5  # share of the outline's edges that the frame must show; a ghost has about none
@@ -57,6 +66,8 @@ def check_residual(
     apart = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5)
     away_px = np.asarray(apart, dtype=np.float32)
     if _beyond_tips(soft_level, away_px, tips, wide, least) > _PART * mass:
+        return FrameStatus.PART
+    if _continues_to_itself(silhouette, skeleton, wide, least):
         return FrameStatus.PART
     if ghosts and polarity is not Polarity.BOTH:
         least = max(silhouette.noise_level, _GHOST_WEAK * level)
@@ -102,6 +113,26 @@ def _beyond_tips(
         near[part[np.hypot(x - tip[0], y - tip[1]) < _NEAR_WIDTHS * wide + 2.0]] = True
     away = rest & (away_px > _AWAY_WIDTHS * wide)
     return float(soft_level[away & near[label]].sum())
+
+
+def _continues_to_itself(
+    silhouette: Silhouette, skeleton: Skeleton, wide: float, least: float
+) -> bool:
+    """Whether something faint lies in a gap between a tip and another part of the body."""
+    line = skeleton.points_px - np.asarray(silhouette.origin_px)
+    along = np.arange(len(line)) * skeleton.length_px / len(line)
+    blur_px = edge_width_px(silhouette.level, silhouette.threshold)
+    for tip in (0, -1):
+        away = np.hypot(*(line - line[tip]).T)
+        away[np.abs(along - along[tip]) < _OTHER_PART_WIDTHS * wide] = np.inf
+        if away.min() > _GAP_WIDTHS * wide:
+            continue
+        x, y = np.linspace(line[tip], line[np.argmin(away)], _GAP_SAMPLES, dtype=np.float32).T
+        level = cv2.remap(silhouette.level, x, y, cv2.INTER_LINEAR)
+        gap_px = float((level < silhouette.threshold).mean() * away.min())
+        if gap_px > _GAP_BLURS * blur_px and level.min() > least:
+            return True
+    return False
 
 
 def _ghost(

@@ -53,6 +53,22 @@ class Silhouette:
         return self.level > self.threshold
 
 
+def edge_width_px(level: Singles, threshold: float) -> float:
+    """Standard deviation of a blurred step as steep as a body's boundary, with all filters.
+
+    Args:
+        level: (h, w) contrast of one body.
+        threshold: contrast at the boundary, half of the body's own.
+
+    """
+    mask = (level > threshold).astype(np.uint8)
+    edge = (mask - cv2.erode(mask, np.ones((3, 3), np.uint8))) > 0
+    across = cv2.Sobel(level, cv2.CV_32F, 1, 0, ksize=3, scale=0.125)
+    down = cv2.Sobel(level, cv2.CV_32F, 0, 1, ksize=3, scale=0.125)
+    steep = float(np.median(np.hypot(across, down)[edge]))
+    return float(2.0 * threshold / (np.sqrt(2.0 * np.pi) * max(steep, 1e-6)))
+
+
 def as_deep_as(image: DeepImage, values: NDArray[Any]) -> DeepImage:
     """Convert to the image's depth; round for 8 bit."""
     if image.dtype == np.uint8 and values.dtype != np.uint8:

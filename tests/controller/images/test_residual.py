@@ -1,10 +1,11 @@
 """Drawn bars beyond, beside and behind a body: which of them belong to it, and which are ghosts."""
 
+import cv2
 import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Image
-from snakewalk.controller.images.medial_axis import Skeleton
+from snakewalk.controller.images.medial_axis import Skeleton, in_equal_chords
 from snakewalk.controller.images.residual import check_residual, is_ghost
 from snakewalk.controller.images.silhouette import Polarity, Silhouette
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -101,6 +102,30 @@ def test_half_a_length_around_the_body_is_looked_at() -> None:
     end = plate(((110, 120, 10, 80), LEVEL), ((110, 80, 10, 40), LEVEL))
     assert check(end, plate(), body=(110, 120, 10, 80)) is FrameStatus.PART
     assert check(plate(((0, 0, 10, 80), LEVEL)), plate(), body=(0, 0, 10, 80)) is FrameStatus.GOOD
+
+
+@pytest.mark.parametrize("gap_px", [3, 8, 10])
+@pytest.mark.parametrize(
+    ("faint", "expected"), [(0, FrameStatus.GOOD), (15, FrameStatus.GOOD), (36, FrameStatus.PART)]
+)
+def test_a_gap_between_a_tip_and_the_body_is_empty_or_holds_a_part(
+    gap_px: int, faint: int, expected: FrameStatus
+) -> None:
+    """A hook 10 px wide; its tip ends above its own long arm, and blur fills a narrow gap."""
+    tip_y = 60 - gap_px
+    hook = np.array([[80, tip_y], [80, 20], [120, 20], [120, 65], [20, 65]])
+    clear = np.zeros(SHAPE, dtype=np.float32)
+    clear[15:60, 75:85] = faint
+    for arm in (np.s_[15:tip_y, 75:85], np.s_[15:25, 75:125], np.s_[15:70, 115:125]):
+        clear[arm] = LEVEL
+    clear[60:70, 20:125] = LEVEL
+    level = np.asarray(cv2.GaussianBlur(clear, (0, 0), 1.2), dtype=np.float32)
+    silhouette = Silhouette(level, 0.5 * LEVEL, 8.0, (0.0, 0.0), 1.0, 0.0, FrameStatus.GOOD)
+    skeleton = in_equal_chords(hook.astype(float), np.full(101, 5.0))
+    assert skeleton is not None
+    image = np.asarray(np.rint(GROUND - level), dtype=np.uint8)
+    found = check_residual(image, plate(), Polarity.DARK, silhouette, skeleton, ghosts=False)
+    assert found is (expected if gap_px > 3 else FrameStatus.GOOD)
 
 
 GHOST = (62, 80, 10, 40)
