@@ -194,18 +194,19 @@ class TerrainPlanner:
         """Plan in one piece, but reject a start that is off the world or unsafe.
 
         Raises:
-            InputError: as for steps, and for the first point; with advice where no route exists.
+            InputError: as for steps, and for the first point; with advice if a limit is too low.
 
         """
         points = np.asarray(points_m, float)
         self._numbers = list(range(len(points)))
         faults = [f for k in range(len(points)) for f in self._fault(k, points[k])]
-        if faults:
-            raise InputError(faults)
-        try:
-            return at_once(self.in_steps(points))
-        except _NoRouteError as error:
-            raise InputError(f"{error}; {route_advice(error.relief, error.ends_m)}") from None
+        if not faults:
+            try:
+                return at_once(self.in_steps(points))
+            except _NoRouteError as error:
+                faults = [str(error)]
+        assert self.relief is not None
+        raise InputError([*faults, f"to use these points: {route_advice(self.relief, points)}"])
 
     def _turn_cost_per_m(self, points_m: Floats) -> Floats:
         """Cost (..., k) of a metre of path at (..., k, 2), with a penalty on unsafe ground."""
@@ -285,9 +286,7 @@ class TerrainPlanner:
             f"{self._name(k, points[k])} cannot be reached from "
             f"{self._name(k - 1, points[k - 1])}: no way "
             f"stays under a slope of {np.degrees(config.slope_limit_rad):.1f} deg and an elevation "
-            f"variance of {config.variance_limit_m2:.2g} m2",
-            self.relief,
-            points[k - 1 : k + 1],
+            f"variance of {config.variance_limit_m2:.2g} m2"
         )
 
     def _fault(self, k: int, point: Floats) -> list[str]:
@@ -313,11 +312,6 @@ class TerrainPlanner:
 
 class _NoRouteError(InputError):
     """No safe ground joins two points; a search for advice needs more time than a cycle has."""
-
-    def __init__(self, fault: str, relief: Relief, ends_m: Floats) -> None:
-        super().__init__(fault)
-        self.relief = relief
-        self.ends_m = ends_m
 
 
 def _distinct_points(points: Floats) -> list[int]:

@@ -74,7 +74,7 @@ class RollPlanner:
 
     def best(self, pose: PathPose, walker: PredictiveWalker, target_m: Floats) -> RollPlan | None:
         """Return the roll that approaches the target fastest, or None."""
-        plans = list(self._plans(pose, walker, target_m))
+        plans = self._plans(pose, walker, target_m)
         return max(plans, key=lambda plan: plan.speed_m_s, default=None)
 
     def to_go_m(self, target_m: Floats, links_m: Floats, heading_rad: float, side: float) -> Floats:
@@ -92,12 +92,12 @@ class RollPlanner:
         away_m = np.hypot(*(centres_m - target_m).T)
         if uphill @ turn_m < _UPHILL * self.turn_m * np.hypot(*uphill):
             return np.asarray(away_m[:1])
-        heights_m = np.array([self._height_m(links_m + shift) for shift in shifts_m])
-        for turns in range(MOST_TURNS):
-            rise_m = heights_m[turns + 1] - heights_m[turns]
-            if rise_m < _LEAST_SLOPE * self.turn_m or not self._safe(centres_m[turns + 1]):
-                return np.asarray(away_m[: turns + 1])
-        return np.asarray(away_m)
+        rises_m = np.diff([self._height_m(links_m + shift) for shift in shifts_m])
+        ends = [
+            rise_m < _LEAST_SLOPE * self.turn_m or not self._safe(centre_m)
+            for rise_m, centre_m in zip(rises_m, centres_m[1:], strict=True)
+        ]
+        return np.asarray(away_m[: [*ends, True].index(True) + 1])
 
     def tried(
         self, pose: PathPose, walker: PredictiveWalker, target_m: Floats, heading_rad: float

@@ -119,6 +119,7 @@ def plan(
 
 
 def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
+    path_m = prepared.path.length_m  # first, because its planner advises
     ahead = prepared.forecast()
     plan_facts: dict[str, object] = {
         "run": prepared.run.name,
@@ -130,7 +131,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
         "waypoints": len(prepared.run.waypoints_m),
         "waypoints_reached": ahead.reached,
         "passed_by": ahead.missed,
-        "path_m": round(prepared.path.length_m, 3),
+        "path_m": round(path_m, 3),
         "speed_of_the_wave": f"{prepared.pulse_m_s:.2f} m/s (behaviour.pulse_body_lengths_s)",
         "duration_s": round(ahead.duration_s, 2),
         "joint_reach_rad": round(float(abs(ahead.joint_rad).max()), 3),
@@ -143,7 +144,7 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
     if safety.on_trip == "hold":
         hold = TripHold.from_config(prepared.robot, safety)
         assert hold is not None
-        low_a, high_a = float(hold.current_a.min()), float(hold.current_a.max())
+        low_a, high_a = hold.current_a.min(), hold.current_a.max()
         amps = f"{low_a:.2f} A" if low_a == high_a else f"{low_a:.2f} to {high_a:.2f} A"
         plan_facts["on_trip"] = f"hold for {safety.hold_s:g} s with at most {amps} a joint"
     if safety.stop_output is not None:
@@ -160,11 +161,12 @@ def _facts(prepared: WalkRun) -> tuple[dict[str, object], list[str]]:
     if ahead.reached < len(prepared.run.waypoints_m):
         warnings.append(
             f"{ahead.reached} of {len(prepared.run.waypoints_m)} waypoints are reached in "
-            f"{ahead.duration_s:.0f} s; raise run.time_limit_s or joint limits, or move waypoints"
+            f"{ahead.duration_s:.0f} s, without rolls; raise run.time_limit_s or joint limits, or "
+            "move waypoints"
         )
     if safety.stop_output is not None:
         output = parse_stop_output(safety.stop_output)
-        if isinstance(output, StopCommand) and output.fault is not None:
+        if isinstance(output, StopCommand) and output.fault:
             warnings.append(f"{output.fault}, or plan on the computer of the robot")
     if prepared.keep_off is not None:
         plan_facts["obstacle"] = prepared.keep_off.distance_text(prepared.path)

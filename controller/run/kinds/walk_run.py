@@ -123,6 +123,8 @@ _BRIDGED_LINKS = 4.0
 """Radius of the ball that bridges the ground, over a link's length (ours). Bodies pass steps of 4
 cm in 41 s with 4, in 49 s with 1; with 0 one of eight fails."""
 
+_STIFF = "--set run.walk.pitch.p_gain=800 --set run.walk.pitch.current_limit_a=0.4"
+"""Options with which pitch joints roll a body up a plane of 19 degrees (docs/terrain.md)."""
 _ROLLING_A = 0.3
 """Goal current of pitch joints that roll a body up 18 degrees (ours, decision 37)."""
 
@@ -355,8 +357,9 @@ class WalkRun(PathRun):
     @property
     def _rolls(self) -> bool:
         """Whether the body may roll, and its pitch joints carry it."""
-        carried_a = (self.robot.current_limits_a[joint] for joint in self.robot.pitch_joints)
-        return self._may_roll and min(carried_a) >= _ROLLING_A
+        return self._may_roll and all(
+            self.robot.current_limits_a[joint] >= _ROLLING_A for joint in self.robot.pitch_joints
+        )
 
     @property
     def pulse_m_s(self) -> float:
@@ -386,7 +389,11 @@ class WalkRun(PathRun):
                 "ground's friction leaves narrower ones no hold (behaviour.curvature)"
             )
         if not self.library.recorded:
-            lines.append(self._no_recorded_message)
+            lines.append(
+                f"no shape of {self.run.track} is used: the robot or the ground refuses them all; "
+                f"the walk is made of {len(self.library.shapes_rad)} random ones "
+                f"(why: snakewalk animal track {self.run.track})"
+            )
         return tuple(lines)
 
     @cached_property
@@ -410,21 +417,18 @@ class WalkRun(PathRun):
 
     def _too_steep(self, section: SteepSection) -> str:
         x_m, y_m = self.path.position(section.begin_m)
-        remedy = "move the waypoints, or expect it to stay there"
-        if self.run.motion == "walk" and self._may_roll:
-            remedy = "run.walk.pitch.p_gain=800, run.walk.pitch.current_limit_a=0.4 let it roll up"
+        words = [
+            "--motion walk" * (self.run.motion != "walk"),
+            "--robot alternating16" * (not self._may_roll),
+            _STIFF * (not self._rolls),
+        ]
+        remedy = f"add {' '.join(filter(None, words))} to let it roll up, or move the waypoints"
+        if not any(words):
+            remedy = "its pitch joints let it roll up there"
         return (
             f"the path climbs {np.degrees(section.slope_rad):.1f} deg from {section.begin_m:.1f} "
             f"to {section.end_m:.1f} m, beginning at ({x_m:.2f}, {y_m:.2f}): this body is known "
             f"to climb {np.degrees(self._steepest_climb_rad):.1f} deg; {remedy}"
-        )
-
-    @property
-    def _no_recorded_message(self) -> str:
-        return (
-            f"no shape of {self.run.track} is used: the robot or the ground refuses them all; the "
-            f"walk is made of {len(self.library.shapes_rad)} random ones "
-            f"(why: snakewalk animal track {self.run.track})"
         )
 
     def walker(self, library: StateLibrary, filters: Mapping[str, ShapeFilter]) -> Walker:

@@ -1,6 +1,7 @@
 """A way is found wherever safe ground joins two points, and the advice opens one elsewhere."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -68,7 +69,7 @@ def test_a_route_is_found_where_safe_ground_joins_its_points(seed, points) -> No
 def test_where_no_route_exists_the_advice_opens_one() -> None:
     planner, at = TerrainPlanner(bumps(10), CONFIG), np.array([(0.08, -1.06), (1.97, 1.76)])
     assert not are_joined(planner.relief, at)
-    with pytest.raises(InputError, match=r"cannot be reached .*; set .*_limit_m2 to 0\.00043$"):
+    with pytest.raises(InputError, match=r"cannot be reached (.|\n)* --set .*_limit_m2=0\.00043$"):
         planner.plan(at)
     wider = CONFIG.model_copy(update={"variance_limit_m2": 0.00043})
     TerrainPlanner(bumps(10), wider).plan(at)
@@ -82,9 +83,12 @@ def test_advice_names_the_margin_the_map_or_the_waypoint() -> None:
         ground = HeightField(z_m, 0.05, -2.0, -2.0)
         return route_advice(Relief(replace(ground, known=known), CONFIG), ends)
 
-    assert "edge_margin_m to 0.15" in advice(np.where((abs(x) < 0.2) & (y < 1.51), 3.0, 0.0))
+    assert "edge_margin_m=0.15" in advice(np.where((abs(x) < 0.2) & (y < 1.51), 3.0, 0.0))
     assert "move a waypoint" in advice(np.where(abs(x) < 0.2, 3.0, 0.0))
     assert "map does not know" in advice(0.0 * x, known=abs(x) > 0.2)
+    bank_m = np.tan(np.radians(25.0)) * np.clip(x, 0.0, 1.2)
+    words = advice(bank_m)
+    assert re.fullmatch(r"--set .*slope_limit_rad=0\.44 --set .*variance_limit_m2=0\.005", words)
 
 
 def random_risk(seed: int) -> tuple[Relief, SafeGraph, np.ndarray]:
