@@ -41,10 +41,6 @@ PATH = INK
 TO_COME = RED
 """Colour of waypoints that are not reached."""
 REACHED = GREEN
-HIGHEST = RED
-"""Colour of the joint or servo with the highest value."""
-MEAN = SKY
-"""Colour of the mean of all joints, or all servos."""
 SUPPLY = AMBER
 WARNING = AMBER
 FAULT = RED

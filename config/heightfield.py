@@ -68,12 +68,17 @@ class HeightField:
         rows, columns = self.z_m.shape
         return (columns - 1) * self.spacing_m, (rows - 1) * self.spacing_m
 
-    def contains(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
-        """Whether points are on the field."""
+    @property
+    def middle_m(self) -> Floats:
+        """(2,) place in the middle of the field."""
+        return np.array([self.x0_m, self.y0_m]) + 0.5 * np.array(self.size_m)
+
+    def contains(self, x_m: ArrayLike, y_m: ArrayLike, margin_m: float = 0.0) -> Bools:
+        """Whether points are on the field, at least ``margin_m`` from its border."""
         x, y = np.asarray(x_m, float), np.asarray(y_m, float)
         w, h = self.size_m
-        inside = (x >= self.x0_m) & (x <= self.x0_m + w) & (y >= self.y0_m) & (y <= self.y0_m + h)
-        return np.asarray(inside)
+        inside = np.minimum(x - self.x0_m, self.x0_m + w - x) >= margin_m
+        return inside & (np.minimum(y - self.y0_m, self.y0_m + h - y) >= margin_m)
 
     def elevation_m(self, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         """Elevation at points (clamped to the border), m; shape of the inputs."""
@@ -109,16 +114,10 @@ class HeightField:
 
 def surface(field: HeightField) -> tuple[Floats, Ints]:
     """Corners (n, 3), m, and triangles (k, 3) of a field's surface."""
-    rows, columns = field.z_m.shape
-    x, y = np.meshgrid(
-        field.x0_m + field.spacing_m * np.arange(columns),
-        field.y0_m + field.spacing_m * np.arange(rows),
-    )
-    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    lower = np.stack([corner, corner + 1, corner + columns + 1], axis=1)
-    upper = np.stack([corner, corner + columns + 1, corner + columns], axis=1)
-    corners_m = np.stack([x.ravel(), y.ravel(), field.z_m.ravel()], axis=1)
-    return corners_m, np.concatenate([lower, upper])
+    corner = np.arange(field.z_m.size).reshape(field.z_m.shape)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
+    faces = np.moveaxis(np.array([[a, b, c], [a, c, d]]), 1, -1).reshape(-1, 3)
+    return np.dstack([*np.meshgrid(*field.axes_m), field.z_m]).reshape(-1, 3), faces
 
 
 def write_map(file: Path, ground: HeightField) -> None:

@@ -332,7 +332,7 @@ class Wandering:
         """
         ground = self._ground
         places_m = np.zeros((len(bodies), 3))
-        corner = np.array([ground.x0_m, ground.y0_m]) + 0.1 * np.array(ground.size_m)
+        corner = ground.middle_m - 0.4 * np.array(ground.size_m)
         missing = np.arange(len(bodies))
         for _ in range(1000):
             tried = corner + self._random.random((len(missing), 2)) * 0.8 * np.array(ground.size_m)

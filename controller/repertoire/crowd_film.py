@@ -184,10 +184,7 @@ class CrowdScene:
         """Where the camera looks, from how far, and its two angles in degrees."""
         turn = 2.0 * np.pi * time_s / FLIGHT_S
         wide = 0.5 * min(self._ground.size_m)
-        middle = np.array([self._ground.x0_m, self._ground.y0_m]) + 0.5 * np.array(
-            self._ground.size_m
-        )
-        place_m = middle + 0.3 * wide * np.array([np.cos(turn), np.sin(turn)])
+        place_m = self._ground.middle_m + 0.3 * wide * np.array([np.cos(turn), np.sin(turn)])
         lookat = np.array([*place_m, float(self._ground.elevation_m(*place_m))])
         distance = wide * (0.42 + 0.14 * np.cos(1.7 * turn))
         return lookat, distance, float(np.degrees(turn)) + 55.0, -26.0

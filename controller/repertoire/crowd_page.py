@@ -14,13 +14,13 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.repertoire.behaviour import Wandering
 from snakewalk.controller.repertoire.crowd_film import MIDDLE, DetailedCrowd
 from snakewalk.controller.view.live_view import host_and_port
-from snakewalk.controller.view.page_server import served_page
+from snakewalk.controller.view.page_server import served_model
 from snakewalk.controller.view.scene import draw_water, ground_hit_m, ground_mesh
 from snakewalk.drivers.clock import Clock, WallClock
 from snakewalk.sim.rendering.crowd_mesh import COLOURS, MESHES, TubeGrid
 
 _SAMPLES = 2500
-"""Samples of the drawn ground (ours): more slow a browser that draws without a graphics card."""
+"""Samples of the drawn ground (ours): more slow a browser without a graphics card."""
 FRAMES = 4
 """Frames of the repertoire between two pictures (ours): 15 a second."""
 _LATE_S = 0.25
@@ -48,16 +48,13 @@ class CrowdPage:
     def __init__(
         self, wandering: Wandering, world: WorldConfig, ground: HeightField, host: str, port: int
     ) -> None:
-        self.server, self.url = served_page(host, port)
+        self.server, self.url = served_model(host, port)
         self.wandering = wandering
         self._ground = ground = _coarse(ground)
         self._chains = DetailedCrowd(ground, wandering.radius_m, wandering.swims)
         self._wish: Floats = np.zeros(3)
         self._inputs: SimpleQueue[Callable[[], None]] = SimpleQueue()
         scene = self.server.scene
-        scene.set_up_direction("+z")
-        scene.configure_default_lights(cast_shadow=False)
-        scene.configure_environment_map(None)
         self.frame = scene.add_frame("/crowd", show_axes=False)
         scene.add_mesh_trimesh("/crowd/ground", ground_mesh(ground))
         draw_water(scene, "/crowd/water", water_surface_m(world, ground))
@@ -87,7 +84,7 @@ class CrowdPage:
         for key, (label, change) in _KEYS.items():
             gui.add_command(label, hotkey=key).on_trigger(self.steering(change))  # type: ignore[arg-type]
         scene.on_click()(self.on_click)
-        middle_m = np.array([ground.x0_m, ground.y0_m]) + 0.5 * np.array(ground.size_m)
+        middle_m = ground.middle_m
         camera = self.server.initial_camera
         camera.look_at = *middle_m, float(ground.elevation_m(*middle_m))
         camera.position = *(middle_m - [0.35 * ground.size_m[0], 0.0]), 0.25 * ground.size_m[0]

@@ -99,13 +99,7 @@ class Relief:
 
     def within(self, x_m: ArrayLike, y_m: ArrayLike) -> Bools:
         """Whether points lie on the field, ``edge_margin_m`` or more from its border."""
-        x, y = np.asarray(x_m, float), np.asarray(y_m, float)
-        ground = self.ground
-        margin = self.config.edge_margin_m - EDGE_TOLERANCE_M
-        w, h = ground.size_m
-        inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x) >= margin
-        inside &= np.minimum(y - ground.y0_m, ground.y0_m + h - y) >= margin
-        return np.asarray(inside)
+        return self.ground.contains(x_m, y_m, self.config.edge_margin_m - EDGE_TOLERANCE_M)
 
     def _field_at(self, field: Floats, x_m: ArrayLike, y_m: ArrayLike) -> Floats:
         return interpolated(self.ground, field, x_m, y_m)

@@ -61,9 +61,7 @@ def _are_joined(relief: Relief, risk: Floats, margin_m: float, points_m: Floats)
     """
     ground = relief.ground
     x, y = ground.axes_m
-    w, h = ground.size_m
-    inside = np.minimum(x - ground.x0_m, ground.x0_m + w - x)[None, :] >= margin_m - 1e-9
-    inside = inside & (np.minimum(y - ground.y0_m, ground.y0_m + h - y)[:, None] >= margin_m - 1e-9)
+    inside = ground.contains(x[None, :], y[:, None], margin_m - 1e-9)
     parts, count = label((risk <= 1.0) & inside)
     if count == 0:
         return False

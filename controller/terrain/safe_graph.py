@@ -118,8 +118,8 @@ class SafeGraph:
         ground = relief.ground
         config = relief.config
         w, h = (size - 2.0 * config.edge_margin_m for size in ground.size_m)
-        x = _centred_grid(ground.x0_m + ground.size_m[0] / 2, w, config.node_spacing_m)
-        y = _centred_grid(ground.y0_m + ground.size_m[1] / 2, h, config.node_spacing_m)
+        x = _centred_grid(ground.middle_m[0], w, config.node_spacing_m)
+        y = _centred_grid(ground.middle_m[1], h, config.node_spacing_m)
         xx, yy = np.meshgrid(x, y)
         safe = relief.risk(xx, yy) <= RISK_LIMIT
         index = np.where(safe, np.cumsum(safe).reshape(safe.shape) - 1, -1)

@@ -1,8 +1,6 @@
 """Motion by a walk on the fixed graph of states ([KP] 4.2.1), whose head leads its tail (Eq. 9).
 
-States without recorded neighbours are joined by distance; ``film_graph`` joins the others.
-Coefficients between two states are interpolated linearly: the angles ``A_c``. On land the angles of
-the head pass down the body, one point a frame:
+On land the angles ``A_c`` of the head pass down the body, one point a frame:
 ``A_f(t, s_k) = m(s_k) A_c(t, s_k) + (1 - m(s_k)) A_f(t - 1, s_(k-1))``. Correction: the text wants
 m "close to 1" at the head. It must be 1 there, as nothing is in front of the head.
 """
@@ -11,12 +9,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from snakewalk.config.arrays import Complexes, Floats
+from snakewalk.config.arrays import Floats
 from snakewalk.controller.animals.synthesis.synthesis import Locomotion, Until, chain
 from snakewalk.controller.kinematics import smoothstep
-from snakewalk.controller.shape.graphs import threshold_graph
-from snakewalk.controller.shape.states import to_angles
-from snakewalk.controller.shape.walks import walk
 from snakewalk.controller.terrain.path import SplinePath
 
 HEAD_SHARE = 0.5
@@ -45,23 +40,6 @@ def handed_down(wanted_rad: Floats, before_rad: Floats, m: Floats) -> Floats:
     return np.asarray(m * wanted_rad + (1.0 - m) * ahead)
 
 
-def graph_angles(
-    states: Complexes, frames_between: int, points: int, rng: np.random.Generator
-) -> Iterator[tuple[int, Floats]]:
-    """Give the state that is left, and A_c (points,), frame by frame and without end.
-
-    The graph has the smallest threshold that joins all states (S, n).
-    """
-    graph = threshold_graph(states, None)
-    state = 0
-    while True:
-        for after in walk(graph, "degree", state, rng).path.tolist()[1:]:
-            share = np.arange(frames_between)[:, None] / frames_between
-            between = states[state] + share * (states[after] - states[state])
-            yield from ((state, angles) for angles in to_angles(between, points))
-            state = after
-
-
 def graph_motion(
     shapes: Iterator[tuple[int, Floats]],
     path: SplinePath,
@@ -78,7 +56,7 @@ def graph_motion(
     advances by the same distance (ours; the text leaves the speed open).
 
     Args:
-        shapes: of ``graph_angles`` or ``film_angles``.
+        shapes: of ``film_angles``.
         path: through the waypoints.
         frames: largest number of frames.
         segment_m: r, the body's length over N.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakewalk.config.arrays import Complexes, Floats
+from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.synthesis import (
     Adaptation,
@@ -17,8 +17,12 @@ from snakewalk.config.synthesis import (
     along_body,
     curve_at,
 )
-from snakewalk.controller.animals.synthesis.film_graph import FilmStates, film_angles
-from snakewalk.controller.animals.synthesis.graph_motion import graph_angles, graph_motion
+from snakewalk.controller.animals.synthesis.film_graph import (
+    FilmStates,
+    film_angles,
+    with_random_states,
+)
+from snakewalk.controller.animals.synthesis.graph_motion import graph_motion
 from snakewalk.controller.animals.synthesis.synthesis import (
     Behaviour,
     Locomotion,
@@ -37,7 +41,7 @@ from snakewalk.controller.mechanics.ground_step import (
 from snakewalk.controller.mechanics.speed_law import SpeedLaw
 from snakewalk.controller.run.kinds.walk_run import POINTS, WalkRun
 from snakewalk.controller.shape.library import ShapeFilter, StateLibrary, build_library
-from snakewalk.controller.shape.states import to_states
+from snakewalk.controller.shape.states import to_angles, to_states
 from snakewalk.controller.terrain.in_steps import at_once
 from snakewalk.controller.terrain.path import SplinePath
 from snakewalk.controller.track.analysis import analyse
@@ -358,30 +362,36 @@ class SnakeSynthesis:
         return plan, states
 
     def _graph_shapes(self) -> Iterator[tuple[int, Floats]]:
-        """States and angles A_c of [KP] 4.2.1, from consecutive frames if there are any."""
+        """States and angles A_c of [KP] 4.2.1: consecutive frames, and random states between.
+
+        Raises:
+            InputError: the library has no consecutive frames, or no wave to the tail.
+
+        """
         run = self.run
         library = self.library
-        coefficients = to_states(library.shapes_rad, self.how.coefficients)
-        rng = np.random.default_rng(run.seed)
-        film = self._film(coefficients[: library.recorded])
-        if film is not None:
-            return film_angles(film, POINTS, rng)
-        between = max(1, round(run.walk.decision_fraction * POINTS))
-        return graph_angles(coefficients, between, POINTS, rng)
-
-    def _film(self, states: Complexes) -> FilmStates | None:
-        """Recorded states (S, n) as a film; None without neighbours or a wave to the tail."""
-        track = load_track(self.run.track)
-        number = np.rint(track.time_s * track.rate_hz).astype(np.int64)[self.library.frame]
-        if not (np.diff(number) == 1).any():
-            return None
+        track = load_track(run.track)
+        number = np.rint(track.time_s * track.rate_hz).astype(np.int64)[library.frame]
         pulse = analyse(track).pulse
         is_known = np.isfinite(pulse.body_points_per_frame)
-        rows = pulse.frame[is_known]
-        speeds = pulse.body_points_per_frame[is_known]
-        if len(speeds) == 0 or np.median(speeds) <= 0.0:
-            return None
-        return FilmStates(states, number, np.interp(self.library.frame, rows, speeds))
+        speeds = np.interp(
+            library.frame, pulse.frame[is_known], pulse.body_points_per_frame[is_known]
+        )
+        states = to_states(library.shapes_rad[: library.recorded], self.how.coefficients)
+        try:
+            film = FilmStates(states, number, speeds)
+        except ValueError as fault:
+            raise InputError(
+                f"run {run.name}: track {run.track}: {fault}; use --motion walk, or a track "
+                "of successive frames without [synthesis.waves]"
+            ) from None
+        rng = np.random.default_rng(run.seed)
+        film = with_random_states(film, POINTS, run.states.random_count, self._is_possible, rng)
+        self.library = replace(library, shapes_rad=to_angles(film.states, POINTS))
+        return film_angles(film, POINTS, rng)
+
+    def _is_possible(self, shapes_rad: Floats) -> bool:
+        return not any(refuses(shapes_rad).any() for refuses in self.shape_filters.values())
 
     @property
     def law(self) -> SpeedLaw:

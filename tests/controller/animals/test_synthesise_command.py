@@ -353,15 +353,15 @@ def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: 
         assert message in done.stderr
 
 
-def test_the_older_graph_says_that_it_replays_the_recording_and_moves_sideways() -> None:
-    """[KP] 4.2.1 wants random states, too; the walk of [PT] has them and slides less."""
+def test_the_older_graph_mixes_random_states_and_moves_sideways() -> None:
+    """The walk of [PT] slides less: its mass centre may leave the path."""
     facts = {
         motion: SnakeSynthesis(prepare_walk("flat-slalom", motion=motion, on_paper=True))
         .synthesise(400)
         .facts()
         for motion in ("walk", "kp")
     }
-    assert facts["kp"]["states_random"] == 0
+    assert facts["kp"]["states_random"] > 20  # type: ignore[operator]
     assert facts["walk"]["states_random"] > 0  # type: ignore[operator]
     assert facts["kp"]["sideways_share"] > 4.0 * facts["walk"]["sideways_share"]  # type: ignore[operator]
 

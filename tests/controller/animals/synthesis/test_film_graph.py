@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from snakewalk.config.arrays import Floats
+from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_world
 from snakewalk.controller.animals.synthesis.film_graph import (
     FilmStates,
     film_angles,
     film_successors,
+    with_random_states,
 )
 from snakewalk.controller.animals.synthesis.graph_motion import (
-    graph_angles,
     handed_down,
     leading,
 )
@@ -23,6 +24,7 @@ from snakewalk.controller.mechanics.traction import quasi_static_gain
 from snakewalk.controller.run.factory import prepare_walk
 from snakewalk.controller.shape.states import to_angles, to_states
 from snakewalk.controller.track.readers.load import load_track
+from tests.oracles.graph_by_distance import graph_angles
 
 N = 100
 PULSE = 3.0
@@ -70,6 +72,39 @@ def test_the_pattern_of_the_walk_moves_one_point_a_frame() -> None:
     assert body.std() == pytest.approx(np.std(frames[-1]), rel=0.15)
 
 
+def test_a_random_state_moves_down_the_body_and_joins_the_recording() -> None:
+    film = film_of(140)
+    judged: list[int] = []
+
+    def is_possible(angles_rad: Floats) -> bool:
+        judged.append(len(angles_rad))
+        return len(judged) > 1  # the first one is refused
+
+    mixed = with_random_states(film, N, 100, is_possible, np.random.default_rng(0))
+    recorded = len(film.frame)
+    np.testing.assert_array_equal(mixed.states[:recorded], film.states)
+    assert mixed.random == len(mixed.frame) - recorded >= 100
+    course = mixed.states[recorded : recorded + judged[0]]
+    size = np.abs(film.states)
+    assert (np.abs(course) >= size.min(axis=0) - 1e-9).all()  # Eq. 8
+    assert (np.abs(course) <= size.max(axis=0) + 1e-9).all()
+    np.testing.assert_allclose(course[-1], course[0])
+    angles = to_angles(course)
+    moved = angles[1:, 3:] - angles[:-1, :-3]  # about three points a frame
+    assert moved.std(axis=1).max() < 0.05
+    after = film_successors(mixed, N)
+    assert all(after)
+    assert max(max(states) for states in after[:recorded]) >= recorded
+    assert min(min(states) for states in after[recorded:]) < recorded
+
+
+def test_no_random_state_joins_where_none_is_possible() -> None:
+    film = film_of(140)
+    mixed = with_random_states(film, N, 100, lambda _: False, np.random.default_rng(0))
+    assert mixed.random == 0
+    assert film_successors(mixed, N) == film_successors(film, N)
+
+
 def test_a_film_without_neighbours_or_that_runs_to_the_head_is_refused() -> None:
     film = film_of(40)
     with pytest.raises(ValueError, match="two consecutive frames"):
@@ -108,18 +143,37 @@ def test_by_distance_alone_the_middle_of_the_body_is_straight() -> None:
     assert library.shapes_rad[: library.recorded, 50].std() > 0.5
 
 
+@pytest.mark.slow
+def test_the_mass_centre_on_the_path_moves_the_body_sideways() -> None:
+    """[KP] 4.2.1; the same shapes slide less if each frame is placed by least squares."""
+    plan = SnakeSynthesis(prepare_walk("flat-slalom", motion="kp", on_paper=True)).synthesise(300)
+    angles_rad, points_m = plan.plan.angles_rad[:-1], plan.plan.points_m[:, :-1]
+    normal = np.stack([-np.sin(angles_rad), np.cos(angles_rad)], axis=-1)
+    ways = [np.diff(points_m, axis=0), np.diff(points_m, axis=0)]
+    for t, across in enumerate(normal):
+        arm = (points_m[t] - points_m[t].mean(axis=0)) @ [[0.0, 1.0], [-1.0, 0.0]]
+        rigid = np.column_stack([across, (arm * across).sum(axis=1)])
+        best = np.linalg.lstsq(rigid, -(ways[1][t] * across).sum(axis=1), rcond=None)[0]
+        ways[1][t] += best[:2] + best[2] * arm
+    printed, free = (
+        float(np.abs((way * normal).sum(axis=-1)).sum() / np.linalg.norm(way, axis=-1).sum())
+        for way in ways
+    )
+    assert printed == pytest.approx(plan.facts()["sideways_share"], abs=0.01)
+    assert printed > 3.0 * free
+
+
 def waves_on_the_body(angles_rad: Floats) -> float:
     power = np.abs(np.fft.fft(np.diff(angles_rad, axis=1), n=8 * N, axis=1)) ** 2
     return float(power.mean(axis=0)[: 4 * N].argmax()) / 8.0
 
 
-def test_a_library_of_random_states_alone_is_joined_by_distance() -> None:
+def test_a_library_without_recorded_states_is_rejected() -> None:
     prepared = prepare_walk(
         "flat-slalom",
         motion="kp",
         on_paper=True,
         keys={"run.synthesis.waves.long": 1.0, "run.states.random_count": 30},
     )
-    made = SnakeSynthesis(prepared)
-    assert made.library.recorded == 0
-    assert len(made.synthesise(60).plan.angles_rad) == 60
+    with pytest.raises(InputError, match="two consecutive frames; use --motion walk"):
+        SnakeSynthesis(prepared).synthesise(60)

@@ -7,7 +7,6 @@ import pytest
 
 from snakewalk.config.arrays import Complexes, Floats
 from snakewalk.controller.animals.synthesis.graph_motion import (
-    graph_angles,
     graph_motion,
     handed_down,
     leading,
@@ -15,6 +14,7 @@ from snakewalk.controller.animals.synthesis.graph_motion import (
 from snakewalk.controller.shape.graphs import threshold_graph
 from snakewalk.controller.shape.states import to_angles, to_states
 from snakewalk.controller.terrain.path import SplinePath
+from tests.oracles.graph_by_distance import graph_angles
 
 N = 100
 RNG = np.random.default_rng(7)
