@@ -7,7 +7,7 @@ import viser
 
 from snakewalk.config.archive import read_bytes
 from snakewalk.controller.images.mesh_files import read_mesh
-from snakewalk.controller.view.page_server import served_page
+from snakewalk.controller.view.page_server import served_model
 
 _UPRIGHT = (0.5**0.5, 0.5**0.5, 0.0, 0.0)
 """Rotation from y up, the standard of glTF, to z up."""
@@ -23,13 +23,9 @@ def open_model(file: Path, host: str, port: int) -> tuple[viser.ViserServer, str
     """
     corners_m = read_mesh(file, forward="+x", up="+y").mesh.vertices
     least_m, most_m = corners_m.min(axis=0), corners_m.max(axis=0)
-    server, url = served_page(host, port)
+    server, url = served_model(host, port)
     server.gui.add_markdown(_HINT)
-    scene = server.scene
-    scene.set_up_direction("+z")
-    scene.configure_default_lights(cast_shadow=False)
-    scene.configure_environment_map(None)
-    scene.add_glb("/model", read_bytes(file), wxyz=_UPRIGHT)
+    server.scene.add_glb("/model", read_bytes(file), wxyz=_UPRIGHT)
     centre_m = 0.5 * (least_m + most_m)
     size_m = float(np.linalg.norm(most_m - least_m))
     camera = server.initial_camera

@@ -59,6 +59,15 @@ def served_page(host: str, port: int) -> tuple[viser.ViserServer, str]:
         raise InputError(f"--view-at {host}:{port}: {fault.strerror or fault}") from None
 
 
+def served_model(host: str, port: int) -> tuple[viser.ViserServer, str]:
+    """Serve a page with z up and without shadows, which a browser draws in less time."""
+    server, url = served_page(host, port)
+    server.scene.set_up_direction("+z")
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.configure_environment_map(None)
+    return server, url
+
+
 def _in_url(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
