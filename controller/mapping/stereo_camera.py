@@ -239,13 +239,14 @@ def _unit(file: Path, baseline: float, unit: Fact | None) -> Fact:
 
 
 def read_pair(calibration: StereoCalibration, left: Path, right: Path) -> RectifiedPair:
-    """Read and rectify two colour pictures, blue first.
+    """Read and rectify two colour pictures; return colours, red first.
 
     Raises:
         InputError: not two pictures of the calibration's size.
 
     """
-    return rectify(calibration, read_colours(left), read_colours(right))
+    pictures = (np.ascontiguousarray(read_colours(file)[..., ::-1]) for file in (left, right))
+    return rectify(calibration, *pictures)
 
 
 def rectify(calibration: StereoCalibration, left: Image, right: Image) -> RectifiedPair:

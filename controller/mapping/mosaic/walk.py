@@ -10,7 +10,6 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.walkthrough import PositionConfig, WalkthroughConfig
-from snakewalk.controller.images.colour_picture import read_colours
 from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.mosaic.adjustment import (
     Adjusted,
@@ -30,10 +29,9 @@ from snakewalk.controller.mapping.mosaic.relative_pose import (
 )
 from snakewalk.controller.mapping.mosaic.scale_flow import flow_problem, solve_flow
 from snakewalk.controller.mapping.stereo_camera import (
-    RectifiedPair,
     StereoCalibration,
     read_calibration,
-    rectify,
+    read_pair,
 )
 
 _SKIP_RADIUS_PX = 6
@@ -140,19 +138,13 @@ def _fault_place(where: str) -> Iterator[None]:
         raise InputError(f"{where}: {error}") from None
 
 
-def rectified(folder: Path, left: str, right: str, calibration: StereoCalibration) -> RectifiedPair:
-    """Read and rectify a pair of pictures, red first."""
-    files = (folder / left, folder / right)
-    return rectify(
-        calibration, *(np.ascontiguousarray(read_colours(file)[..., ::-1]) for file in files)
-    )
-
-
 def _model(
     folder: Path, position: PositionConfig, calibration: StereoCalibration, disparities: int
 ) -> LocalModel:
     views = [
-        LocalModel.of_pair(rectified(folder, pair.left, pair.right, calibration), disparities)
+        LocalModel.of_pair(
+            read_pair(calibration, folder / pair.left, folder / pair.right), disparities
+        )
         for pair in position.pairs
     ]
     return views[0] if len(views) == 1 else mosaic(views).model
