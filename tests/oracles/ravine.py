@@ -3,6 +3,7 @@
 The ravine runs along x between two walls. Coordinates of a camera: x right, y down, z forward.
 """
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -150,6 +151,19 @@ def _cast(
                 picture[row, column, k] = min(max(colour[k] / fine**2, 0.0), 255.0)
 
 
+@_compiled
+def _reaches(z: Array, at: Array, rays: Array, out: Array) -> None:
+    for number in range(len(rays)):
+        out[number] = _reach(z, at, rays[number])
+
+
+def reaches_m(at_m: Array, rays: Array) -> Array:
+    """(n,) distances from a place to the ground along rays (n, 3), in lengths of the rays."""
+    out = np.empty(len(rays))
+    _reaches(heights(), at_m, np.ascontiguousarray(rays), out)
+    return out
+
+
 @cache
 def heights() -> Array:
     """(rows, columns) heights every ``CELL_M`` from (``X0_M``, ``Y0_M``)."""
@@ -253,14 +267,26 @@ def write_positions(
     camera: Lens,
     stations: Sequence[Station],
     pairs: Sequence[tuple[NDArray[np.uint8], ...]],
+    distortion: Sequence[float] = (),
 ) -> Path:
-    """Write pictures, calibration and true poses; return the positions' file."""
-    rows = [f"{value:g}" for value in camera.matrix.ravel()]
-    matrix = "[" + "; ".join(" ".join(rows[i : i + 3]) for i in (0, 3, 6)) + "]"
-    (folder / "calib.txt").write_text(
-        f"cam0={matrix}\ncam1={matrix}\nbaseline={1000 * camera.baseline_m:g}\n"
-    )
-    lines = ['calibration = "calib.txt"', "disparities = 128"]
+    """Write pictures, calibration and true poses; return the positions' file.
+
+    A lens with ``distortion`` has a calibration with OpenCV's names.
+    """
+    if distortion:
+        one = {"K": camera.matrix.tolist(), "D": list(distortion)}
+        both = {f"{name}{side}": value for side in (1, 2) for name, value in one.items()}
+        both |= {"R": np.eye(3).tolist(), "T": [-camera.baseline_m, 0.0, 0.0]}
+        name = "calib.json"
+        (folder / name).write_text(json.dumps(both))
+    else:
+        rows = [f"{value:g}" for value in camera.matrix.ravel()]
+        matrix = "[" + "; ".join(" ".join(rows[i : i + 3]) for i in (0, 3, 6)) + "]"
+        name = "calib.txt"
+        (folder / name).write_text(
+            f"cam0={matrix}\ncam1={matrix}\nbaseline={1000 * camera.baseline_m:g}\n"
+        )
+    lines = [f'calibration = "{name}"', "disparities = 128"]
     for number, (at, pair) in enumerate(zip(stations, pairs, strict=True)):
         lines += ["", "[[positions]]"]
         for side, picture in zip(("left", "right"), pair, strict=True):

@@ -1,11 +1,12 @@
 """A yard between walls, drawn by MuJoCo with real photographs as textures, seen by a stereo pair.
 
-The gravel, grass and brick are pictures that scikit-image packs. Coordinates of a camera: x right,
-y down, z forward.
+The photographs are pictures that scikit-image packs. Coordinates of a camera: x right, y down,
+z forward.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Self
 
 import cv2
 import mujoco
@@ -20,12 +21,14 @@ from tests.oracles.ravine import Station
 Array = NDArray[np.float64]
 LENGTH_M, WIDTH_M, CELL_M = 9.0, 4.0, 0.02
 RELIEF_M = 0.12
-LOOKS = {
-    "gravel": ((6, 12), (1.0, 1.0), (1.0, 0.93, 0.82)),
-    "brick": ((1, 6), (1.0, 1.0), (1.0, 0.75, 0.62)),
-    "grass": ((2, 2), (1.0, 1.0), (0.8, 1.0, 0.6)),
-}
-"""Tiles (down, across), repetitions and tint of a photograph."""
+LOOKS = (
+    ("ground", (6, 12), (1.0, 0.93, 0.82)),
+    ("wall", (1, 6), (1.0, 0.75, 0.62)),
+    ("boulder", (2, 2), (0.8, 1.0, 0.6)),
+)
+"""Surfaces with the tiles (down, across) and the tint of their photograph."""
+CANVAS = 1.25
+"""Size of the drawn picture in pictures of a lens with distortion, which shows parts outside."""
 
 
 def _quilt(grey: NDArray[np.uint8], tiles: tuple[int, int], rng: np.random.Generator) -> Array:
@@ -62,6 +65,17 @@ class Yard:
     size_px: tuple[int, int] = (640, 480)
     focal_px: float = 460.0
     baseline_m: float = 0.12
+    photographs: tuple[str, str, str] = ("gravel", "brick", "grass")
+    """Of the ground, the walls and the boulders."""
+    distortion: tuple[float, ...] = ()
+    """Coefficients of the lens in OpenCV's order; none: a pinhole."""
+
+    @classmethod
+    def quarry(cls, seed: int) -> Self:
+        """Return a scene of other photographs, seen through a wider lens with distortion."""
+        return cls(
+            seed, (560, 420), 380.0, 0.09, ("moon", "ihc", "coins"), (-0.18, 0.04, 4e-4, -3e-4)
+        )
 
     @property
     def matrix(self) -> Array:
@@ -114,14 +128,13 @@ class Yard:
         rng = np.random.default_rng(self.seed + 2000)
         folder = Path(skimage.__file__).parent / "data"
         spec = mujoco.MjSpec()
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = self.size_px
+        spec.visual.global_.offwidth, spec.visual.global_.offheight = self._canvas_px
         spec.visual.map.znear, spec.visual.map.zfar = 0.005, 10.0
         spec.visual.headlight.ambient = [0.55, 0.55, 0.55]
         spec.visual.headlight.diffuse = [0.35, 0.35, 0.35]
         spec.visual.headlight.specular = [0.0, 0.0, 0.0]
-        for name in ("gravel", "brick", "grass"):
-            grey = np.asarray(cv2.imread(str(folder / f"{name}.png"), 0), np.uint8)
-            tiles, repeat, tint = LOOKS[name]
+        for (name, tiles, tint), photograph in zip(LOOKS, self.photographs, strict=True):
+            grey = np.asarray(cv2.imread(str(folder / f"{photograph}.png"), 0), np.uint8)
             grain = _quilt(grey, tiles, rng)
             colour = np.clip(grain[..., None] * np.array(tint), 0, 255).astype(np.uint8)
             texture = spec.add_texture(
@@ -129,7 +142,7 @@ class Yard:
                 height=colour.shape[0], nchannel=3,
             )  # fmt: skip
             texture.data = colour.tobytes()
-            material = spec.add_material(name=name, texrepeat=repeat, specular=0.0)
+            material = spec.add_material(name=name, specular=0.0)
             material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
         heights = self.heights()
         spec.add_hfield(
@@ -141,23 +154,23 @@ class Yard:
         body = spec.worldbody
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname="ground", pos=[middle, 0.0, 0.0],
-            material="gravel",
+            material="ground",
         )  # fmt: skip
         for side in (-1.0, 1.0):
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.5 * LENGTH_M, 0.05, 0.7],
-                pos=[middle, side * 1.5, 0.7], material="brick",
+                pos=[middle, side * 1.5, 0.7], material="wall",
             )  # fmt: skip
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.05, 2.0, 0.7], pos=[LENGTH_M - 1.2, 0.0, 0.7],
-            material="brick",
+            material="wall",
         )  # fmt: skip
         for _ in range(7):
             size = rng.uniform(0.06, 0.2, 3)
             x_m, y_m = rng.uniform(0.8, 6.0), rng.uniform(0.45, 1.2) * rng.choice([-1.0, 1.0])
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_ELLIPSOID, size=size, pos=[x_m, y_m, 0.1],
-                material="grass",
+                material="boulder",
             )  # fmt: skip
         return spec.compile()
 
@@ -174,21 +187,55 @@ class Yard:
             model, data, mujoco.MjvOption(), None, mujoco.MjvCamera(),
             mujoco.mjtCatBit.mjCAT_ALL, scene,
         )  # fmt: skip
-        screen = Offscreen(model, *self.size_px)
+        screen = Offscreen(model, *self._canvas_px)
         pairs = []
         for station in stations:
             pictures = []
             for shift_m in (0.0, self.baseline_m):
                 self._aim(scene, station.at_m + shift_m * station.axes[:, 0], station.axes)
-                drawn = screen.draw(scene).astype(float)
+                drawn = self._through_lens(screen.draw(scene)).astype(float)
                 drawn += rng.normal(0.0, 1.5, drawn.shape)
                 pictures.append(np.clip(np.rint(drawn), 0, 255).astype(np.uint8))
             pairs.append((pictures[0], pictures[1]))
         screen.close()
         return pairs
 
-    def _aim(self, scene: "mujoco.MjvScene", at_m: Array, axes: Array) -> None:
+    def reaches_m(self, at_m: Array, rays: Array) -> Array:
+        """(n,) distances from a place to what the scene shows along rays (n, 3); NaN for the sky.
+
+        Distances are in lengths of the rays.
+        """
+        model = self.scene()
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        count = len(rays)
+        length = np.linalg.norm(rays, axis=1)
+        geom, reach = np.empty(count, np.int32), np.empty(count)
+        rays_flat = np.ascontiguousarray(rays / length[:, None]).ravel()
+        mujoco.mj_multiRay(
+            model, data, at_m, rays_flat, None, True, -1, geom, reach, None, count, 60.0
+        )
+        return np.where(geom >= 0, reach / length, np.nan)
+
+    @property
+    def _canvas_px(self) -> tuple[int, int]:
+        scale = CANVAS if self.distortion else 1.0
+        return round(scale * self.size_px[0]), round(scale * self.size_px[1])
+
+    def _through_lens(self, drawn: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the picture that the lens makes of the drawn one."""
+        if not self.distortion:
+            return drawn
         wide, tall = self.size_px
+        u, v = np.meshgrid(np.arange(wide, dtype=float), np.arange(tall, dtype=float))
+        seen = np.stack([u, v], axis=-1).reshape(-1, 1, 2)
+        straight = cv2.undistortPoints(seen, self.matrix, np.array(self.distortion))
+        middle = 0.5 * (np.array(self._canvas_px) - 1.0)
+        place = (self.focal_px * straight.reshape(tall, wide, 2) + middle).astype(np.float32)
+        return np.asarray(cv2.remap(drawn, place[..., 0], place[..., 1], cv2.INTER_CUBIC), np.uint8)
+
+    def _aim(self, scene: "mujoco.MjvScene", at_m: Array, axes: Array) -> None:
+        wide, tall = self._canvas_px
         near_m = 0.05
         scale = near_m / self.focal_px
         for camera in scene.camera:

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
-from snakewalk.controller.mapping.mosaic.adjustment import Sightings, adjusted
+from snakewalk.controller.mapping.mosaic.adjustment import Adjusted, Sightings, adjusted
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, moved, project
 from snakewalk.controller.mapping.mosaic.scale_matches import (
     ScaleMatches,
@@ -107,18 +107,18 @@ def estimated_motion(
         InputError: too few matches agree.
 
     """
-    best = best_start(first, second, similar_points(first, second), distance_m)
-    if best is None:
-        best = best_start(first, second, match_over_scale(first, second), distance_m)
-    if best is None:
+    for match in (similar_points, match_over_scale):
+        best = best_start(first, second, match(first, second), distance_m)
+        if best:
+            break
+    else:
         raise InputError(
             f"fewer than {LEAST_INLIERS} matches agree on a relative pose; record the pictures "
             "closer together, or set `distance_m`"
         )
     motion, matches = best
     for radius_px in _RADII_PX:
-        sightings = Sightings.of_matches((0, 1), (first, second), matches)
-        motion = adjusted([sightings], motion[None]).motions[0]
+        motion = _adjusted_to(first, second, motion, matches).motions[0]
         matches = matches_around(first, second, motion, radius_px)
         if len(matches.scale) < LEAST_INLIERS:
             raise InputError(
@@ -126,6 +126,12 @@ def estimated_motion(
                 f"{LEAST_INLIERS}; record the pictures closer together"
             )
     return motion, matches
+
+
+def _adjusted_to(
+    first: LocalModel, second: LocalModel, motion: Floats, matches: ScaleMatches
+) -> Adjusted:
+    return adjusted([Sightings.of_matches((0, 1), (first, second), matches)], motion[None])
 
 
 def matches_around(
@@ -153,7 +159,6 @@ def _starts(first: LocalModel, second: LocalModel, matches: ScaleMatches) -> lis
             matches.first_px[rest],
             matches.second_px[rest],
             matches.scale[rest],
-            matches.correlation[rest],
         )
     return starts
 
@@ -164,10 +169,10 @@ def best_start(
     matches: ScaleMatches,
     distance_m: float | None = None,
 ) -> tuple[Floats, ScaleMatches] | None:
-    """Choose the motion (3, 4) around which most points match; return it and these matches.
+    """Choose the motion (3, 4) with which most matches agree; return it and these matches.
 
     Repeated patterns support several motions. The one near a stated distance is chosen. None: fewer
-    than twelve points match.
+    than twelve matches agree.
 
     Raises:
         InputError: two different motions explain the pictures, and no distance is stated.
@@ -176,11 +181,17 @@ def best_start(
     starts = _starts(first, second, matches)
     if distance_m is not None:
         starts.append(np.column_stack([np.eye(3), [0.0, 0.0, -distance_m]]))
-    tried = [(start, matches_around(first, second, start, _WIDE_RADIUS_PX)) for start in starts]
-    most = max((len(around.scale) for _, around in tried), default=0)
+    tried = []
+    agreeing = []
+    for start in starts:
+        around = matches_around(first, second, start, _WIDE_RADIUS_PX)
+        if len(around.scale) >= LEAST_INLIERS:
+            tried.append((start, around))
+            agreeing.append(int(_adjusted_to(first, second, start, around).agrees[0].sum()))
+    most = max(agreeing, default=0)
     if most < LEAST_INLIERS:
         return None
-    rivals = [pair for pair in tried if len(pair[1].scale) >= _RIVAL * most]
+    rivals = [pair for pair, count in zip(tried, agreeing, strict=True) if count >= _RIVAL * most]
     ways_m = [float(np.linalg.norm(start[:, 3])) for start, _ in rivals]
     if distance_m is not None:
         return rivals[int(np.argmin(np.abs(np.array(ways_m) - distance_m)))]
@@ -189,7 +200,7 @@ def best_start(
             "the pictures repeat themselves: they agree on distances of "
             f"{' m and '.join(f'{way_m:.2f}' for way_m in sorted(ways_m))} m; set `distance_m`"
         )
-    return max(rivals, key=lambda pair: len(pair[1].scale))
+    return tried[agreeing.index(most)]
 
 
 def pose_error(pose: RelativePose, first_pose: Floats, second_pose: Floats) -> tuple[float, float]:

@@ -42,8 +42,6 @@ class ScaleMatches:
     """(n, 2) in the second one."""
     scale: Floats
     """(n,) elements of ``SCALES``: size in the second picture over size in the first."""
-    correlation: Floats
-    """(n,) correlations of the pairs."""
 
 
 def grey(image: Image) -> Singles:
@@ -88,7 +86,7 @@ def match_over_scale(
         patch = _patch(grey_first, column, row, _RADIUS_PX)
         best = _best_match(patch, pyramid, np.array([column, row]), wide * grey_first.shape[1])
         if best is not None:
-            kept.append((column, row, *best))
+            kept.append((column, row, *best[:3]))
     return _as_matches(kept)
 
 
@@ -111,7 +109,7 @@ def similar_points(first: LocalModel, second: LocalModel) -> ScaleMatches:
     for best, rival in cv2.BFMatcher().knnMatch(roots[0], roots[1], k=2):
         if best.distance < _RATIO * rival.distance:
             one, two = sides[0][0][best.queryIdx], sides[1][0][best.trainIdx]
-            kept.append((*one.pt, *two.pt, two.size / one.size, 1.0 - 0.5 * best.distance**2))
+            kept.append((*one.pt, *two.pt, two.size / one.size))
     return _as_matches(kept)
 
 
@@ -156,7 +154,7 @@ def match_around(
         )
         counterpart = _bilinear(predicted_px, place)
         if np.isfinite(counterpart).all():
-            kept.append((column, row, *counterpart, scale[row, column], value))
+            kept.append((column, row, *counterpart, scale[row, column]))
     return _as_matches(kept)
 
 
@@ -196,8 +194,8 @@ def _patch(picture: Singles, column: int, row: int, radius: int) -> Singles:
 
 
 def _as_matches(rows: Sequence[Sequence[float]]) -> ScaleMatches:
-    table = np.array(rows, dtype=float).reshape(-1, 6)
-    return ScaleMatches(table[:, :2], table[:, 2:4], table[:, 4], table[:, 5])
+    table = np.array(rows, dtype=float).reshape(-1, 5)
+    return ScaleMatches(table[:, :2], table[:, 2:4], table[:, 4])
 
 
 def _best_match(

@@ -1,5 +1,7 @@
 """Matches over scale and the pose that they give, against known truth."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial.transform import Rotation
 
 from snakewalk.config.errors import InputError
+from snakewalk.controller.mapping.elevation_choice import CalibrationChoice
 from snakewalk.controller.mapping.mosaic.local_model import LocalModel, project
 from snakewalk.controller.mapping.mosaic.relative_pose import (
     RelativePose,
@@ -22,6 +25,9 @@ from snakewalk.controller.mapping.mosaic.scale_matches import (
     match_over_scale,
     reduced,
 )
+from snakewalk.controller.mapping.stereo_camera import read_calibration, read_pair
+from tests.oracles.ravine import write_positions
+from tests.oracles.textured_yard import Yard
 
 K = np.array([[200.0, 0.0, 119.5], [0.0, 200.0, 89.5], [0.0, 0.0, 1.0]])
 
@@ -91,7 +97,7 @@ def test_the_pose_survives_matches_that_are_wrong() -> None:
     seen = project(K, model.points_m[places[:, 1], places[:, 0]] @ turn.T + shift)
     seen[:40] += rng.uniform(20, 60, (40, 2))
     ones = np.ones(100)
-    pose = relative_pose(model, model, ScaleMatches(places.astype(float), seen, ones, ones))
+    pose = relative_pose(model, model, ScaleMatches(places.astype(float), seen, ones))
     assert pose.inliers.sum() == 60
     assert not pose.inliers[:40].any()
     first = np.eye(3, 4)
@@ -103,7 +109,7 @@ def test_the_pose_survives_matches_that_are_wrong() -> None:
     assert pose_error(off, first, second)[0] == pytest.approx(0.005)
     assert pose.back(pose.moved(model.points_m)) == pytest.approx(model.points_m)
     wrong = rng.uniform(0, 170, (60, 2))
-    few = ScaleMatches(places[:60].astype(float), wrong, ones[:60], ones[:60])
+    few = ScaleMatches(places[:60].astype(float), wrong, ones[:60])
     with pytest.raises(InputError, match="matches agree on a relative pose"):
         relative_pose(model, model, few)
 
@@ -132,9 +138,25 @@ def test_a_picture_that_repeats_itself_is_rejected_without_a_distance() -> None:
     repeated = LocalModel(model.points_m, image, K, 0.1)
     places = np.random.default_rng(4).integers([70, 10], [170, 170], (80, 2)).astype(float)
     seen = places + np.repeat([[0.0, 0.0], [60.0, 0.0]], 40, axis=0)
-    matches = ScaleMatches(places, seen, np.ones(80), np.ones(80))
+    matches = ScaleMatches(places, seen, np.ones(80))
     with pytest.raises(InputError, match="they agree on distances of 0"):
         best_start(repeated, repeated, matches)
     found = best_start(repeated, repeated, matches, distance_m=0.5)
     assert found is not None
     assert found[0][:, 3] == pytest.approx([0.6, 0.0, 0.0], abs=0.01)
+
+
+@pytest.mark.slow
+def test_matches_that_do_not_agree_make_no_second_distance(tmp_path: Path) -> None:
+    """Around 0.47 m four fifths as many points of this wall match, but half of them disagree."""
+    yard = Yard.quarry(52)
+    stations = yard.stations(2)
+    file = write_positions(tmp_path, yard, stations, yard.pairs(stations), yard.distortion)
+    calibration = read_calibration(tmp_path / "calib.json", CalibrationChoice(unit="m"))
+    models = []
+    for k in range(2):
+        left, right = (file.parent / f"{k}-{side}.png" for side in ("left", "right"))
+        models.append(LocalModel.of_pair(read_pair(calibration, left, right), 128))
+    motion, _ = estimated_motion(*models)
+    true_m = np.linalg.norm(stations[1].at_m - stations[0].at_m)
+    assert np.linalg.norm(motion[:, 3]) == pytest.approx(true_m, rel=0.01)
