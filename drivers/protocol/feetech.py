@@ -25,7 +25,6 @@ GROUP_BYTES = 8
 """Sync instruction without entries: header 2, ID, length, instruction, address, data length,
 checksum. A read of one servo is as long."""
 POSITION_MODE = 0
-TORQUE_ON = 1
 TORQUE_DAMPING = 2
 CALIBRATE_MIDDLE = 128
 """Torque Enable(40)."""

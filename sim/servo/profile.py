@@ -15,10 +15,9 @@ _READ = readonly_array(layout="C")
 _MASK = readonly_array("boolean")
 
 STEP = 0x00
-RECTANGULAR = 0x10
 TRIANGULAR = 0x20
 TRAPEZOIDAL = 0x30
-"""Moving Status(123), bits 4 and 5."""
+"""Moving Status(123), bits 4 and 5; 0x10 is a rectangular profile."""
 
 
 class Trajectory:
