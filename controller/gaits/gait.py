@@ -56,7 +56,7 @@ class Needs:
             if is_needed and not have:
                 raise InputError(
                     f"{what} needs {axis} joints; robot {robot.name} has none "
-                    f"(joint_axes {robot.joint_axes})"
+                    f"(joint_axes {robot.joint_axes}); choose another with --robot"
                 )
         if self.legs and len(robot.limbs) != 2:
             raise InputError(

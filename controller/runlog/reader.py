@@ -72,7 +72,7 @@ def read_log(
         with path.open("rb") as file:
             start = file.read(len(_MAGIC))
             if not start or not _MAGIC.startswith(start):  # a device without an end is not a log
-                raise LogError(f"{path}: is not an MCAP log")
+                raise LogError(f"{path}: is not an MCAP log; a run writes log.mcap")
             stream = file if file.seekable() else BytesIO(start + file.read())
             return _record(path, stream, is_snakewalk_log, on_progress)
     except OSError as error:

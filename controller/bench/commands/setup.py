@@ -31,7 +31,7 @@ def setup(
     Stop at any question; the same command goes on there.
     """
     if not sys.stdin.isatty():
-        raise InputError("setup: asks before each step, but a terminal is missing")
+        raise InputError("setup: asks before each step, but a terminal is missing; run it in one")
     guide = GuidedSetup(folder, port, _ask_person, run_command)
     guide.carry_on()
     files = guide.files
