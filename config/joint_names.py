@@ -25,7 +25,7 @@ def default_joint_names(axes: str, sides: Sequence[str]) -> tuple[str, ...]:
 
 
 def numbered_joint_names(count: int) -> tuple[str, ...]:
-    """Names of older versions; ``joint0`` is next to the head."""
+    """Names that a ROS graph may also use; ``joint0`` is next to the head."""
     return tuple(f"joint{k}" for k in range(count))
 
 

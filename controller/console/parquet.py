@@ -45,7 +45,6 @@ def table_to_parquet(table: Path, path: Path, kinds: Mapping[str, Kind]) -> int:
             convert_options=csv.ConvertOptions(
                 column_types=schema,
                 include_columns=list(kinds),
-                include_missing_columns=True,  # a table of an earlier version
                 null_values=[""],
                 strings_can_be_null=True,
             ),

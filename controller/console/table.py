@@ -13,12 +13,8 @@ from snakewalk.config.errors import InputError
 _NO_ROW: dict[str, str] = {}
 
 
-def read_csv_table(
-    path: Path, columns: Sequence[str], command: str, optional: Sequence[str] = ()
-) -> Iterator[dict[str, str]]:
+def read_csv_table(path: Path, columns: Sequence[str], command: str) -> Iterator[dict[str, str]]:
     """Yield the complete rows of a table that ``command`` wrote; drops a torn last line.
-
-    A column of ``optional`` that the table lacks is empty.
 
     Raises:
         InputError: the file is something else.
@@ -30,13 +26,11 @@ def read_csv_table(
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or 'is no text'}") from None
     complete_text = text[: text.rfind("\n") + 1]
     rows = csv.DictReader(io.StringIO(complete_text))
-    there = tuple(rows.fieldnames or ())
-    lacking = [column for column in optional if column not in there]
-    if not complete_text or there != tuple(column for column in columns if column not in lacking):
+    if not complete_text or tuple(rows.fieldnames or ()) != tuple(columns):
         raise InputError(
             f"{path}: is not a table of `snakewalk {command}` of this version; choose another file"
         )
-    return (row | dict.fromkeys(lacking, "") for row in rows)
+    return iter(rows)
 
 
 class CsvTable:
@@ -50,7 +44,6 @@ class CsvTable:
         place: Sequence[str],
         command: str,
         keeps_rows: bool = True,
-        optional: Sequence[str] = (),
     ) -> None:
         """Open or make the table; without ``keeps_rows`` only the places stay in memory.
 
@@ -62,10 +55,8 @@ class CsvTable:
         self._keeps_rows = keeps_rows
         self._held: dict[tuple[str, ...], dict[str, str]] = {}
         if path.exists() and path.stat().st_size:
-            for row in read_csv_table(path, columns, command, optional):
+            for row in read_csv_table(path, columns, command):
                 self._hold(row)
-            with path.open(newline="") as file:  # a table keeps the columns that it has
-                self._columns = tuple(next(csv.reader(file)))
 
     def __enter__(self) -> Self:
         """Cut off a torn last line and open for appending."""

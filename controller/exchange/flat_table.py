@@ -3,7 +3,7 @@
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats
-from snakewalk.config.joint_names import numbered_joint_names
-from snakewalk.config.robot import JointConfig
 from snakewalk.config.units import end_of
 from snakewalk.controller.runlog.column import ANY, JOINT, LINK, ROWS, Column, Table, release
 from snakewalk.controller.runlog.encode import encode
@@ -42,38 +40,20 @@ class FlatTable:
         return len(self.columns["time_s"])
 
 
-def flat_tables(record: RunRecord, *, joint_numbers: bool = False) -> list[FlatTable]:
-    """Return a table of each topic that has rows.
-
-    ``joint_numbers`` names joints as older versions did: ``joint0`` is next to the head, and the
-    column ``joints`` contains numbers.
-    """
-    robot = record.header.robot
-    joints = numbered_joint_names(robot.joint_count) if joint_numbers else robot.joint_names
-    marks = tuple(map(str, range(robot.joint_count))) if joint_numbers else joints
+def flat_tables(record: RunRecord) -> list[FlatTable]:
+    """Return a table of each topic that has rows."""
+    joints = record.header.robot.joint_names
     evidence = record.header.pose_evidence
     tables = [
         FlatTable(
             table.topic.table_name,
-            _columns(table, joints, marks)
+            _columns(table, joints)
             | (_evidence(evidence, len(table.time_s)) if isinstance(table, _OF_THE_POSE) else {}),
         )
         for table in record.tables()
         if len(table.time_s)
     ]
     return [_config(record.header), *(table for table in tables if table.row_count)]
-
-
-def with_joint_numbers(record: RunRecord) -> RunRecord:
-    """Return the record of a robot whose joints have the names of older versions."""
-    robot = record.header.robot
-    joints = robot.joints or (JointConfig(),) * robot.joint_count
-    names = numbered_joint_names(robot.joint_count)
-    named = tuple(
-        joint.model_copy(update={"name": name}) for joint, name in zip(joints, names, strict=True)
-    )
-    header = replace(record.header, robot=robot.model_copy(update={"joints": named}))
-    return replace(record, header=header)
 
 
 def write_csv(table: FlatTable, path: Path) -> int:
@@ -103,15 +83,15 @@ def write_parquet(table: FlatTable, path: Path) -> int:
     return table.row_count
 
 
-def _columns(table: Table, joints: Sequence[str], marks: Sequence[str]) -> dict[str, Cells]:
-    """Columns of a table; ``marks`` are the joints' names in a list of joints."""
+def _columns(table: Table, joints: Sequence[str]) -> dict[str, Cells]:
+    """Columns of a table of a robot with these joints."""
     cells: dict[str, Cells] = {}
     for name, column in table.topic.columns.items():
         values = getattr(table, name)
         if column.kind == "points":
             cells = _points(cells, values, 3 if column.shape[1] == ANY else 2)
         elif column.kind == "joints":
-            cells[name] = [" ".join(marks[k] for k in indices) for indices in values]
+            cells[name] = [" ".join(joints[k] for k in indices) for indices in values]
         elif column.shape:
             flat = values.reshape(len(values), -1)
             names = cell_names(name, column, flat.shape[1], joints)

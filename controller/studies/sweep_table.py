@@ -22,8 +22,6 @@ _MEASURED_COLUMNS = tuple(field.name for field in fields(Measurement))
 _PARAMETERS = tuple(sorted({key for gait in GAITS.values() for key in gait.model.model_fields}))
 COLUMNS = (*_PLACE, *_MEASURED_COLUMNS, *_PARAMETERS)
 """A cell is empty if the gait lacks the parameter, or the value is unknown."""
-_ADDED_COLUMNS = ("backend",)
-"""Columns that tables of earlier versions lack; their new rows lack them, too."""
 _TEXT = ("gait", "robot", "world", "keys", "ended", "pose_evidence", "pose_source", "backend")
 _INTEGER = ("number", "seed", "cycles")
 _TRUTH = tuple(
@@ -58,7 +56,7 @@ def read_table(path: Path) -> list[dict[str, str]]:
 
 def table_rows(path: Path) -> Iterator[dict[str, str]]:
     """Yield the complete rows of a table; otherwise as ``read_table``."""
-    return read_csv_table(path, COLUMNS, "sweep", _ADDED_COLUMNS)
+    return read_csv_table(path, COLUMNS, "sweep")
 
 
 class SweepTable(CsvTable):
@@ -77,7 +75,6 @@ class SweepTable(CsvTable):
             place=_PLACE,
             command="gait sweep",
             keeps_rows=False,
-            optional=_ADDED_COLUMNS,
         )
 
     def missing(self, points: list[Point]) -> list[Point]:

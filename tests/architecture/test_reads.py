@@ -20,7 +20,6 @@ OPENINGS: Final = {
     "controller/capture/review.py": "reads the package's own page",
     "controller/cli/main.py": "opens the null device",
     "controller/console/command.py": "reads the package's own source",
-    "controller/console/table.py": "reads the first line of a table that it has read with a limit",
     "controller/mapping/geo_raster.py": "asks the system for a fault; GDAL reads blocks",
     "controller/report/page.py": "reads a film that the run has just written",
     "controller/runlog/reader.py": "reads a log row by row",

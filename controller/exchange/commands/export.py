@@ -16,7 +16,6 @@ from snakewalk.controller.console.options import Force, Json, RunLog, console
 from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
 from snakewalk.controller.exchange.flat_table import (
     flat_tables,
-    with_joint_numbers,
     write_csv,
     write_parquet,
 )
@@ -31,7 +30,6 @@ from snakewalk.controller.runlog.column import registered_tables
         "log export runs/flat-square-walk-seed0/log.mcap --csv tables",
         "log export runs/flat-square-walk-seed0/log.mcap --parquet tables --foxglove body.mcap",
         "log export runs/flat-square-walk-seed0/log.mcap --ros2 bag.mcap --json",
-        "log export runs/flat-square-walk-seed0/log.mcap --csv tables --joint-numbers",
     ),
 )
 def export(
@@ -56,9 +54,6 @@ def export(
             dir_okay=False, help="write a file for Foxglove in 3-D, FILE.mcap", metavar="FILE"
         ),
     ] = None,
-    joint_numbers: Annotated[
-        bool, typer.Option("--joint-numbers", help="name joints by number, as older versions did")
-    ] = False,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -68,16 +63,15 @@ def export(
     results = {file for folder, ending, _ in tables_in for file in _tables(folder, ending)}
     refuse_to_overwrite([*sorted(results), ros2, foxglove], force)
     record = open_log(log)
-    tables = flat_tables(record, joint_numbers=joint_numbers)
-    named = with_joint_numbers(record) if joint_numbers else record
+    tables = flat_tables(record)
     writers: dict[Path, Callable[[Path], int | dict[str, int]]] = {}
     for folder, ending, write in tables_in:
         if folder is not None:
             writers |= {folder / f"{t.name}.{ending}": partial(write, t) for t in tables}
     if ros2 is not None:
-        writers[ros2] = partial(write_ros_bag, named)
+        writers[ros2] = partial(write_ros_bag, record)
     if foxglove is not None:
-        writers[foxglove] = partial(write_foxglove_scene, named)
+        writers[foxglove] = partial(write_foxglove_scene, record)
     written: dict[str, int | dict[str, int]] = {}
     for file, write_to in writers.items():
         with atomic_write(file) as part:

@@ -9,8 +9,6 @@ from typer.testing import CliRunner
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.cli.command_line import app
-from snakewalk.controller.exchange.flat_table import with_joint_numbers
-from snakewalk.controller.runlog.record import RunRecord
 
 
 def run(*words: str | Path) -> str:
@@ -71,20 +69,9 @@ def test_a_log_that_is_none(tmp_path: Path) -> None:
     assert not (tmp_path / "t").exists()
 
 
-def test_joint_numbers_are_the_columns_of_before(log: Path, tmp_path: Path) -> None:
-    now, before = tmp_path / "now", tmp_path / "before"
-    run(log, "--csv", now)
-    run(log, "--csv", before, "--joint-numbers")
-    names = (now / "slow.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
-    numbers = (before / "slow.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+def test_columns_have_the_names_of_the_joints(log: Path, tmp_path: Path) -> None:
+    run(log, "--csv", tmp_path / "now")
+    names = (tmp_path / "now/slow.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
     assert names[:3] == ["time_s", "temperature_yaw_01_c", "temperature_pitch_02_c"]
-    assert numbers[:3] == ["time_s", "temperature_joint0_c", "temperature_joint1_c"]
-    for folder, joints in ((now, "yaw_03 yaw_05"), (before, "2 4")):
-        with (folder / "cycle.csv").open(encoding="utf-8", newline="") as file:
-            assert [row["joints"] for row in csv.DictReader(file)][2:5] == ["", joints, ""]
-
-
-def test_joint_numbers_are_the_names_in_a_bag_of_before(record: RunRecord) -> None:
-    robot = with_joint_numbers(record).header.robot
-    assert robot.joint_names == tuple(f"joint{k}" for k in range(16))
-    assert robot.servo_ids == record.header.robot.servo_ids
+    with (tmp_path / "now/cycle.csv").open(encoding="utf-8", newline="") as file:
+        assert [row["joints"] for row in csv.DictReader(file)][2:5] == ["", "yaw_03 yaw_05", ""]

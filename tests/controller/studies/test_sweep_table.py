@@ -155,21 +155,3 @@ def test_a_table_of_finished_points_keeps_no_rows(tmp_path: Path) -> None:
     again = SweepTable(path)
     assert again.missing(POINTS) == POINTS[1:]
     assert again.held(POINTS[0].key) == {}
-
-
-def test_a_table_without_the_backend_column_is_continued(tmp_path: Path) -> None:
-    path = tmp_path / "sweep.csv"
-    with SweepTable(path) as table:
-        table.add(POINTS[0], row(0.1, backend="warp:cpu"))
-    assert [one["backend"] for one in read_table(path)] == ["warp:cpu"]
-    lines = [line.split(",") for line in path.read_text().splitlines()]
-    at = COLUMNS.index("backend")
-    path.write_text("".join(",".join(each[:at] + each[at + 1 :]) + "\n" for each in lines))
-    with SweepTable(path) as table:
-        assert table.missing(POINTS) == POINTS[1:]
-        table.add(POINTS[1], row(0.2, backend="compiled"))
-    rows = read_table(path)
-    pytest.importorskip("pyarrow")
-    assert table_to_parquet(path, tmp_path / "sweep.parquet", KINDS) == 2
-    assert [one["backend"] for one in rows] == ["", ""]
-    assert [one["forward_bl_cycle"] for one in rows] == ["0.1", "0.2"]
