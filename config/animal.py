@@ -13,6 +13,10 @@ Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
 Channel = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
+FeetPath = Literal["footfall", "gc-printed"]
+"""Path of the feet of an animal with legs."""
+
+
 class SectionConfig(Strict):
     """An ellipse across the body; lengths over the body's."""
 
@@ -221,7 +225,7 @@ class AnimalConfig(Strict):
     )
     cycle_s: float = Field(gt=0.02, le=20.0, description="duration of a cycle")
     leg_pairs: tuple[LegPairConfig, LegPairConfig] = Field(description="front, then hind")
-    feet: Literal["footfall", "gc-printed"] = Field(
+    feet: FeetPath = Field(
         "footfall",
         description="paths of the feet: footfall (ours) stands still on the ground; gc-printed is "
         "[GC] Eq. 9-10 as printed, with one height for left and right",

@@ -1,9 +1,8 @@
 """The printed board of a calibration: a chessboard, or a ChArUco board that may be cut off."""
 
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -18,26 +17,8 @@ _MOST_SQUARES = 20
 _INCH_M = 0.0254
 
 
-class BoardPattern(StrEnum):
-    """Pattern to print."""
-
-    CHARUCO = "charuco"
-    CHESSBOARD = "chessboard"
-
-
-def read_pattern(text: str) -> BoardPattern:
-    """Return a pattern by name.
-
-    Raises:
-        InputError: the pattern is unknown.
-
-    """
-    try:
-        return BoardPattern(text)
-    except ValueError:
-        raise InputError(
-            f"--pattern {text}: is unknown; use one of {', '.join(BoardPattern)}"
-        ) from None
+BoardPattern = Literal["charuco", "chessboard"]
+"""Pattern to print."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +40,7 @@ class CalibrationBoard:
 
     """
 
-    pattern: BoardPattern = BoardPattern.CHARUCO
+    pattern: BoardPattern
     squares: tuple[int, int] = (7, 5)
     """Squares across and down; a chessboard has one inner corner fewer in each direction."""
     square_m: float = 0.036
@@ -92,7 +73,7 @@ class CalibrationBoard:
         """(H, W) the printed board without a margin."""
         side = max(8, round(self.square_m / _INCH_M * dots_per_inch))
         across, down = self.squares
-        if self.pattern is BoardPattern.CHARUCO:
+        if self.pattern == "charuco":
             drawn = self._charuco.generateImage((across * side, down * side), None, 0, 1)
             return np.asarray(drawn, dtype=np.uint8)
         x, y = np.meshgrid(np.arange(across * side) // side, np.arange(down * side) // side)
@@ -102,7 +83,7 @@ class CalibrationBoard:
         """Find the corners in a picture (H, W[, 3]); None if there are too few."""
         grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
         places = np.asarray(self._charuco.getChessboardCorners(), dtype=float)[:, :2]
-        if self.pattern is BoardPattern.CHARUCO:
+        if self.pattern == "charuco":
             corners, ids, _, _ = self._detector.detectBoard(grey)
             if ids is None:
                 return None

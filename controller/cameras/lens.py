@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from snakewalk.config.archive import why_no_file
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
+from snakewalk.controller.console.result_files import check_ending
 from snakewalk.controller.images.calibration_storage import read_storage
 
 _MATRICES = "camera_matrix", "distortion_coefficients"
-_ENDINGS = (".yml", ".yaml", ".xml", ".json")
+ENDINGS = (".yml", ".yaml", ".xml", ".json")
 _COEFFICIENTS = (4, 5, 8, 12, 14)
 _STEPS = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-9)
 
@@ -65,8 +66,7 @@ class Lens:
             InputError: it does not exist, is of another kind, or does not describe a lens.
 
         """
-        if file.suffix.lower() not in _ENDINGS:
-            raise InputError(f"{file}: the file of a lens ends in {', '.join(_ENDINGS)}")
+        check_ending(file, "the file of a lens", *ENDINGS)
         if not file.is_file():
             raise InputError(why_no_file(file))
         size, matrices = _stored_matrices(file)

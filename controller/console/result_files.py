@@ -203,6 +203,17 @@ def run_files(folder: Path) -> list[Path]:
     return [file for name in (*RUN_FILES, f"{_PARTS}*") for file in folder.glob(name)]
 
 
+def check_ending(path: Path | None, what: str, *endings: str) -> None:
+    """Reject a file of ``what`` with another ending; None is ignored.
+
+    Raises:
+        InputError: the ending is none of these.
+
+    """
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{path}: {what} ends in {', '.join(endings)}")
+
+
 def check_picture(path: Path | None) -> None:
     """Reject a file that cannot be drawn; None is ignored.
 
@@ -210,11 +221,9 @@ def check_picture(path: Path | None) -> None:
         InputError: the ending is not a picture's, or matplotlib is not installed.
 
     """
-    if path is None:
-        return
-    if path.suffix.lower() not in PICTURE_ENDINGS:
-        raise InputError(f"{path}: a picture ends in {', '.join(PICTURE_ENDINGS)}")
-    require_extra("pictures need", "matplotlib")
+    check_ending(path, "a picture", *PICTURE_ENDINGS)
+    if path is not None:
+        require_extra("pictures need", "matplotlib")
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from typing import get_args
 
 import pytest
 from pydantic import BaseModel
@@ -9,7 +10,7 @@ from pydantic import BaseModel
 from snakewalk.config.document import json_schema
 from snakewalk.config.loader import checked, load_robot, load_run, load_world, shipped
 from snakewalk.config.template import template
-from snakewalk.controller.run.commands.schema import KINDS, models
+from snakewalk.controller.run.commands.schema import SchemaName, models
 
 SHIPPED = [
     *(load_run(name) for name in shipped("runs")),
@@ -44,10 +45,10 @@ def test_a_template_shows_every_key_with_its_meaning() -> None:
 
 
 def test_every_file_has_a_schema() -> None:
-    assert tuple(models()) == KINDS
+    assert tuple(models()) == get_args(SchemaName)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", get_args(SchemaName))
 def test_a_schema_refuses_unknown_keys_in_every_table_and_has_all_keys(kind: str) -> None:
     described = json_schema(kind, models()[kind])
     assert set(described["properties"]) == set(models()[kind].model_fields)

@@ -36,6 +36,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
     refuse_to_overwrite,
 )
@@ -244,8 +245,7 @@ class _ResultFiles:
         if animate is None:
             files = self._write(skin.mesh, body.texture)
         else:
-            if self.output.suffix.lower() != ".glb":
-                raise InputError(f"{self.output}: a skin that moves is written as .glb")
+            check_ending(self.output, "a skin that moves", ".glb")
             skin, motion = animated(skin, animate, fps)
             with atomic_write(self.output) as part:
                 write_skin(

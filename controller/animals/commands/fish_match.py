@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
+from snakewalk.controller.animals.commands.fish_options import Picture
 from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.accuracy import compare
 from snakewalk.controller.animals.fish.film_options import BUILD, Build
@@ -17,6 +17,7 @@ from snakewalk.controller.console.options import FilmRate, Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
 )
 
@@ -67,7 +68,7 @@ def match(
 ) -> None:
     """Fit a deformable fish to every frame: head, spine angles, and from the side its pitch."""
     check_picture(picture)
-    check_npz(output)
+    check_ending(output, "the result", ".npz")
     if length is not None and not 0.0 < length < 1e3:
         raise InputError(f"--length: a body length in metres, above 0; not {length:g}")
     true_postures = None if truth is None else load_postures(truth)

@@ -5,12 +5,4 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.errors import InputError
-
 Picture = Annotated[Path | None, typer.Option(help="draw the result here (.png, .svg, .pdf)")]
-
-
-def check_npz(path: Path) -> None:
-    """Reject a result file whose name does not end in .npz."""
-    if path.suffix.lower() != ".npz":
-        raise InputError(f"{path}: the result is an .npz; change the ending")

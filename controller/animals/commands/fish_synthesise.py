@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.controller.animals.commands.fish_options import Picture, check_npz
+from snakewalk.controller.animals.commands.fish_options import Picture
 from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.fish.fish_synthesis import SynthesisFacts, synthesise_motion
 from snakewalk.controller.animals.fish.postures import load_postures
@@ -16,6 +16,7 @@ from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
 )
 
@@ -41,7 +42,7 @@ def synthesise(
 ) -> None:
     """Join segments of a film in a new order, at random or through control points."""
     check_picture(picture)
-    check_npz(output)
+    check_ending(output, "the result", ".npz")
     with ProgressBar("search", transient=True) as bar:
         motion = synthesise_motion(load_postures(postures), options, bar.update)
     with atomic_write(output) as part:

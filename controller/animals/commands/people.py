@@ -8,7 +8,6 @@ import numpy as np
 import typer
 
 from snakewalk.config.arrays import Image
-from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.controller.animals.commands.pictures import pictures
 from snakewalk.controller.animals.mesh.rig import Rig, posed_m
@@ -21,15 +20,15 @@ from snakewalk.controller.animals.people.cycle import (
     animate,
     scaled,
 )
-from snakewalk.controller.animals.people.feet_law import MOTIONS, FeetLaw
+from snakewalk.controller.animals.people.feet_law import FeetLaw, MotionName
 from snakewalk.controller.animals.people.surface import Person
 from snakewalk.controller.animals.people.worn_mesh import worn_mesh
-from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
     refuse_to_overwrite,
 )
@@ -45,9 +44,7 @@ from snakewalk.controller.images.mesh_files import read_mesh
     ),
 )
 def people(
-    motion: Annotated[
-        str, typer.Argument(help="walk or run", autocompletion=completion.words(*MOTIONS))
-    ] = "walk",
+    motion: Annotated[MotionName, typer.Argument(help="walk or run")] = "walk",
     output: Annotated[
         Path, typer.Option("-o", "--output", help="write one looping cycle here (.glb)")
     ] = Path("person.glb"),
@@ -93,8 +90,6 @@ def people(
     as_json: Json = False,
 ) -> None:
     """Animate a person who walks or runs: PDE skin, feet by [GC] Eq. 9 and 10."""
-    if motion not in GAITS:
-        raise InputError(f"{motion}: no such motion of people; choose from {', '.join(GAITS)}")
     _check(output, film, picture, force)
     gait = scaled(GAITS[motion], step_height, step_length, cycle)
     person = Person.of(stature, girth)
@@ -138,13 +133,10 @@ def _facts(person: Person, gait: PersonGait, motion: PersonMotion, rig: Rig) -> 
 
 def _check(output: Path, film: Path | None, picture: Path | None, force: bool) -> None:
     """Check the results' names before any work."""
-    if output.suffix.lower() != ".glb":
-        raise InputError(f"{output}: a person who moves is written as .glb; change the ending")
-    if film is not None and film.suffix.lower() != ".mp4":
-        raise InputError(f"{film}: a film ends in .mp4; change the ending")
-    refuse_to_overwrite([output, *(path for path in (film, picture) if path is not None)], force)
-    if picture is not None:
-        check_picture(picture)
+    check_ending(output, "a person who moves", ".glb")
+    check_ending(film, "a film", ".mp4")
+    refuse_to_overwrite([output, film, picture], force)
+    check_picture(picture)
     if film is not None or picture is not None:
         require_extra("films and pictures of people need", "mujoco", "av")
 

@@ -7,7 +7,7 @@ import typer
 
 from snakewalk.config.reading import texts
 from snakewalk.controller.animals.legged.animal_stride import Names, measure_animal
-from snakewalk.controller.animals.legged.views import VIEWS
+from snakewalk.controller.animals.legged.views import View
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import (
@@ -57,11 +57,7 @@ def stride(
         float | None, typer.Option(help="length of the spine in metres; default: the file's scale")
     ] = None,
     view: Annotated[
-        str,
-        typer.Option(
-            help="view of the camera: above; or side, on level ground",
-            autocompletion=completion.words(*VIEWS),
-        ),
+        View, typer.Option(help="view of the camera: above; or side, on level ground")
     ] = "above",
     picture: Annotated[
         Path | None, typer.Option(help="draw the fit of each foot here (.png, .svg, .pdf)")

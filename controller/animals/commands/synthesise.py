@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from snakewalk.config.animal import FeetPath
 from snakewalk.config.errors import InputError
 from snakewalk.config.key_types import Seed
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal, synthesise_animal
@@ -42,7 +43,6 @@ _END = (
     "--frames %s: the motion ends after %s frames, where the head leaves the ground of %s; "
     "ask for fewer frames, or add waypoints"
 )
-FEET = ("footfall", "gc-printed")
 """Paths of the feet of an animal with legs."""
 _MOTIONS = ("walk", "walk-printed", "kp")
 _ENDINGS = {"track": ".npz", "picture": ".png", "film": ".mp4", "skin": ".glb"}
@@ -67,11 +67,10 @@ Animal = Annotated[
     ),
 ]
 Feet = Annotated[
-    str | None,
+    FeetPath | None,
     typer.Option(
         help="feet of --animal: footfall (ours), or gc-printed, [GC] Eq. 9-10 as printed; "
-        "default: of the animal's file",
-        autocompletion=completion.words(*FEET),
+        "default: of the animal's file"
     ),
 ]
 TongueFile = Annotated[
@@ -207,15 +206,13 @@ def _with_legs(
     prepared: WalkRun,
     frames: int | None,
     name: str,
-    feet: str | None,
+    feet: FeetPath | None,
     files: Mapping[str, Path],
     marks: bool,
 ) -> tuple[dict[str, object], bool]:
     """Synthesise an animal with legs; facts of it, and whether it reached its last waypoint."""
     config = read_animal(name)
     if feet is not None:
-        if feet not in FEET:
-            raise InputError(f"--feet {feet}: choose {' or '.join(FEET)}")
         config = config.model_copy(update={"feet": feet})
     body = None
     if "skin" in files or "film" in files:

@@ -1,6 +1,6 @@
 """Options of a film of a fish, on the command line and in Python."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from pydantic import Field
@@ -9,14 +9,14 @@ from snakewalk.config.base import Strict
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.option import Flag
 
+FishBuild = Literal["carp", "eel"]
 Build = Annotated[
-    str,
-    typer.Option(
-        help="model of the body: carp (A0..A3 behind a rigid head) or eel (8 angles)",
-        autocompletion=completion.words("carp", "eel"),
-    ),
+    FishBuild,
+    typer.Option(help="model of the body: carp (A0..A3 behind a rigid head) or eel (8 angles)"),
 ]
-BUILD = "carp"
+
+
+BUILD: FishBuild = "carp"
 
 
 class FishFilmOptions(Strict):

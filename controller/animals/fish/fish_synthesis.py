@@ -189,8 +189,6 @@ def _segments(source: Postures, options: SynthesisOptions) -> list[MotionSegment
         reference = commonest_posture(source.angles_rad, within)
         if options.mirror:
             raise InputError("--mirror needs the straight reference: a bent one has no mirror end")
-    elif options.reference != "straight":
-        raise InputError(f"--reference {options.reference}: choose straight or commonest")
     segmentation = Segmentation(within_rad=within, merge_rad=math.radians(options.merge_deg))
     return segment_motion(source, segmentation, reference)
 

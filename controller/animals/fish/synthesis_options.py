@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -80,7 +80,7 @@ class SynthesisOptions(Strict):
     merge_deg: Annotated[float, Flag(("--merge",))] = Field(
         20.0, ge=0.0, description="merge tail beats that differ by fewer degrees than this"
     )
-    reference: str = Field(
+    reference: Literal["straight", "commonest"] = Field(
         "straight", description="basic posture: straight, or the commonest of the film"
     )
     blend_s: Annotated[float, Flag(("--blend",))] = Field(

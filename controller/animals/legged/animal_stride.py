@@ -12,7 +12,7 @@ from snakewalk.config.template import template
 from snakewalk.controller.animals.legged.animal_synthesis import read_animal
 from snakewalk.controller.animals.legged.prototype import LEGS
 from snakewalk.controller.animals.legged.stride import Foot, Stride, measure_stride
-from snakewalk.controller.animals.legged.views import VIEWS
+from snakewalk.controller.animals.legged.views import View
 from snakewalk.controller.console.rounding import rounded
 from snakewalk.controller.track.readers.keypoints import KEYPOINT_RATE_HZ, Keypoints
 
@@ -100,7 +100,7 @@ def measure_animal(
     like: str,
     name: str,
     length_m: float | None,
-    view: str,
+    view: View,
 ) -> MeasuredAnimal:
     """Measure the stride of a tracked animal.
 
@@ -113,11 +113,9 @@ def measure_animal(
         view: above or side.
 
     Raises:
-        InputError: no such keypoint or view, or no stride can be measured.
+        InputError: no such keypoint, or no stride can be measured.
 
     """
-    if view not in VIEWS:
-        raise InputError(f"--view {view}: choose {' or '.join(VIEWS)}")
     other = read_animal(like)
     if length_m is not None and not (np.isfinite(length_m) and length_m > 0.0):
         raise InputError(f"--length-m {length_m:g}: must be a positive number of metres")

@@ -19,6 +19,7 @@ from snakewalk.controller.animals.legged.contact_fit import (
     step,
 )
 from snakewalk.controller.animals.legged.prototype import spine_shares
+from snakewalk.controller.animals.legged.views import View
 from snakewalk.controller.gaits.footfall import lift
 from snakewalk.controller.gaits.wave import TURN
 
@@ -107,7 +108,7 @@ class Stride:
 
 
 def measure_stride(
-    spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float, view: str
+    spine: Floats, feet: Floats, girdles: tuple[int, int], rate_hz: float, view: View
 ) -> Stride:
     """Measure the stride of an animal seen from above, or from its side on level ground.
 

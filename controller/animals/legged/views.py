@@ -1,3 +1,5 @@
 """Views of the camera in which keypoints of an animal with legs are tracked."""
 
-VIEWS = ("above", "side")
+from typing import Literal
+
+View = Literal["above", "side"]

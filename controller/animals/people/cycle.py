@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.legged.leg import triangle_m
-from snakewalk.controller.animals.people.feet_law import MOTIONS, FeetLaw
+from snakewalk.controller.animals.people.feet_law import FeetLaw, MotionName
 from snakewalk.controller.animals.people.skeleton import (
     ABDUCTION_RAD,
     BALL,
@@ -155,7 +155,7 @@ RUN = PersonGait(
            (0.66, -70.0), (0.82, -12.0), (0.93, 6.0)),
 )  # fmt: skip
 """A run at 3 m/s: 35 % of a cycle on the ground."""
-GAITS = dict(zip(MOTIONS, (WALK, RUN), strict=True))
+GAITS: dict[MotionName, PersonGait] = {"walk": WALK, "run": RUN}
 
 
 @dataclass(frozen=True, slots=True)

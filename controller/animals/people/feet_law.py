@@ -1,8 +1,9 @@
 """Names of the motions of people, and of the equations of their feet."""
 
 from enum import StrEnum
+from typing import Literal
 
-MOTIONS = ("walk", "run")
+MotionName = Literal["walk", "run"]
 
 
 class FeetLaw(StrEnum):

@@ -14,7 +14,7 @@ from snakewalk.controller.bench.port_lines import open_lines
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.messages import LOGGER
 from snakewalk.controller.console.options import ChainPort, Force, Json, console, print_table
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import check_ending, write_result
 
 
 @command(
@@ -39,8 +39,7 @@ def bus_identify(
     as_json: Json = False,
 ) -> None:
     """List the servos on the wire: models, IDs, firmware, faults; suggest a robot file."""
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: a robot's file ends in .toml")
+    check_ending(out, "a robot's file", ".toml")
     if not axes or set(axes) - {"y", "p"}:
         raise InputError(f"--axes {axes}: expected the letters y and p, e.g. yp")
     scan.check_bauds(baud or ())

@@ -22,7 +22,11 @@ from snakewalk.controller.bench.scan import pick_port
 from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Port, console, show
-from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
+from snakewalk.controller.console.result_files import (
+    check_ending,
+    refuse_to_overwrite,
+    write_result,
+)
 from snakewalk.drivers.bus.dynamixel_bus import DynamixelBus
 from snakewalk.drivers.bus.feetech_bus import servo_bus
 from snakewalk.drivers.port.network_port import open_port
@@ -135,8 +139,7 @@ def _check_robot(like: RobotConfig) -> None:
 
 
 def _check_options(out: Path, current: float, *, homing_offset: bool, yes: bool) -> None:
-    if out.suffix != ".toml":
-        raise InputError(f"{out}: a robot's file ends in .toml")
+    check_ending(out, "a robot's file", ".toml")
     if not 0.0 < current <= 2.0:
         raise InputError(f"--current {current:g}: over 0 and at most 2 A")
     if homing_offset and not yes and not sys.stdin.isatty():

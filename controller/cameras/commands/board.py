@@ -1,7 +1,7 @@
 """``snakewalk pose board``: the board of a calibration, to print."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from PIL import Image as Pictures
@@ -9,18 +9,20 @@ from PIL import ImageOps
 
 from snakewalk.config.arrays import Image
 from snakewalk.config.errors import InputError
-from snakewalk.controller.cameras.calibration_board import CalibrationBoard, read_pattern
+from snakewalk.controller.cameras.calibration_board import CalibrationBoard
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import atomic_write, check_ending
 
 Pattern = Annotated[
-    str, typer.Option(help="pattern: charuco, which may be seen in part, or chessboard")
+    Literal["charuco", "chessboard"],
+    typer.Option(help="pattern: charuco, which may be seen in part, or chessboard"),
 ]
 Squares = Annotated[
     str, typer.Option(help="number of squares across and down, for both patterns", metavar="NxM")
 ]
 SquareMm = Annotated[float, typer.Option(help="side of a square in mm, as measured on the print")]
+PRINTS = (".pdf", ".png")
 DOTS = 300.0
 """Resolution of the print, dots per inch."""
 
@@ -54,24 +56,11 @@ def board(
     as_json: Json = False,
 ) -> None:
     """Draw the board for `pose lens`; print it without scaling, and glue it to a plate."""
-    calibration_board = CalibrationBoard(
-        read_pattern(pattern), read_squares(squares), 0.001 * square
-    )
-    check_print(out)
+    calibration_board = CalibrationBoard(pattern, read_squares(squares), 0.001 * square)
+    check_ending(out, "a print", *PRINTS)
     write_print(out, [calibration_board.picture(DOTS)])
     width, height = (round(1000.0 * side, 1) for side in calibration_board.size_m)
     show({"board": str(out), "width_mm": width, "height_mm": height, "square_mm": square}, as_json)
-
-
-def check_print(out: Path) -> None:
-    """Reject files that cannot be printed.
-
-    Raises:
-        InputError: it is neither a .pdf nor a .png.
-
-    """
-    if out.suffix.lower() not in (".pdf", ".png"):
-        raise InputError(f"{out}: the ending must be .pdf or .png")
 
 
 def write_print(out: Path, pages: list[Image]) -> None:

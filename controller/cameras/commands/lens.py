@@ -13,7 +13,6 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.cameras.calibration_board import (
     BoardView,
     CalibrationBoard,
-    read_pattern,
 )
 from snakewalk.controller.cameras.commands.board import (
     Pattern,
@@ -22,14 +21,14 @@ from snakewalk.controller.cameras.commands.board import (
     read_squares,
 )
 from snakewalk.controller.cameras.device_camera import open_device
+from snakewalk.controller.cameras.lens import ENDINGS
 from snakewalk.controller.cameras.lens_calibration import calibrate_lens
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
-from snakewalk.controller.console.result_files import atomic_write
+from snakewalk.controller.console.result_files import atomic_write, check_ending
 from snakewalk.controller.images.video import open_footage
 from snakewalk.drivers.clock import WallClock
 
-_ENDINGS = (".yml", ".yaml", ".xml", ".json")
 _PAUSE_S = 0.7
 """Time between pictures of a device, in which a user moves the board."""
 
@@ -64,9 +63,8 @@ def calibrate_camera(
     Hold the board at 15 places or more, also in the corners of the picture, tilted by up to 45
     degrees.
     """
-    if out.suffix.lower() not in _ENDINGS:
-        raise InputError(f"{out}: the file of a lens ends in {', '.join(_ENDINGS)}")
-    board = CalibrationBoard(read_pattern(pattern), read_squares(squares), 0.001 * square)
+    check_ending(out, "the file of a lens", *ENDINGS)
+    board = CalibrationBoard(pattern, read_squares(squares), 0.001 * square)
     if source.isdigit():
         board_views, size_px = _from_device(source, size, board, views)
     else:

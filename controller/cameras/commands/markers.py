@@ -6,10 +6,11 @@ from typing import Annotated
 import typer
 
 from snakewalk.config.errors import InputError
-from snakewalk.controller.cameras.commands.board import DOTS, check_print, write_print
+from snakewalk.controller.cameras.commands.board import DOTS, PRINTS, write_print
 from snakewalk.controller.cameras.markers.floor_markers import COUNT, marker_sheet
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, show
+from snakewalk.controller.console.result_files import check_ending
 
 
 @command(
@@ -34,7 +35,7 @@ def markers(
     Lay four or more flat on the floor, as far apart as the picture allows. The table
     `camera.markers_m` of a run contains their positions.
     """
-    check_print(out)
+    check_ending(out, "a print", *PRINTS)
     if out.suffix.lower() == ".png" and count > 1:
         raise InputError(f"{out}: a .png holds one marker: --count 1, or a .pdf")
     if first + count > COUNT:

@@ -5,12 +5,11 @@ from typing import Annotated
 
 import typer
 
-from snakewalk.config.errors import InputError
 from snakewalk.config.reading import texts
 from snakewalk.config.template import plain_toml
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, console, show
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import check_ending, write_result
 from snakewalk.controller.exchange.robot_import import robot_import
 from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 
@@ -35,8 +34,7 @@ def import_robot(
     choice: RobotChoice,
 ) -> None:
     """Make a robot's file from a URDF, SDF or MuJoCo model; report dropped and changed parts."""
-    if out.suffix != ".toml":
-        raise InputError(f"{out}: a robot's file ends in .toml")
+    check_ending(out, "a robot's file", ".toml")
     imported = robot_import.import_robot(file, out.stem, servo, choice)
     joints = ", ".join(imported.joint_names)
     comment = [f"From {file.name} by snakewalk robot import. Joints from the head: {joints}."]

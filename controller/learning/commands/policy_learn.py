@@ -13,7 +13,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.interrupted_progress import read_progress
 from snakewalk.controller.console.options import Force, GivenRobot, GivenWorld, Workers, console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import check_ending, write_result
 from snakewalk.controller.learning.wave_search import (
     SearchProgress,
     search_progress,
@@ -54,8 +54,7 @@ def learn_policy(
     Each generation is saved at once in OUT.part. --resume continues from there, with the same
     result as without the interruption.
     """
-    if out.suffix != ".toml":
-        raise InputError(f"{out}: a policy's file ends in .toml")
+    check_ending(out, "a policy's file", ".toml")
     part_file = out.with_name(f"{out.name}.part")
     progress = search_progress(
         robot=robot, world=world, population=population, steps=steps, seed=seed

@@ -14,6 +14,7 @@ from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force, Json, Robot, show
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
 )
 from snakewalk.controller.gaits.backbone import fit_backbone
@@ -43,8 +44,7 @@ def fit_gait(
 ) -> None:
     """Fit the robot to a curve in space: joint angles, and distance of the joints from it."""
     check_picture(picture)
-    if output is not None and output.suffix.lower() != ".npz":
-        raise InputError(f"{output}: joint angles go to a file that ends in .npz")
+    check_ending(output, "a file of joint angles", ".npz")
     body = load_robot(robot or "alternating16")
     points_m = _read(curve)
     try:

@@ -2,13 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from snakewalk.config.document import SCHEMAS, json_schema
-from snakewalk.config.errors import InputError
-from snakewalk.controller.console import completion
 from snakewalk.controller.console.command import command
 from snakewalk.controller.console.options import Force
 from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 
-KINDS = (
+SchemaName = Literal[
     "run",
     "robot",
     "world",
@@ -31,25 +29,17 @@ KINDS = (
     "faults",
     "servo",
     "policy",
-)
+]
 """Names of the schemas in ``models``, known before they are built."""
 
 
 @command("tools schema", examples=("tools schema run", "tools schema robot -o robot.json"))
 def schema(
-    kind: Annotated[
-        str,
-        typer.Argument(
-            help=f"kind of file: {', '.join(KINDS[:-1])} or {KINDS[-1]}",
-            autocompletion=completion.words(*KINDS),
-        ),
-    ],
+    kind: Annotated[SchemaName, typer.Argument(help="kind of file")],
     out: Annotated[Path | None, typer.Option("-o", "--out", help="write the schema here")] = None,
     force: Force = False,
 ) -> None:
     """Print the JSON Schema of a TOML file; editors use it to complete and check the file."""
-    if kind not in KINDS:
-        raise InputError(f"{kind}: is not a kind of file; use one of {', '.join(KINDS)}")
     refuse_to_overwrite([out], force)
     text = json.dumps(json_schema(kind, models()[kind]), indent=2)
     if out is None:

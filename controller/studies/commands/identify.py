@@ -31,6 +31,7 @@ from snakewalk.controller.console.options import (
 )
 from snakewalk.controller.console.progress import ProgressBar
 from snakewalk.controller.console.result_files import (
+    check_ending,
     refuse_to_overwrite,
     write_result,
 )
@@ -182,14 +183,9 @@ def _robot_file(robot: str | None, out: Path | None) -> _RobotFile | None:
             "--robot ROBOT and --robot-out FILE go together: the robot, and the file to write it "
             "to with the constants"
         )
-    _check_robot_out(out)
+    check_ending(out, "a robot's file (--robot-out)", ".toml")
 
     return _RobotFile(load_robot(robot), out)
-
-
-def _check_robot_out(out: Path | None) -> None:
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: --robot-out is a robot's file; end its name with .toml")
 
 
 def _read_runs(
@@ -230,10 +226,9 @@ def _friction(
 
     require_extra("friction from a run's log needs", "mujoco")
     refuse_to_overwrite(outs, force)
-    _check_robot_out(outs.robot)
+    check_ending(outs.robot, "a robot's file (--robot-out)", ".toml")
     out = outs.world
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: friction is written as a world's file; end its name with .toml")
+    check_ending(out, "friction is a world's file, which", ".toml")
     check_files(None, None, world)
     given = None if world is None else load_world(world)
     logs = _read_runs(paths, judge, given, lifting=outs.robot is not None)

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 import typer
 
-from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.key_types import SEED, Seed
 from snakewalk.controller.console import completion
@@ -22,7 +21,7 @@ from snakewalk.controller.console.options import (
     show,
 )
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import write_result
+from snakewalk.controller.console.result_files import check_ending, write_result
 from snakewalk.controller.gaits.gait import fitting_robot
 from snakewalk.controller.gaits.registry import make_gait
 from snakewalk.controller.studies import tune as search
@@ -59,8 +58,7 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Search a gait's parameters for speed or efficiency, and compare with the defaults."""
-    if out is not None and out.suffix != ".toml":
-        raise InputError(f"{out}: a set of parameters ends in .toml")
+    check_ending(out, "a set of parameters", ".toml")
     keys = key_values("--set", set_)
 
     require_extra("tuning needs", "mujoco")

@@ -345,7 +345,7 @@ def test_the_feet_as_printed_are_an_option_and_their_slip_is_reported(tmp_path: 
     assert slip["footfall"] < 1e-6
     assert slip["gc-printed"] > 0.1
     for wrong, message in (
-        (["--animal", "goat", "--feet", "round"], "choose footfall or gc-printed"),
+        (["--animal", "goat", "--feet", "round"], "'round' is not one of 'footfall', 'gc-printed'"),
         (["--feet", "footfall"], "add --animal"),
     ):
         done = snakewalk(*words, "-o", str(tmp_path / "x"), *wrong)

@@ -29,7 +29,7 @@ def call(*words: str) -> dict[str, object]:
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pictures")
-    for k, picture in enumerate(board_pictures(CalibrationBoard(), LENS, 9)):
+    for k, picture in enumerate(board_pictures(CalibrationBoard("charuco"), LENS, 9)):
         cv2.imwrite(str(folder / f"{k}.png"), picture)
     return folder
 
@@ -62,7 +62,7 @@ def test_the_board_is_drawn_in_its_size(ending: str, tmp_path: Path) -> None:
     assert (told["width_mm"], told["height_mm"]) == (252.0, 180.0)
     if ending == "png":
         drawn = cv2.imread(str(out), cv2.IMREAD_GRAYSCALE)
-        view = CalibrationBoard().find(np.asarray(drawn, dtype=np.uint8))
+        view = CalibrationBoard("charuco").find(np.asarray(drawn, dtype=np.uint8))
         assert view is not None
         assert len(view.corners_px) == 24
         apart_mm = np.hypot(*(view.corners_px[5] - view.corners_px[0])) / 300.0 * 25.4
@@ -94,12 +94,8 @@ def test_markers_are_printed_in_their_size_one_a_page(tmp_path: Path) -> None:
         (("markers", "-o", "m.png"), "holds one marker"),
         (("markers", "-o", "m.pdf", "--first", "48"), "numbers end at 49"),
         (("markers", "-o", "m.pdf", "--side", "2"), "must be 10 to 1000 mm"),
-        (("board", "-o", "x.gif"), "the ending must be .pdf or .png"),
+        (("board", "-o", "x.gif"), "a print ends in .pdf, .png"),
         (("board", "-o", "x.pdf", "--squares", "7"), "--squares 7: expected"),
-        (
-            ("board", "-o", "x.pdf", "--pattern", "dots"),
-            "is unknown; use one of charuco, chessboard",
-        ),
         (("lens", "nowhere", "-o", "lens.yml"), "nowhere"),
         (("lens", "nowhere", "-o", "lens.txt"), "lens.txt: the file of a lens ends in"),
     ],

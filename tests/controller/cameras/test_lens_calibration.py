@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import cv2
 import numpy as np
@@ -15,11 +16,11 @@ from tests.oracles.board_view import board_picture, board_pictures, lens_rays
 
 MATRIX = np.array([[420.0, 0.0, 325.0], [0.0, 424.0, 236.0], [0.0, 0.0, 1.0]])
 LENS = Lens((640, 480), MATRIX, np.array([-0.3, 0.09, 0.001, -0.0008, 0.0]))
-BOARD = CalibrationBoard()
+BOARD = CalibrationBoard("charuco")
 RAYS = lens_rays(LENS)
 
 
-@pytest.fixture(scope="module", params=list(BoardPattern))
+@pytest.fixture(scope="module", params=get_args(BoardPattern))
 def found(request: pytest.FixtureRequest) -> LensCalibration:
     board = CalibrationBoard(request.param)
     views = [board.find(one) for one in board_pictures(board, LENS, 12, rays=RAYS)]
@@ -94,7 +95,7 @@ def test_too_few_views_are_refused() -> None:
 @pytest.mark.parametrize("squares", [(3, 9), (6, 6), (21, 8)])
 def test_a_board_that_is_none_is_refused(squares: tuple[int, int]) -> None:
     with pytest.raises(InputError, match="squares"):
-        CalibrationBoard(squares=squares)
+        CalibrationBoard("charuco", squares)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,8 @@ ROWS = [
     ("init . --from nosuch", "nosuch: no such run; shipped are"),
     ("init . --robot typo.toml", "typo.toml:2: waypoints_m: unknown key"),
     ("init file.txt", "'file.txt' is a file"),
-    ("tools schema nosuch", "nosuch: is not a kind of file; use one of run, robot, world"),
+    ("pose board -o a.pdf --pattern dots", "'dots' is not one of 'charuco', 'chessboard'"),
+    ("tools schema nosuch", "kind: 'nosuch' is not one of 'run', 'robot', 'world'"),
     ("robot export yaw16 --urdf .", ".: is a folder; name a file"),
     ("tools schema run -o file.txt", "file.txt: exists; --force overwrites it"),
     ("run flat-square --out=", "nothing after --out: fill it"),
@@ -274,7 +275,7 @@ ROWS = [
     ("robot identify nosuch.mcap list.json", "give one kind"),
     (
         "robot identify nosuch.mcap -o found.json",
-        "found.json: friction is written as a world's file",
+        "found.json: friction is a world's file, which ends in .toml",
     ),
     ("robot identify list.json --world flat", "--world is the ground of a run's log"),
     ("world from nosuch.tif -o w.toml", "nosuch.tif: No such file"),

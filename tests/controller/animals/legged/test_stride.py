@@ -222,7 +222,7 @@ def test_files_as_trackers_write_them_give_the_stride(
         ("--girdles", "neck,FL", "expected two names of the spine"),
         ("--feet", "FL,FR,HL", "expected four other names: front left"),
         ("--feet", "FL,FR,HL,paw", "it has no paw; it has nose, neck"),
-        ("--view", "below", "choose above or side"),
+        ("--view", "below", "'below' is not one of 'above', 'side'"),
         ("--animal", "nosuch", "no such animal; shipped are goat, lizard"),
     ],
 )

@@ -227,8 +227,8 @@ def test_another_mesh_moves_with_the_person(person: Person, walk: PersonMotion) 
 @pytest.mark.parametrize(
     ("words", "fault"),
     [
-        (("hop",), "no such motion"),
-        (("walk", "-o", "a.obj"), "written as .glb"),
+        (("hop",), "'hop' is not one of 'walk', 'run'"),
+        (("walk", "-o", "a.obj"), "a person who moves ends in .glb"),
         (("walk", "--film", "a.avi"), "ends in .mp4"),
         (("walk", "--mesh", "none.obj"), "no such file"),
     ],

@@ -143,7 +143,7 @@ def test_what_tells_no_friction_is_refused(record: RunRecord, log: Path, tmp_pat
     recording.write_text("{}")
     assert "give one kind" in refused(log, recording)
     assert "and --backlash: are for pendulums" in refused(log, "--start", recording)
-    assert "end its name with .toml" in refused(log, "-o", tmp_path / "a.json")
+    assert "ends in .toml" in refused(log, "-o", tmp_path / "a.json")
     assert "a pendulum has none" in refused(recording, "--world", "flat")
     assert "No such file" in refused(tmp_path / "none.mcap")
 

@@ -143,14 +143,12 @@ def test_what_is_refused_of_a_robot(files: list[Path], tmp_path: Path) -> None:
     assert "go together" in refused(*words, "--robot", "xl330-16")
     assert "go together" in refused(*words, "--robot-out", out)
     json_out = tmp_path / "mine.json"
-    assert "end its name with .toml" in refused(
-        *words, "--robot", "xl330-16", "--robot-out", json_out
-    )
+    assert "ends in .toml" in refused(*words, "--robot", "xl330-16", "--robot-out", json_out)
     assert "of a servo xl330, robot yaw16 has XM430-W350" in refused(
         *words, "--robot", "yaw16", "--robot-out", out
     )
     assert "the robot of a run is in its log" in refused("a.mcap", "--robot", "yaw16")
-    assert "end its name with .toml" in refused("a.mcap", "--robot-out", json_out)
+    assert "ends in .toml" in refused("a.mcap", "--robot-out", json_out)
     assert not out.exists()
 
 
