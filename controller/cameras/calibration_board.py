@@ -9,6 +9,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image, Ints
 from snakewalk.config.errors import InputError
+from snakewalk.controller.cameras.floor_light import grey_of
 
 DICTIONARY = "DICT_5X5_250"
 """Dictionary of the markers on a ChArUco board; those on the floor are of another."""
@@ -81,7 +82,7 @@ class CalibrationBoard:
 
     def find(self, picture: Image) -> BoardView | None:
         """Find the corners in a picture (H, W[, 3]); None if there are too few."""
-        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        grey = grey_of(picture)
         places = np.asarray(self._charuco.getChessboardCorners(), dtype=float)[:, :2]
         if self.pattern == "charuco":
             corners, ids, _, _ = self._detector.detectBoard(grey)

@@ -12,6 +12,7 @@ import numpy as np
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.overhead_camera import LineDetection
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 
 _EARLIEST_S, _LATEST_S, _STEP_S = -0.1, 0.6, 0.005
@@ -120,7 +121,7 @@ def _shapes(robot: RobotConfig, lines_m: Sequence[Floats]) -> Floats:
     share = np.array(robot.link_ends) / robot.link_ends[-1]
     shapes = []
     for line in lines_m:
-        arc = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+        arc = arc_lengths(line)
         ends = np.stack([np.interp(share * arc[-1], arc, axis) for axis in line.T], axis=1)
         ahead = ends[:-1] - ends[1:]  # from the tail to the head
         heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))

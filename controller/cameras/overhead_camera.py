@@ -22,7 +22,7 @@ from snakewalk.controller.cameras.body_contrast import (
     confirmed,
     links_at,
 )
-from snakewalk.controller.cameras.floor_light import lit_floor, unexplained
+from snakewalk.controller.cameras.floor_light import grey_of, lit_floor, unexplained
 from snakewalk.controller.cameras.ground_rest import Heights
 from snakewalk.controller.cameras.lens import Lens, projected
 from snakewalk.controller.cameras.markers.floor_markers import (
@@ -482,7 +482,7 @@ def _next_to_shadow(
 
 def _texture(image: Image) -> Singles:
     """(H / 2, W / 2) edges of a picture, without slow changes of light."""
-    grey = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    grey = grey_of(image)
     half = grey.shape[1] // _SCALE_DOWN, grey.shape[0] // _SCALE_DOWN
     small = cv2.resize(grey, half, interpolation=cv2.INTER_AREA).astype(np.float32)
     fine, coarse = (cv2.GaussianBlur(small, (0, 0), reach) for reach in (1.0, 4.0))

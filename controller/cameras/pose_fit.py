@@ -11,6 +11,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.config.robot import RobotConfig
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.kinematics.links import body_in_world, pose_at
 from snakewalk.drivers.attitude import heading_of
 from snakewalk.drivers.least_squares import least_squares
@@ -52,7 +53,7 @@ def fit_both_ends(robot: RobotConfig, line_m: Floats, joint_rad: Floats) -> tupl
 
 
 def _fit(robot: RobotConfig, line_m: Floats, links: Floats) -> PoseFit:
-    arc = np.concatenate([[0.0], np.hypot(*np.diff(line_m, axis=0).T).cumsum()])
+    arc = arc_lengths(line_m)
     ends = np.array(robot.link_ends)
     number = 0.5 * (ends[:-1] + ends[1:]) - 0.5 * len(links)
     middle_m = 0.5 * arc[-1] + number * robot.mean_link_length_m

@@ -1,6 +1,5 @@
 """The overhead camera of a simulated run: rendered top views."""
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from snakewalk.config.world import WorldConfig
 from snakewalk.controller.cameras.camera_frames import (
     CHECK_FRAMES,
     OnPicture,
+    SimulatedFrames,
     centre_of,
     require_whole_body,
 )
@@ -92,9 +92,9 @@ class RenderedCamera:
         self._qpos = qpos
         self._clock = clock
         self._on_picture = on_picture
-        self._period_s = 1.0 / run.camera.rate_hz
-        self._next_s = clock.now_s()
-        self._coming: deque[LineDetection | TrackedPose] = deque()
+        self._frames = SimulatedFrames[LineDetection | TrackedPose](
+            run.camera.rate_hz, clock.now_s()
+        )
         self._robot = robot
         self._learning = FloorLearning(robot, run.camera.learn_s)
         self._taken = 0
@@ -106,14 +106,7 @@ class RenderedCamera:
 
     def arrived(self, now_s: float, prior_at: PriorAt) -> list[LineDetection | TrackedPose]:
         """Capture a frame if due; return arrived ones."""
-        if now_s >= self._next_s - 1e-9:
-            self._coming.append(self._track(now_s, prior_at(now_s)))
-            missed = int((now_s - self._next_s) / self._period_s + 1e-9)
-            self._next_s += (missed + 1) * self._period_s
-        detections: list[LineDetection | TrackedPose] = []
-        while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
-            detections.append(self._coming.popleft())
-        return detections
+        return self._frames.arrived(now_s, lambda: self._track(now_s, prior_at(now_s)))
 
     def close(self) -> None:
         """Free the frame buffer."""

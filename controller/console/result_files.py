@@ -207,7 +207,7 @@ def check_ending(path: Path | None, what: str, *endings: str) -> None:
     """Reject a file of ``what`` with another ending; None is ignored.
 
     Raises:
-        InputError: the ending is none of these.
+        InputError: the ending is another one.
 
     """
     if path is not None and path.suffix.lower() not in endings:

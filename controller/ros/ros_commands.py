@@ -31,6 +31,7 @@ from snakewalk.controller.motion.command import (
     Velocity,
 )
 from snakewalk.controller.motion.refusals import NAME_MAX, TEXT_MAX
+from snakewalk.controller.ros.clock_offset import ClockOffset
 from snakewalk.controller.ros.ros_options import RosOptions
 from snakewalk.controller.run.kinds.gait_factory import gait_by_name, is_gait
 
@@ -40,23 +41,6 @@ newer ones of the same joints follow, and velocities and goal poses that newer o
 QUEUE = QoSProfile(depth=10)
 _WINDOW_S = 120.0
 """Time whose fastest message counts as having no delay (ours), so that clocks need not agree."""
-
-
-class Delays:
-    """Delays of the messages of a topic, from the publisher's time in the message's envelope.
-
-    A delay is counted from the fastest message of the last two minutes.
-    """
-
-    def __init__(self) -> None:
-        self._offsets_s: deque[tuple[float, float]] = deque(maxlen=10_000)
-
-    def delay_s(self, source_s: float, now_s: float) -> float:
-        """Return the delay of a message that was sent at ``source_s`` of the publisher's clock."""
-        self._offsets_s.append((now_s, now_s - source_s))
-        while now_s - self._offsets_s[0][0] > _WINDOW_S:
-            self._offsets_s.popleft()
-        return now_s - source_s - min(offset_s for _, offset_s in self._offsets_s)
 
 
 class CommandTopics:
@@ -108,12 +92,12 @@ class CommandTopics:
         self, topic: str, take: Callable[[Any], None]
     ) -> Callable[[Any, Any], None]:
         """Return a callback that rejects a message on which ``take`` fails."""
-        delays = Delays()
+        clock = ClockOffset(_WINDOW_S)
 
         def taken(message: Any, info: Any) -> None:
             try:
                 source_s = 1e-9 * info["source_timestamp"]
-                self._delay_s = delays.delay_s(source_s, time.monotonic()) if source_s else 0.0
+                self._delay_s = clock.delay_s(source_s, time.monotonic()) if source_s else 0.0
                 take(message)
             except Exception as fault:  # else the thread ends, and the stop service with it
                 self.reject(f"{topic}: {in_words(fault)}")
@@ -122,109 +106,43 @@ class CommandTopics:
 
     def on_goals(self, message: Any) -> None:
         """Keep joint goals."""
-        if max(len(message.name), len(message.position)) > JOINTS_MAX:
-            why = (
-                f"joint goals: names {len(message.name)} joints; at most {JOINTS_MAX} are accepted"
-            )
-            self._command(Refused(why), message.header.stamp, "joint goals")
-            return
-        if message.name and not message.position:
-            why = "joint goals: no positions; velocities and efforts alone are not accepted"
-            self._command(Refused(why), None, "joint goals")
-            return
-        goals = JointGoals(list(message.name), list(message.position))
-        self._command(goals, message.header.stamp, "joint goals")
+        self._keep(_joint_goals, message, message.header.stamp, "joint goals")
 
     def on_trajectory(self, message: Any) -> None:
         """Keep a trajectory."""
-        stamp = message.header.stamp
-        points = message.points
-        if not points:
-            self._command(HoldStill(), stamp, "trajectory")
-            return
-        if len(message.joint_names) > JOINTS_MAX:
-            why = (
-                f"trajectory: names {len(message.joint_names)} joints; at most {JOINTS_MAX} are "
-                "accepted"
-            )
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        if len(points) > POINTS_MAX:
-            why = f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are accepted"
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        times = [point.time_from_start for point in points]
-        time_s = np.array([duration.sec + 1e-9 * duration.nanosec for duration in times])
-        try:
-            values = (
-                _rows([point.positions for point in points]),
-                _rows([point.velocities for point in points]),
-                _rows([point.accelerations for point in points]),
-            )
-        except ValueError:
-            why = "trajectory: its points have different numbers of values"
-            self._command(Refused(why), stamp, "trajectory")
-            return
-        positions, velocities, accelerations = values
-        if positions is None:
-            self._command(Refused("trajectory: its points have no positions"), stamp, "trajectory")
-            return
-        names = list(message.joint_names)
-        command = JointTrajectory(names, time_s, positions, velocities, accelerations)
-        self._command(command, stamp, "trajectory")
+        self._keep(_trajectory, message, message.header.stamp, "trajectory")
 
     def on_gait(self, message: Any) -> None:
         """Keep a gait, or a hold."""
-        words = message.data.split()
-        if not words:
-            self._command(HoldStill(), None, "gait")
-            return
-
-        command: Command
-        try:
-            if not is_gait(words[0]):
-                raise InputError(f"gait: {words[0][:NAME_MAX]}: no such gait; snakewalk gait list")
-            values: dict[str, Any] = {}
-            for key, value in map(_value, words[1:]):
-                if key in values:
-                    raise InputError(f"gait: {key[:NAME_MAX]} is given twice; give it once")
-                values[key] = value
-            command = StartGait(gait_by_name(words[0], values)[0])
-        except InputError as error:
-            command = Refused(error.faults[0])
-        self._command(command, None, "gait")
+        self._keep(_gait, message, None, "gait")
 
     def on_velocity(self, message: Any) -> None:
         """Keep a velocity along the body and a rate of turn."""
-        linear = message.linear
-        angular = message.angular
-        others = {
-            "linear.y": linear.y,
-            "linear.z": linear.z,
-            "angular.x": angular.x,
-            "angular.y": angular.y,
-        }
-        wrong = [name for name, value in others.items() if value != 0.0]
-        command: Command = Velocity(linear.x, angular.z)
-        if wrong:
-            command = Refused(
-                f"velocity: {wrong[0]} is not 0; send linear.x and angular.z, and 0 elsewhere"
-            )
-        self._command(command, None, "velocity")
+        self._keep(_velocity, message, None, "velocity")
 
     def on_goal_pose(self, message: Any) -> None:
         """Keep the place of a goal pose; a walk has no heading at its end."""
-        header = message.header
+        self._keep(self._goal, message, message.header.stamp, "goal pose")
+
+    def _goal(self, message: Any) -> Command:
+        frame = message.header.frame_id
         place = message.pose.position
-        command: Command = GoTo(place.x, place.y)
-        if header.frame_id != self.frame:
-            command = Refused(
-                f"goal pose: frame {header.frame_id[:NAME_MAX]!r}; this run's poses have the "
-                f"frame {self.frame!r}: transform the goal"
+        if frame != self.frame:
+            raise InputError(
+                f"goal pose: frame {frame[:NAME_MAX]!r}; this run's poses have the frame "
+                f"{self.frame!r}: transform the goal"
             )
-        elif not (math.isfinite(place.x) and math.isfinite(place.y)):
-            command = Refused("goal pose: x or y is not a number")
-        self._command(command, header.stamp, "goal pose")
+        if not (math.isfinite(place.x) and math.isfinite(place.y)):
+            raise InputError("goal pose: x or y is not a number")
+        return GoTo(place.x, place.y)
+
+    def _keep(self, read: Callable[[Any], Command], message: Any, stamp: Any, what: str) -> None:
+        """Keep the command that a message states, or why it is rejected."""
+        try:
+            command = read(message)
+        except InputError as error:
+            command = Refused(error.faults[0])
+        self._command(command, stamp, what)
 
     def _command(self, command: Command, stamp: Any, what: str) -> None:
         """Keep a command for the run; a stamp of 0 says nothing."""
@@ -252,6 +170,95 @@ class CommandTopics:
             if last is not None and _replaces(command, last):
                 self.pending.pop()
             self.pending.append(command)
+
+
+def _joint_goals(message: Any) -> Command:
+    """Return the joint goals of a message.
+
+    Raises:
+        InputError: too many joints, or no positions.
+
+    """
+    if max(len(message.name), len(message.position)) > JOINTS_MAX:
+        raise InputError(
+            f"joint goals: names {len(message.name)} joints; at most {JOINTS_MAX} are accepted"
+        )
+    if message.name and not message.position:
+        raise InputError("joint goals: no positions; velocities and efforts alone are not accepted")
+    return JointGoals(list(message.name), list(message.position))
+
+
+def _trajectory(message: Any) -> Command:
+    """Return the trajectory of a message; one without points is a hold.
+
+    Raises:
+        InputError: too many joints or points, or points with different values or no positions.
+
+    """
+    points = message.points
+    names = list(message.joint_names)
+    if not points:
+        return HoldStill()
+    if len(names) > JOINTS_MAX:
+        raise InputError(
+            f"trajectory: names {len(names)} joints; at most {JOINTS_MAX} are accepted"
+        )
+    if len(points) > POINTS_MAX:
+        raise InputError(f"trajectory: {len(points)} points; 1 to {POINTS_MAX} are accepted")
+    times = [point.time_from_start for point in points]
+    time_s = np.array([duration.sec + 1e-9 * duration.nanosec for duration in times])
+    try:
+        positions = _rows([point.positions for point in points])
+        velocities = _rows([point.velocities for point in points])
+        accelerations = _rows([point.accelerations for point in points])
+    except ValueError:
+        raise InputError("trajectory: its points have different numbers of values") from None
+    if positions is None:
+        raise InputError("trajectory: its points have no positions")
+    return JointTrajectory(names, time_s, positions, velocities, accelerations)
+
+
+def _gait(message: Any) -> Command:
+    """Return the gait of a message, ``NAME PARAM=VALUE ...``; an empty one is a hold.
+
+    Raises:
+        InputError: no such gait, or a value is wrong or repeated.
+
+    """
+    words = message.data.split()
+    if not words:
+        return HoldStill()
+    if not is_gait(words[0]):
+        raise InputError(f"gait: {words[0][:NAME_MAX]}: no such gait; snakewalk gait list")
+    values: dict[str, Any] = {}
+    for key, value in map(_value, words[1:]):
+        if key in values:
+            raise InputError(f"gait: {key[:NAME_MAX]} is given twice; give it once")
+        values[key] = value
+    return StartGait(gait_by_name(words[0], values)[0])
+
+
+def _velocity(message: Any) -> Command:
+    """Return the velocity along the body and the rate of turn of a message.
+
+    Raises:
+        InputError: another component is not 0.
+
+    """
+    linear = message.linear
+    angular = message.angular
+    others = {
+        "linear.y": linear.y,
+        "linear.z": linear.z,
+        "angular.x": angular.x,
+        "angular.y": angular.y,
+    }
+    for name, value in others.items():
+        if value != 0.0:
+            raise InputError(
+                f"velocity: {name} is not 0; send linear.x and angular.z, and 0 elsewhere"
+            )
+    return Velocity(linear.x, angular.z)
 
 
 def _is_halt(command: Command) -> bool:

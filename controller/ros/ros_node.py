@@ -5,7 +5,6 @@ import json
 import signal
 import socket
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib.util import find_spec
@@ -39,6 +38,7 @@ from snakewalk.controller.exchange.ros_messages import (
     pose_frame,
 )
 from snakewalk.controller.metrics.verdict import NOT_MEASURED, RunVerdict
+from snakewalk.controller.ros.clock_offset import ClockOffset
 from snakewalk.controller.ros.command_codec import encode_command
 from snakewalk.controller.ros.ros_commands import QUEUE, CommandTopics, in_words, message_type
 from snakewalk.controller.ros.ros_options import RosOptions
@@ -150,27 +150,6 @@ def _spinning(node: Node, reject: Callable[[str], None]) -> Iterator[None]:
         thread.join()
 
 
-class ClockOffset:
-    """ROS time over the run's clock: rows come late by chance, so the earliest of late counts."""
-
-    def __init__(self, span_s: float = _OFFSET_SPAN_S) -> None:
-        self._span_s = span_s
-        self._seen: deque[tuple[float, float]] = deque()
-
-    def add(self, ros_s: float, run_s: float) -> None:
-        """Process a row of ``run_s`` that came at ``ros_s``."""
-        offset_s = ros_s - run_s
-        while self._seen and self._seen[-1][1] >= offset_s:
-            self._seen.pop()
-        self._seen.append((ros_s, offset_s))
-        while self._seen[0][0] < ros_s - self._span_s:
-            self._seen.popleft()
-
-    def ros_s(self, run_s: float) -> float:
-        """ROS time of a time of the run."""
-        return run_s + (self._seen[0][1] if self._seen else 0.0)
-
-
 class RobotNode:
     """Topics and services of one run."""
 
@@ -179,9 +158,9 @@ class RobotNode:
         self._end = end
         self._options = options
         self._clock = WallClock()
-        self._offset = ClockOffset()
+        self._offset = ClockOffset(_OFFSET_SPAN_S)
         self._messages = RosMessages(
-            _message, _doubles, lambda value: bytes([value]), self._offset.ros_s
+            _message, _doubles, lambda value: bytes([value]), self._offset.local_s
         )
         self._publishers: dict[str, Any] = {}
         self._header: Header | None = None
@@ -251,7 +230,7 @@ class RobotNode:
         if self._header is None or _CYCLE not in rows:
             return
         self.commands.has_begun = True
-        self._offset.add(self._ros_now_s(), rows[_CYCLE]["time_s"])
+        self._offset.delay_s(rows[_CYCLE]["time_s"], self._ros_now_s())
         record = self._record({topic: [row] for topic, row in rows.items()})
         self._publish(self._messages.joints(record))
         self._publish(self._messages.head_poses(record))
@@ -292,7 +271,7 @@ class RobotNode:
             return
         self._told_s = now_s
         ros_s = self._ros_now_s()
-        run_s = ros_s - self._offset.ros_s(0.0)
+        run_s = ros_s - self._offset.local_s(0.0)
         status = [
             self._messages.status(f"{NAME}: {name}", level, text, self._header.robot.name, values)
             for name, (level, text) in self._said.items()

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from snakewalk.config.arrays import Floats, Image
+from snakewalk.controller.kinematics.arc_length import arc_lengths
 from snakewalk.controller.track.resample import SEGMENTS, equal_arc_length
 
 ALONG, ACROSS = 512, 64
@@ -54,8 +55,7 @@ def colours_across(
 
     """
     colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
-    chord = np.hypot(*np.diff(points_px, axis=0).T)
-    arc = np.concatenate([[0.0], np.cumsum(chord)])
+    arc = arc_lengths(points_px)
     even = equal_arc_length(points_px, SEGMENTS)
     station = np.linspace(0.0, 1.0, ALONG)
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.cameras.floor_light import grey_of
 from snakewalk.controller.cameras.lens import Lens, projected
 
 DICTIONARY = "DICT_4X4_50"
@@ -131,7 +132,7 @@ def marker_sheet(number: int, side_m: float, dots_per_inch: float) -> Image:
 
 def find_markers(picture: Image) -> dict[int, Floats]:
     """Corners of the markers in a picture (H, W[, 3]), except those seen twice."""
-    grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    grey = grey_of(picture)
     large = cv2.resize(grey, None, fx=_LARGER, fy=_LARGER, interpolation=cv2.INTER_CUBIC)
     corners, numbers, _ = cv2.aruco.ArucoDetector(_dictionary()).detectMarkers(large)
     names = [] if numbers is None else np.asarray(numbers, dtype=int).ravel().tolist()

@@ -7,7 +7,6 @@ Only tags are drawn, on grey; a tag that faces away is hidden, but links hide no
 
 import queue
 import threading
-from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -19,7 +18,7 @@ from snakewalk.config.camera import CameraConfig
 from snakewalk.config.errors import InputError
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.tags import FixedTag
-from snakewalk.controller.cameras.camera_frames import OnPicture
+from snakewalk.controller.cameras.camera_frames import OnPicture, SimulatedFrames
 from snakewalk.controller.cameras.device_camera import PATIENCE_S, in_colour, open_device
 from snakewalk.controller.cameras.tags.tag_detector import TagDetector, TagPicture, tag_dictionary
 from snakewalk.controller.cameras.tags.tag_fit import tag_corners
@@ -229,22 +228,16 @@ class SimulatedTags:
         self._detector = detector
         self._body = body
         self._on_picture = on_picture
-        self._period_s, self._next_s = 1.0 / camera.rate_hz, clock.now_s()
-        self._coming: deque[TagPicture] = deque()
+        self._frames = SimulatedFrames[TagPicture](camera.rate_hz, clock.now_s())
 
     def arrived(self, now_s: float) -> list[TagPicture]:
         """Record a picture if due; return arrived ones."""
-        if now_s >= self._next_s - 1e-9:
-            head, joint_rad = self._body()
-            picture: Image = self._drawn.picture(head, joint_rad)
-            self._on_picture(np.dstack([picture] * 3), now_s)
-            self._coming.append(TagPicture(now_s, self._detector.find(picture)))
-            missed = int((now_s - self._next_s) / self._period_s + 1e-9)
-            self._next_s += (missed + 1) * self._period_s
-        arrivals = []
-        while self._coming and self._coming[0].time_s + self._period_s <= now_s + 1e-9:
-            arrivals.append(self._coming.popleft())
-        return arrivals
+        return self._frames.arrived(now_s, lambda: self._picture(now_s))
+
+    def _picture(self, now_s: float) -> TagPicture:
+        picture = self._drawn.picture(*self._body())
+        self._on_picture(np.dstack([picture] * 3), now_s)
+        return TagPicture(now_s, self._detector.find(picture))
 
     def close(self) -> None:
         """Do nothing: no device is open."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
+from snakewalk.controller.cameras.floor_light import grey_of
 
 Corners = Mapping[int, Floats]
 """Corners (4, 2) of each tag by its number, pixels: upper left of the print first, clockwise."""
@@ -65,7 +66,7 @@ class TagDetector:
 
     def find(self, picture: Image) -> dict[int, Floats]:
         """Return the corners of each tag that a picture (H, W[, 3]) shows once."""
-        grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        grey = grey_of(picture)
         corners, numbers, _ = self._detector.detectMarkers(grey)
         corners_by_id: dict[int, Floats] = {}
         twice = set()

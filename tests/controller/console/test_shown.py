@@ -37,7 +37,7 @@ def test_a_table_shows_names_as_they_are(capsys: pytest.CaptureFixture[str]) -> 
             ["animal", "body", "worm-like", "-o", "b.glb", "--aspect", "-1"],
             "aspect: height over width",
         ),
-        (["animal", "fish", "match", ".", "-o", "postures.csv"], "is an .npz"),
+        (["animal", "fish", "match", ".", "-o", "postures.csv"], "the result ends in .npz"),
         (["animal", "fish", "synthesise", "."], "is a folder"),
     ],
 )

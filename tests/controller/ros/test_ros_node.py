@@ -34,10 +34,10 @@ from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot, load_run, load_world
 from snakewalk.controller.motion.command import HoldStill, Refused, StartGait
 from snakewalk.controller.motion.commanded import Commanded
+from snakewalk.controller.ros import ros_commands
+from snakewalk.controller.ros.clock_offset import ClockOffset
 from snakewalk.controller.ros.command_codec import decode_command
-from snakewalk.controller.ros.ros_commands import Delays
 from snakewalk.controller.ros.ros_node import (
-    ClockOffset,
     RobotNode,
     _make_node,
     _spinning,
@@ -140,7 +140,7 @@ def graph() -> Iterator[Graph]:
 @pytest.fixture
 def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages have no delay, which a busy machine or messages of megabytes cause."""
-    monkeypatch.setattr(Delays, "delay_s", lambda *times: 0.0)
+    monkeypatch.setattr(ros_commands, "LATE_S", math.inf)
 
 
 def point(time_s: float, *angles: float, **more: Any) -> JointTrajectoryPoint:
@@ -378,11 +378,11 @@ def test_rows_that_come_late_by_chance_do_not_shift_the_stamps() -> None:
     offset = ClockOffset(span_s=2.0)
     for k in range(200):
         run_s = 0.02 * k
-        offset.add(1000.0 + run_s + (0.001 if k % 10 == 0 else 0.03), run_s)
-    assert offset.ros_s(4.0) == pytest.approx(1004.001)
+        offset.delay_s(run_s, 1000.0 + run_s + (0.001 if k % 10 == 0 else 0.03))
+    assert offset.local_s(4.0) == pytest.approx(1004.001)
     for k in range(200, 400):  # a simulated run that does not keep its pace
-        offset.add(1000.5 + 0.02 * k, 0.02 * k)
-    assert offset.ros_s(8.0) == pytest.approx(1008.5)
+        offset.delay_s(0.02 * k, 1000.5 + 0.02 * k)
+    assert offset.local_s(8.0) == pytest.approx(1008.5)
 
 
 def test_this_machine_alone_unless_somebody_says_otherwise() -> None:
