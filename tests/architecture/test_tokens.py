@@ -45,7 +45,7 @@ LIMITS: Final = {
     "controller.figures": 3350,
     "controller.run": 21750,
     "controller.capture": 29250,
-    "controller.animals": 44900,
+    "controller.animals": 45000,
     "controller.cameras": 19200,
     "controller.mapping": 19150,
     "controller.repertoire": 13250,
