@@ -14,6 +14,7 @@ _MOST_FACTORS = 4.0, 20.0
 degrees has 19 times the default limit of variance."""
 _STEPS = 1000
 _MOST_SLOPE_RAD = 1.49
+_MOVE = "move a waypoint; no higher limit joins them"
 
 
 def route_advice(relief: Relief, points_m: Floats) -> str:
@@ -31,13 +32,13 @@ def route_advice(relief: Relief, points_m: Floats) -> str:
     most_slope = min(most_slope, _MOST_SLOPE_RAD / config.slope_limit_rad)
     variance = _least_factor(most_variance, lambda factor: joins(most_slope, factor))
     slope = _least_factor(most_slope, lambda factor: joins(factor, variance))
-    words = [
-        f"--set world.planner.{key}={_rounded_up(factor * getattr(config, key))}"
-        for key, factor in (("slope_limit_rad", slope), ("variance_limit_m2", variance))
-        if factor > 1.0 and variance < np.inf
-    ]
-    if words:
-        return " ".join(words)
+    if variance < np.inf:
+        words = [
+            f"--set world.planner.{key}={_rounded_up(factor * getattr(config, key))}"
+            for key, factor in (("slope_limit_rad", slope), ("variance_limit_m2", variance))
+            if factor > 1.0
+        ]
+        return " ".join(words) or _MOVE
     risk = relief.risk_at_samples(slope_factor=1.0, variance_factor=1.0)
     for margin_m in config.edge_margin_m * np.array([0.75, 0.5, 0.25, 0.0]):
         if _are_joined(relief, risk, float(margin_m), points_m):
@@ -45,7 +46,7 @@ def route_advice(relief: Relief, points_m: Floats) -> str:
     risk = relief.risk_at_samples(slope_factor=1.0, variance_factor=1.0, filled=True)
     if _are_joined(relief, risk, config.edge_margin_m, points_m):
         return "the world's map does not know the ground between them; map it or move a waypoint"
-    return "move a waypoint; no higher limit joins them"
+    return _MOVE
 
 
 def _least_factor(most: float, joins: Callable[[float], bool]) -> float:

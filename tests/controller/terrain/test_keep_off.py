@@ -56,8 +56,9 @@ def test_without_another_way_the_path_leads_where_the_body_has_room() -> None:
     assert length_m < 3.1
     with pytest.raises(InputError, match="nearer to it than the radius"):
         least_gap_m(CorridorObstacle(width_m=0.04), np.array([(-3.0, 0.0), (0.0, 0.0)]))
-    with pytest.raises(InputError, match=r"waypoint 1 .* is in the world's obstacle"):
+    with pytest.raises(InputError, match=r"waypoint 1 .* is in the world's obstacle") as error:
         least_gap_m(narrow, np.array([(-3.0, 0.0), (0.0, 0.12)]))
+    assert "--set" not in str(error.value), "no limit of the planner permits it"
 
 
 def test_distances_are_those_of_the_parts() -> None:
