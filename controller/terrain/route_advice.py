@@ -9,7 +9,7 @@ from scipy.ndimage import label
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.terrain.relief import Relief
 
-_MOST_FACTORS = 4.0, 20.0
+_MOST_STEEPER, _MOST_VARIANCE = 4.0, 20.0
 """Factors of the limits of slope and of variance that are still proposed (ours): a plane of 30
 degrees has 19 times the default limit of variance."""
 _STEPS = 1000
@@ -28,9 +28,8 @@ def route_advice(relief: Relief, points_m: Floats) -> str:
         risk = relief.risk_at_samples(slope_factor=slope_factor, variance_factor=variance_factor)
         return _are_joined(relief, risk, config.edge_margin_m, points_m)
 
-    most_slope, most_variance = _MOST_FACTORS
-    most_slope = min(most_slope, _MOST_SLOPE_RAD / config.slope_limit_rad)
-    variance = _least_factor(most_variance, lambda factor: joins(most_slope, factor))
+    most_slope = min(_MOST_STEEPER, _MOST_SLOPE_RAD / config.slope_limit_rad)
+    variance = _least_factor(_MOST_VARIANCE, lambda factor: joins(most_slope, factor))
     slope = _least_factor(most_slope, lambda factor: joins(factor, variance))
     if variance < np.inf:
         words = [
