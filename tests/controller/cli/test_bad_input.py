@@ -59,6 +59,8 @@ ROWS = [
     ("init . --from nosuch", "nosuch: no such run; shipped are"),
     ("init . --robot typo.toml", "typo.toml:2: waypoints_m: unknown key"),
     ("init file.txt", "'file.txt' is a file"),
+    ("animal fish match film --build shark", "'shark' is not one of 'carp', 'eel'"),
+    ("animal fish synthesise p.npz --reference bent", "is not one of 'straight', 'commonest'"),
     ("pose board -o a.pdf --pattern dots", "'dots' is not one of 'charuco', 'chessboard'"),
     ("tools schema nosuch", "kind: 'nosuch' is not one of 'run', 'robot', 'world'"),
     ("robot export yaw16 --urdf .", ".: is a folder; name a file"),
