@@ -47,49 +47,49 @@ def urdf_text(robot: RobotConfig, ros2_control: Ros2Control | None = None) -> st
         raise InputError(f"{robot.name}: has legs; a URDF is written of a chain only: give --mjcf")
     root = ET.Element("robot", name=robot.name)
     rows = zip(robot.link_lengths_m, robot.link_radii_m, robot.link_masses_kg, strict=True)
-    for link, (length, radius, mass) in enumerate(rows):
-        across = mass * (3.0 * radius**2 + length**2) / 12.0
-        centre = f"{0.0 if link == 0 else -0.5 * length!r} 0 0"
-        body = ET.SubElement(root, "link", name=f"link{link}")
-        inertial = ET.SubElement(body, "inertial")
-        ET.SubElement(inertial, "origin", xyz=centre, rpy="0 0 0")
-        ET.SubElement(inertial, "mass", value=repr(mass))
-        ET.SubElement(
-            inertial,
-            "inertia",
-            ixx=repr(0.5 * mass * radius**2),
-            iyy=repr(across),
-            izz=repr(across),
-            ixy="0",
-            ixz="0",
-            iyz="0",
-        )
-        for kind in ("visual", "collision") if length else ():
-            shape = ET.SubElement(body, kind)
-            ET.SubElement(shape, "origin", xyz=centre, rpy="0 1.5707963267948966 0")
-            geometry = ET.SubElement(shape, "geometry")
-            ET.SubElement(geometry, "cylinder", radius=repr(radius), length=repr(length))
-    for joint, axis in enumerate(robot.joint_axes):
-        limit = robot.limit_rad[joint]
-        back = -(0.5 if joint == 0 else 1.0) * robot.link_lengths_m[joint]
-        hinge = ET.SubElement(root, "joint", name=robot.joint_names[joint], type="revolute")
-        ET.SubElement(hinge, "origin", xyz=f"{back!r} 0 0", rpy="0 0 0")
-        ET.SubElement(hinge, "parent", link=f"link{joint}")
-        ET.SubElement(hinge, "child", link=f"link{joint + 1}")
-        ET.SubElement(hinge, "axis", xyz="0 0 -1" if axis == "y" else "0 1 0")
-        ET.SubElement(
-            hinge,
-            "limit",
-            lower=repr(-limit),
-            upper=repr(limit),
-            effort=repr(robot.torque_limit_n_m),
-            velocity=repr(robot.joint_speed_limit_rad_s),
-        )
-        ET.SubElement(hinge, "dynamics", damping=repr(robot.gear_drags_n_m_s[joint]), friction="0")
+    for link, sizes in enumerate(rows):
+        root.append(ET.fromstring(_link_text(link, *sizes)))
+    for joint in range(len(robot.joint_axes)):
+        root.append(ET.fromstring(_joint_text(robot, joint)))
     if ros2_control is not None:
         _add_ros2_control(root, robot, ros2_control)
     ET.indent(root)
     return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _link_text(link: int, length_m: float, radius_m: float, mass_kg: float) -> str:
+    across = mass_kg * (3.0 * radius_m**2 + length_m**2) / 12.0
+    centre = f"{0.0 if link == 0 else -0.5 * length_m!r} 0 0"
+    shape = f"""
+        <origin xyz="{centre}" rpy="0 1.5707963267948966 0"/>
+        <geometry><cylinder radius="{radius_m!r}" length="{length_m!r}"/></geometry>"""
+    shapes = f"<visual>{shape}</visual><collision>{shape}</collision>" if length_m else ""
+    return f"""
+        <link name="link{link}">
+          <inertial>
+            <origin xyz="{centre}" rpy="0 0 0"/>
+            <mass value="{mass_kg!r}"/>
+            <inertia ixx="{0.5 * mass_kg * radius_m**2!r}" iyy="{across!r}" izz="{across!r}"
+                     ixy="0" ixz="0" iyz="0"/>
+          </inertial>
+          {shapes}
+        </link>"""
+
+
+def _joint_text(robot: RobotConfig, joint: int) -> str:
+    limit = robot.limit_rad[joint]
+    back = -(0.5 if joint == 0 else 1.0) * robot.link_lengths_m[joint]
+    axis = "0 0 -1" if robot.joint_axes[joint] == "y" else "0 1 0"
+    return f"""
+        <joint name="{robot.joint_names[joint]}" type="revolute">
+          <origin xyz="{back!r} 0 0" rpy="0 0 0"/>
+          <parent link="link{joint}"/>
+          <child link="link{joint + 1}"/>
+          <axis xyz="{axis}"/>
+          <limit lower="{-limit!r}" upper="{limit!r}" effort="{robot.torque_limit_n_m!r}"
+                 velocity="{robot.joint_speed_limit_rad_s!r}"/>
+          <dynamics damping="{robot.gear_drags_n_m_s[joint]!r}" friction="0"/>
+        </joint>"""
 
 
 def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -> None:
@@ -107,26 +107,41 @@ def _add_ros2_control(root: ET.Element, robot: RobotConfig, kind: Ros2Control) -
     else:
         plugin.text = "dynamixel_hardware_interface/DynamixelHardware"
         _add_params(hardware, _dynamixel_params(robot))
-    rows = zip(
-        robot.limit_rad, robot.servo_ids, robot.servo_records, robot.position_p_gains, strict=True
-    )
-    for joint, (limit, number, facts, gain) in enumerate(rows):
-        senses = facts.measures_current
-        joint_element = ET.SubElement(system, "joint", name=robot.joint_names[joint])
-        command = ET.SubElement(joint_element, "command_interface", name="position")
-        _add_params(command, {"min": repr(-limit), "max": repr(limit)})
-        for what in ("position", "velocity", *(("effort",) if senses else ())):
-            ET.SubElement(joint_element, "state_interface", name=what)
-        if kind == "topic":
-            continue
-        servo = ET.SubElement(system, "gpio", name=f"dxl{number}")
-        _add_params(servo, {"type": "dxl", "ID": str(number)})
-        ET.SubElement(servo, "command_interface", name="Goal Position")
-        current = ("Present Current",) if senses else ()
-        for what in ("Present Position", "Present Velocity", *current):
-            ET.SubElement(servo, "state_interface", name=what)
-        settings = {"Operating Mode": _POSITION_MODE, "Position P Gain": gain}
-        _add_params(servo, {key: str(value) for key, value in settings.items()})
+    for joint in range(len(robot.limit_rad)):
+        system.append(ET.fromstring(_interfaces_text(robot, joint)))
+        if kind != "topic":
+            system.append(ET.fromstring(_servo_text(robot, joint)))
+
+
+def _interfaces_text(robot: RobotConfig, joint: int) -> str:
+    limit = robot.limit_rad[joint]
+    senses = robot.servo_records[joint].measures_current
+    return f"""
+        <joint name="{robot.joint_names[joint]}">
+          <command_interface name="position">
+            <param name="min">{-limit!r}</param>
+            <param name="max">{limit!r}</param>
+          </command_interface>
+          <state_interface name="position"/>
+          <state_interface name="velocity"/>
+          {'<state_interface name="effort"/>' if senses else ""}
+        </joint>"""
+
+
+def _servo_text(robot: RobotConfig, joint: int) -> str:
+    number = robot.servo_ids[joint]
+    senses = robot.servo_records[joint].measures_current
+    return f"""
+        <gpio name="dxl{number}">
+          <param name="type">dxl</param>
+          <param name="ID">{number}</param>
+          <command_interface name="Goal Position"/>
+          <state_interface name="Present Position"/>
+          <state_interface name="Present Velocity"/>
+          {'<state_interface name="Present Current"/>' if senses else ""}
+          <param name="Operating Mode">{_POSITION_MODE}</param>
+          <param name="Position P Gain">{robot.position_p_gains[joint]}</param>
+        </gpio>"""
 
 
 def _dynamixel_params(robot: RobotConfig) -> dict[str, str]:

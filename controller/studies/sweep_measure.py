@@ -111,27 +111,30 @@ def measurement(
         return Measurement(f"refused: {numbers.pose_evidence} pose; a sweep needs a measured one")
     moved = travelled.gait or gait_displacement(record)
     cost = effort(record, travelled)
+    values = {
+        "ran_hz": moved.frequency_hz,
+        "forward_bl_cycle": moved.forward_bl,
+        "left_bl_cycle": moved.left_bl,
+        "turn_rad_cycle": moved.turn_rad,
+        "speed_m_s": moved.speed_m_s,
+        "climb_m_s": cost.climb_m_s,
+        "power_w": cost.power_w,
+        "cost_of_transport": cost.cost_of_transport,
+        "mechanical_cost": cost.mechanical_cost,
+        "slip": cost.slip,
+        "peak_current_a": numbers.peak_current_a,
+        "peak_torque_n_m": numbers.peak_torque_n_m,
+        "peak_temperature_c": numbers.peak_temperature_c,
+        "tracking_max_rad": numbers.tracking_max_rad,
+        "least_rate": least_rate,
+    }
     return Measurement(
         ended=tripped or "ran to its end",
         cycles=moved.cycles,
-        ran_hz=significant(moved.frequency_hz, 5),
-        forward_bl_cycle=significant(moved.forward_bl, 5),
-        left_bl_cycle=significant(moved.left_bl, 5),
-        turn_rad_cycle=significant(moved.turn_rad, 5),
-        speed_m_s=significant(moved.speed_m_s, 5),
-        climb_m_s=significant(cost.climb_m_s, 5),
-        power_w=significant(cost.power_w, 5),
-        cost_of_transport=significant(cost.cost_of_transport, 5),
-        mechanical_cost=significant(cost.mechanical_cost, 5),
-        slip=significant(cost.slip, 5),
-        peak_current_a=significant(numbers.peak_current_a, 5),
-        peak_torque_n_m=significant(numbers.peak_torque_n_m, 5),
-        peak_temperature_c=significant(numbers.peak_temperature_c, 5),
-        tracking_max_rad=significant(numbers.tracking_max_rad, 5),
-        least_rate=significant(least_rate, 5),
         pose_evidence=numbers.pose_evidence,
         pose_source=numbers.pose_source,
         backend=backend,
+        **{name: significant(value, 5) for name, value in values.items()},
     )
 
 

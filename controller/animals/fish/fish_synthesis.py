@@ -14,7 +14,7 @@ from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.animals.fish.piece_graph import PieceGraph, piece_graph
-from snakewalk.controller.animals.fish.postures import Postures
+from snakewalk.controller.animals.fish.postures import Postures, save_postures
 from snakewalk.controller.animals.fish.segments import (
     MotionSegment,
     Segmentation,
@@ -31,7 +31,6 @@ from snakewalk.controller.animals.fish.synthesis import (
     joint_pieces,
     junctions,
     random_sequence,
-    save_motion,
     sequence_through,
 )
 from snakewalk.controller.animals.fish.synthesis_options import SynthesisOptions
@@ -93,7 +92,13 @@ class SynthesisedMotion:
 
     def save(self, file: Path) -> None:
         """Write the motion as a recording that a run accepts."""
-        save_motion(file, self.motion, self.joints_rad, self.facts.robot, self.sequence)
+        save_postures(
+            file,
+            self.motion,
+            joints_rad=self.joints_rad,
+            robot=self.facts.robot,
+            segments=self.sequence.order,
+        )
 
 
 def synthesise_motion(

@@ -6,6 +6,8 @@ fish at rest or backward, so both orientations are matched, and the better one i
 
 import cv2
 import numpy as np
+from scipy.sparse.csgraph import breadth_first_order
+from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from snakewalk.config.arrays import Bools, Floats, Ints
@@ -13,7 +15,8 @@ from snakewalk.controller.animals.fish.model import FishModel
 from snakewalk.controller.animals.fish.postures import midline_angles
 from snakewalk.controller.kinematics.arc_length import arc_lengths
 
-_NEIGHBOURS = [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1)]
+_DIAGONAL = 1.5
+"""A pixel's eight neighbours are closer than this."""
 
 
 def rough_midline(mask: Bools) -> Floats | None:
@@ -70,35 +73,17 @@ def _excess(points: Floats, reach: float) -> Floats:
 
 def _longest_path(bones: Bools) -> Ints | None:
     """Pixels (P, 2), row and column, of the longest shortest path in any part of the skeleton."""
-    pixels = {(int(r), int(c)) for r, c in np.argwhere(bones)}
-    best: list[tuple[int, int]] = []
-    while pixels:
-        first = next(iter(pixels))
-        reached = _walk(first, pixels)
-        end = reached[-1][0]
-        before = dict(_walk(end, pixels))
-        path: list[tuple[int, int]] = []
-        step: tuple[int, int] | None = list(before)[-1]
-        while step is not None:
-            path.append(step)
-            step = before[step]
+    pixels = np.argwhere(bones)
+    tree = cKDTree(pixels)
+    neighbours = tree.sparse_distance_matrix(tree, _DIAGONAL, output_type="coo_matrix").tocsr()
+    best: list[int] = []
+    others = set(range(len(pixels)))
+    while others:
+        far, _ = breadth_first_order(neighbours, min(others))
+        reached, before = breadth_first_order(neighbours, far[-1])
+        path = [int(reached[-1])]
+        while path[-1] != far[-1]:
+            path.append(int(before[path[-1]]))
         best = max(best, path, key=len)
-        pixels -= set(before)
-    return np.array(best, dtype=np.int64) if best else None
-
-
-def _walk(
-    start: tuple[int, int], pixels: set[tuple[int, int]]
-) -> list[tuple[tuple[int, int], tuple[int, int] | None]]:
-    before: dict[tuple[int, int], tuple[int, int] | None] = {start: None}
-    ring = [start]
-    while ring:
-        further = []
-        for r, c in ring:
-            for dr, dc in _NEIGHBOURS:
-                there = (r + dr, c + dc)
-                if there in pixels and there not in before:
-                    before[there] = (r, c)
-                    further.append(there)
-        ring = further
-    return list(before.items())
+        others -= set(reached.tolist())
+    return pixels[best] if best else None

@@ -136,8 +136,11 @@ _POSTURES = {"base", "head_rad", "angles_rad_spine", "joints_at", "rate_hz"}
 _SECTIONS = ("half_width", "half_height")
 
 
-def save_postures(path: Path, postures: Postures) -> None:
-    """Write postures with their skeletons, so that the file is a recording for a run as well."""
+def save_postures(path: Path, postures: Postures, **more: Any) -> None:
+    """Write postures with their skeletons, so that the file is a recording for a run as well.
+
+    ``more`` are further arrays, such as the joints (T, joints) of one robot.
+    """
     optional = {
         key: values
         for key in ("height", "pitch_rad", "value")
@@ -160,6 +163,7 @@ def save_postures(path: Path, postures: Postures) -> None:
             source=postures.source,
             licence=postures.licence,
             **optional,
+            **more,
         )
 
 

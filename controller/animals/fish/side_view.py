@@ -9,7 +9,8 @@ from snakewalk.config.errors import InputError
 from snakewalk.controller.animals.fish.matching import LEAST_VALUE, SilhouetteFrame, Target
 from snakewalk.controller.animals.fish.model import FishModel
 from snakewalk.controller.animals.fish.pattern_search import pattern_search
-from snakewalk.controller.animals.fish.raster import Window, side_outline
+from snakewalk.controller.animals.fish.raster import side_outline
+from snakewalk.controller.animals.fish.top_view import window_of
 
 _LIMIT_RAD = 1.2
 
@@ -72,18 +73,11 @@ class SideView:
             None where the side view shows nothing.
 
         """
-        rows, columns = (np.flatnonzero(frame.mask.any(axis=k)) for k in (1, 0))
-        if len(rows) == 0:
+        model = self._model
+        window = window_of(frame, model, None, min(1.0, 180.0 / model.length_px))
+        if window is None:
             self.last = None
             return None
-        model = self._model
-        scale = min(1.0, 180.0 / model.length_px)
-        edge = max(8, round(0.15 * model.length_px))
-        left = max(int(columns[0]) - edge, 0)
-        top = max(int(rows[0]) - edge, 0)
-        right = min(int(columns[-1]) + edge, frame.mask.shape[1])
-        bottom = min(int(rows[-1]) + edge, frame.mask.shape[0])
-        window = Window(left, top, right - left, bottom - top, scale)
         target = Target(frame, window, 3)
 
         def value(tilt: Floats) -> float:
@@ -91,6 +85,7 @@ class SideView:
                 return float("-inf")
             return target.value_of_pieces(self.pieces(parameters, tilt))
 
+        rows = np.flatnonzero(frame.mask.any(axis=1))
         middle = -0.5 * float(rows[0] + rows[-1])
         fresh = [np.array([middle, pitch]) for pitch in (0.0, 0.3, -0.3)]
         steps = np.array([0.04 * model.length_px, 0.1])

@@ -8,7 +8,6 @@ a quintic: position and speed are continuous, acceleration is bounded.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -427,31 +426,3 @@ def joint_motion(
     """(T, joints) the whole motion, joined with a blend at the joint layer."""
     samples = max(1, round(blend_s * pieces.rate_hz))
     return join(joint_pieces(pieces, sequence, retarget), samples)
-
-
-def save_motion(
-    path: Path, postures: Postures, joints_rad: Floats, robot: str, sequence: PieceSequence
-) -> None:
-    """Write a motion that ``load_track`` reads, with the joints (T, joints) of one robot."""
-    with path.open("wb") as stream:
-        np.savez_compressed(
-            stream,
-            points=postures.points(),
-            rate_hz=postures.rate_hz,
-            length_m=np.nan if postures.length_m is None else postures.length_m,
-            base=postures.base,
-            head_rad=postures.head_rad,
-            angles_rad_spine=postures.angles_rad,
-            joints_at=postures.joints_at,
-            joints_rad=joints_rad,
-            robot=robot,
-            segments=np.array(sequence.order),
-            **{
-                key: values
-                for key in ("height", "pitch_rad")
-                if (values := getattr(postures, key)) is not None
-            },
-            name=postures.name,
-            source=postures.source,
-            licence=postures.licence,
-        )

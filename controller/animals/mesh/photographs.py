@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
+from scipy.sparse.csgraph import connected_components
 
 from snakewalk.config.arrays import Bools, Floats, Image
 from snakewalk.controller.animals.mesh.body_model import BodyModel
@@ -131,9 +132,7 @@ def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] |
             rows.append(row)
             differences.append(np.median(np.log(colour[k][both] / colour[i][both]), axis=0))
             joined[i, k] = joined[k, i] = True
-    reached = joined[0]
-    for _ in range(count):
-        reached = joined[reached].any(axis=0)
+    _, group = connected_components(joined)
     if rows:
         first = np.eye(count)[0]
         log = np.linalg.lstsq(
@@ -144,7 +143,7 @@ def _gains(colour: Floats, cosine: Floats) -> tuple[tuple[float, float, float] |
     gains = np.exp(log - log[0])
     return tuple(
         (float(r), float(g), float(b)) if is_reached else None
-        for (r, g, b), is_reached in zip(gains, reached, strict=True)
+        for (r, g, b), is_reached in zip(gains, group == group[0], strict=True)
     )
 
 
