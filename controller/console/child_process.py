@@ -51,13 +51,11 @@ def child_environ() -> dict[str, str]:
 
 
 def start_module(module: str, *arguments: str) -> "subprocess.Popen[str]":
-    """Start a Python module in a child; its output is a text pipe."""
-    return subprocess.Popen(
-        [sys.executable, "-m", module, *arguments],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=child_environ(),
-    )
+    """Start a Python module in a child that leaves Ctrl-C to this process; its output is a pipe."""
+    with _starting():
+        return subprocess.Popen(
+            [sys.executable, "-m", module, *arguments], stdout=subprocess.PIPE, text=True
+        )
 
 
 def run_command(words: Sequence[str]) -> int:

@@ -9,6 +9,7 @@ import pytest
 
 from snakewalk.controller.bench.loop_compiler import ALL, compile_loops, loop_modules
 from snakewalk.controller.cli.main import CompilationNotice, is_run
+from snakewalk.controller.console.child_process import start_module
 from snakewalk.drivers.compilation import observe_compilation, report_compiled
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -53,6 +54,13 @@ def test_a_failed_child_is_reported_and_a_note_of_both_once(
     with pytest.raises(RuntimeError, match="not compiled"):
         compile_loops(lambda done, total, name: None, ALL)
     assert caplog.messages == ["loops are stored elsewhere"]
+
+
+def test_a_terminal_s_interrupt_is_left_to_the_parent() -> None:
+    """Ctrl-C in the first run printed a traceback of each compiling child."""
+    code = "import signal; print(signal.pthread_sigmask(signal.SIG_BLOCK, []))"
+    with start_module("timeit", "-n", "1", "-r", "1", code) as child:
+        assert "SIGINT" in (child.stdout.read() if child.stdout else "")
 
 
 @pytest.mark.slow
