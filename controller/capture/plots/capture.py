@@ -161,8 +161,11 @@ def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> tuple[Ima
     if status.has_points:
         rows, columns, points_px = _window_of_animal(points_px, is_square=True)
         image = image[rows, columns]
-    tile = drawn(image, points_px, status, _TILE_PX, _TILE_PX + _TEXT_PX - 18)
-    factor = min(_TILE_PX / image.shape[1], (len(tile) - 18) / image.shape[0])
+    picture = drawn(image, points_px, status, _TILE_PX, _TILE_PX)
+    tile = np.pad(
+        picture, ((0, _TEXT_PX - 18), (0, 0), (0, 0)), constant_values=_BACKGROUND_GREY
+    )  # its text hides no part of the picture
+    factor = min(_TILE_PX / image.shape[1], (_TILE_PX - 18) / image.shape[0])
     most = 0.4 * _TILE_PX / factor
     length = max((k for k in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if k <= most), default=1)
     high = round(image.shape[0] * factor)
