@@ -182,8 +182,10 @@ class Dashboard:
                 f"<span style='color:{old}'>{_number(age_s * 1e3, 0)}</span>",
             )
             lines.append("<tr><td>" + "</td><td>".join(cells) + "</td></tr>")
-        heads = ("joint", "angle, rad", "A", "°C", "V", "age, ms")
-        head = "<tr><th>" + "</th><th>".join(heads) + "</th></tr>"
+        head = (
+            "<tr><th>joint</th><th>angle, rad</th><th>A</th>"
+            "<th>°C</th><th>V</th><th>age, ms</th></tr>"
+        )
         self._bars.content = (
             "<table style='width:100%;font-size:11px;line-height:1.25;border-spacing:4px 1px;"
             f"white-space:nowrap;text-align:right'>{head}{''.join(lines)}</table>"
@@ -288,8 +290,8 @@ def _spread(rows: int) -> np.ndarray:
 def _of_joints(names: Sequence[str]) -> dict[str, str]:
     """Colours of all joints, from dark at the head to light at the tail."""
     share = np.linspace(0.0, 0.75, len(names))[:, None]
-    dark, white = (np.array(colours.rgb(colour)) for colour in (colours.MEASURED, "#ffffff"))
-    tones = np.rint(dark + share * (white - dark)).astype(int).tolist()
+    dark = np.array(colours.rgb(colours.MEASURED))
+    tones = np.rint(dark + share * (255 - dark)).astype(int).tolist()
     return {
         name: f"#{red:02x}{green:02x}{blue:02x}"
         for name, (red, green, blue) in zip(names, tones, strict=True)

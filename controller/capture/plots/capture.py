@@ -169,8 +169,7 @@ def _tile(image: DeepImage, points_px: Floats, status: FrameStatus) -> tuple[Ima
     most = 0.4 * _TILE_PX / factor
     length = max((k for k in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if k <= most), default=1)
     high = round(image.shape[0] * factor)
-    end = (4 + round(length * factor), high - 5)
-    cv2.line(tile, (4, high - 5), end, _TEXT, 2)
+    cv2.line(tile, (4, high - 5), (4 + round(length * factor), high - 5), _TEXT, 2)
     _put(tile, f"{length} px", (4, high - 10), _TEXT)
     return tile, high
 
