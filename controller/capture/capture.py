@@ -30,15 +30,15 @@ _OF_FRAMES = (
 _STILL_BODY = 0.02  # of the length: a smaller change does not count as motion
 
 
-_ADVICE = {
+ADVICE = {
     FrameStatus.NOTHING: "no contrast or no motion: nothing stands out from the background; "
     "give --background, or better light",
     FrameStatus.SEVERAL: "several animals: give --animals N or --animals auto",
-    FrameStatus.MERGED: "the animal is never seen apart from others",
-    FrameStatus.EMPTY: "the found lines lie on empty ground; give --background",
-    FrameStatus.CUT: "the body is cut by the edge of the image",
-    FrameStatus.BLOB: "the silhouette is not a long body; give --background",
+    FrameStatus.CUT: "the body is cut by the edge of the image; give a larger --roi, or film more "
+    "of the ground",
+    FrameStatus.BLOB: "the clearest object is not a long body; give --roi around the animal",
 }
+"""Remedies for a film by the commonest status of its frames."""
 
 
 class RejectedFilmError(InputError):
@@ -56,10 +56,13 @@ class UnusableFilmError(RejectedFilmError):
         self.reason: FrameStatus | None = None
         """Commonest status of the frames without points; None: the film is too short."""
         if not reasons:
-            super().__init__(f"{name}: {len(skeletons)} frame: two or more are needed")
+            super().__init__(f"{name}: one frame shows no motion; film longer")
             return
         self.reason = worst = max(dict.fromkeys(reasons), key=reasons.count)
-        advice = _ADVICE.get(worst, f"the body is never completely visible: {worst}")
+        advice = ADVICE.get(
+            worst,
+            f"the body is never completely visible: {worst}; film until it is, or give --threshold",
+        )
         super().__init__(f"{name}: {advice} ({reasons.count(worst)} of {len(skeletons)} frames)")
 
 
@@ -160,7 +163,7 @@ def captured_from(
     if not part and _change(captured) < _STILL_BODY:
         raise RejectedFilmError(
             f"{name}: no motion: the body changes by less than {_STILL_BODY:.0%} of its length in "
-            f"{len(film.skeletons)} frames"
+            f"{len(film.skeletons)} frames; film while it moves"
         )
     return captured
 

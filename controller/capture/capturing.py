@@ -46,16 +46,15 @@ from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
 
-MANY_LOST = 1.0 / 3.0  # share of frames that are not used from which the capture needs a look
+MANY_LOST = 1.0 / 3.0
+"""Share of the frames: from this number of lost ones, or below this number of used ones, the
+outline of the animal may be unseen."""
 _EXPLAINED_STATUSES = {
     FrameStatus.NOTHING,
     FrameStatus.CUT,
     FrameStatus.MERGED,
     FrameStatus.LEFT_OUT,
 }
-_LEAST_USED = (
-    1.0 / 3.0
-)  # of the frames that show the animal: fewer are used if its outline is unseen
 _UNCLEAR = REJECTED | {
     FrameStatus.SEVERAL,
     FrameStatus.BLOB,
@@ -254,7 +253,8 @@ def _captured_clearly(
     """Capture the film; an animal as bright as its ground, whose outline is unseen, is a fault."""
     fault = RejectedFilmError(
         f"{options.recording}: the animal is about as bright as its ground, or dark and light "
-        "shapes are in view; use other light, or give --background, --roi or --threshold"
+        "shapes are in view; use other light, or give --animals, --background, --cropped, --roi "
+        "or --threshold"
     )
     try:
         captured = _captured_parts(parts, film, detector, bar)
@@ -262,7 +262,7 @@ def _captured_clearly(
         if error.reason not in {None, *_EXPLAINED_STATUSES} and stands_out_both_ways(film.some):
             raise fault from None
         raise
-    few = captured.used.sum() < _LEAST_USED * len(_expected_statuses(captured))
+    few = captured.used.sum() < MANY_LOST * len(_expected_statuses(captured))
     if few and stands_out_both_ways(film.some):
         raise fault
     check_chance_finds(options, captured)

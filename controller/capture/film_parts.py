@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
-from snakewalk.controller.capture.capture import Capture, RejectedFilmError, captured_from
+from snakewalk.controller.capture.capture import Capture, UnusableFilmError, captured_from
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import margin_of, margins
 from snakewalk.controller.capture.image_file import large_array
 from snakewalk.controller.capture.part_folder import FinishedPart, PartFolder
 from snakewalk.controller.capture.staged_film import ROUGH
 from snakewalk.controller.images.body_detector import Detection
-from snakewalk.controller.images.medial_axis import Skeleton
+from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
 PART_FRAMES = 1000
@@ -128,7 +128,9 @@ def joined(
     sign = _signs(parts)
     score, by = _head_of(parts, sign)
     if sum(film_part.used for film_part in parts) < 2:
-        raise RejectedFilmError(f"{name}: the body is never completely visible; look at --sheet")
+        raise UnusableFilmError(
+            name, [no_skeleton(one) for film_part in parts for one in film_part.read().status]
+        )
     count = sum(film_part.frames for film_part in parts)
     arrays: dict[str, Floats] = {}
     status: list[FrameStatus] = []

@@ -73,7 +73,7 @@ def open_film(options: CaptureOptions) -> OpenedFilm:
     one_size = len({frame.shape[:2] for frame in sample}) == 1
     if (options.roi or options.mask) and not one_size:
         raise InputError(
-            f"{options.recording}: --roi and --mask need images of one size; these differ"
+            f"{options.recording}: --roi and --mask need images of one size; leave them out"
         )
     region = region_of(options.roi, options.mask, sample[0].shape)
     for head_px in heads_px:

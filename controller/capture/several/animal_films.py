@@ -8,7 +8,7 @@ import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats, SignedInts
 from snakewalk.config.errors import InputError
-from snakewalk.controller.capture.capture import Capture, RejectedFilmError
+from snakewalk.controller.capture.capture import ADVICE, Capture, RejectedFilmError
 from snakewalk.controller.capture.film_parts import PART_FRAMES, FilmParts
 from snakewalk.controller.capture.part_folder import PartFolder
 from snakewalk.controller.capture.several.blobs import (
@@ -92,10 +92,7 @@ def find_animals(
     usual = usual_area(blob_frames)
     sample = [blobs.area_px for blobs in blob_frames]
     if usual <= 0.0:
-        raise RejectedFilmError(
-            f"{name}: no contrast or no motion: nothing stands out from the background; give "
-            "--background, or better light"
-        )
+        raise RejectedFilmError(f"{name}: {ADVICE[FrameStatus.NOTHING]}")
     builder = TrackletBuilder(usual)
     count = 0
     for frame in frames:

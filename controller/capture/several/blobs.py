@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 
 from snakewalk.config.arrays import Bools, DeepImage, Floats, Int32s, Ints
-from snakewalk.config.errors import InputError
 from snakewalk.controller.images.background import background_candidates, median_background
 from snakewalk.controller.images.body_detector import BodyDetector, usual_polarity
 from snakewalk.controller.images.silhouette import (
@@ -147,9 +146,6 @@ def detector_of_several(
         threshold: contrast at the boundary of a body, grey levels.
         requested_count: number of animals; None: unknown.
 
-    Raises:
-        InputError: nothing stands out.
-
     """
     if background is not None:
         polarity = usual_polarity(frames, background)
@@ -165,15 +161,13 @@ def detector_of_several(
             tried.append(
                 (detector, 0 if requested_count is None else abs(count - requested_count), area)
             )
+    surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
     if not tried:
-        raise InputError(
-            "nothing stands out from the background; give --background, or better light"
-        )
+        return surface
     nearest = min(away for _, away, _ in tried)
     tried = [trial for trial in tried if trial[1] == nearest]
     largest = max(area for _, _, area in tried)
     fixed = next(detector for detector, _, area in tried if area >= _LEAST_AREA * largest)
-    surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
     return surface if _shows_more(surface, fixed, frames) else fixed
 
 

@@ -87,7 +87,7 @@ def capture_several(options: CaptureOptions) -> AnimalsFacts:
         film = open_film(options)
         name = str(options.recording)
         if not film.one_size:
-            raise InputError(f"{name}: --animals needs images of one size; these differ")
+            raise InputError(f"{name}: --animals needs images of one size; leave it out")
         detector = detector_of_several(
             film.some,
             film.background,
