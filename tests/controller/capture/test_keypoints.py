@@ -1,5 +1,6 @@
 """Keypoints of another program as the detector: the film confirms or contradicts their lines."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -14,25 +15,38 @@ from snakewalk.controller.capture.capturing import capture_recording
 from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.capture.verification.remedies import remedy
 from snakewalk.controller.track.frame_status import FrameStatus
+from tests.helpers import tracker_files
 from tests.helpers.film_options import changed, film_options
 from tests.oracles.rendered_snake import SnakeScene, film, true_midlines
 
 SCENE = SnakeScene(rows=200, columns=260, length_px=150.0, frames=22, rate_hz=15.0)
 NOISE_PX = 0.5
-EXCHANGED, MISSING, LOST = 7, 12, 15
+EXCHANGED, REVERSED, MISSING, LOST = 7, 9, 12, 15
+UNLIKELY = 17
+"""Frame with a point far away that a tracker is not sure of."""
+WRITERS: dict[str, Callable[[Path, Floats, Floats], None]] = {
+    "sleap.csv": tracker_files.sleap_csv,
+    "sleap.h5": tracker_files.sleap_h5,
+    "dlc.csv": tracker_files.dlc_csv,
+    "dlc.h5": tracker_files.dlc_h5,
+}
 
 
 def table(file: Path, points: Floats) -> Path:
     """A table of SLEAP with keypoints (T, 11, 2), without those that are NaN."""
-    names = [f"p{k}.{axis}" for k in range(points.shape[1]) for axis in ("x", "y", "score")]
-    rows = [["track", "frame_idx", "instance.score", *names]]
-    for number, body in enumerate(points):
-        values = [
-            "" if np.isnan(value) else f"{value:.2f}" for x, y in body for value in (x, y, 0.9)
-        ]
-        rows.append(["snake", str(number), "0.9", *values])
-    file.write_text("\n".join(map(",".join, rows)) + "\n")
+    tracker_files.sleap_csv(file, points, np.full(points.shape[:2], 0.9))
     return file
+
+
+def tracked_px() -> Floats:
+    """(T, 11, 2) keypoints with noise and faults."""
+    noise = np.random.default_rng(1).normal(0.0, NOISE_PX, (SCENE.frames, 11, 2))
+    points = true_midlines(SCENE)[:, ::10] + noise
+    points[EXCHANGED, [3, 6]] = points[EXCHANGED, [6, 3]]
+    points[MISSING, 5] = np.nan
+    points[LOST, 2:5] = np.nan
+    points[REVERSED] = points[REVERSED, ::-1]
+    return points
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +55,7 @@ def options(tmp_path_factory: pytest.TempPathFactory) -> CaptureOptions:
     (folder / "film").mkdir()
     for number, frame in enumerate(film(SCENE)):
         cv2.imwrite(str(folder / "film" / f"{number:02d}.png"), frame)
-    noise = np.random.default_rng(1).normal(0.0, NOISE_PX, (SCENE.frames, 11, 2))
-    points = true_midlines(SCENE)[:, ::10] + noise
-    points[EXCHANGED, [3, 6]] = points[EXCHANGED, [6, 3]]
-    points[MISSING, 5] = np.nan
-    points[LOST, 2:5] = np.nan
-    keypoints = table(folder / "points.csv", points)
+    keypoints = table(folder / "points.csv", tracked_px())
     return film_options(folder / "film", folder / "t.npz", rate_hz=15.0, keypoints=keypoints)
 
 
@@ -56,24 +65,40 @@ def errors_px(captured: CaptureFile) -> Floats:
     return np.asarray(np.hypot(*away.transpose(2, 0, 1)).mean(axis=1))
 
 
+@pytest.mark.slow_cases(3, "4 cases of 4 s of CPU")
 @pytest.mark.slow
-def test_the_film_confirms_lines_and_contradicts_a_wrong_keypoint(options: CaptureOptions) -> None:
+@pytest.mark.parametrize("name", WRITERS)
+def test_the_film_confirms_lines_and_contradicts_a_wrong_keypoint(
+    name: str, options: CaptureOptions, tmp_path: Path
+) -> None:
+    """Each format; DeepLabCut states a place and a low likelihood for a point it did not see."""
+    points = tracked_px()
+    scores = np.full(points.shape[:2], 0.9)
+    if name.startswith("dlc"):
+        points[UNLIKELY, 4] = points[UNLIKELY, 4] + 40.0
+        scores[UNLIKELY, 4] = 0.2
+    keypoints = tmp_path / name
+    WRITERS[name](keypoints, points, scores)
+    options = changed(options, keypoints=keypoints, output=tmp_path / "t.npz")
     facts = capture_recording(options)
     file = load_capture(options.output)
     status, expected_px = file.captured.status, file.captured.expected_px
-    plain = [k for k in range(SCENE.frames) if k not in {EXCHANGED, MISSING, LOST}]
+    plain = [
+        k for k in range(SCENE.frames) if k not in {EXCHANGED, REVERSED, MISSING, LOST, UNLIKELY}
+    ]
     error_px = errors_px(file)
     assert sum(status[k] is FrameStatus.GOOD for k in plain) >= len(plain) - 1
     assert np.median(error_px[plain]) < 0.007 * SCENE.length_px
     assert (error_px[plain] < 2.0 * expected_px[plain]).all()
-    assert status[MISSING].has_points
-    assert error_px[MISSING] < 2.0 * expected_px[MISSING]
+    for frame in (REVERSED, MISSING, UNLIKELY):
+        assert status[frame].has_points
+        assert error_px[frame] < 2.0 * expected_px[frame]
     assert status[EXCHANGED] is not FrameStatus.GOOD
     assert not error_px[EXCHANGED] > 2.0 * expected_px[EXCHANGED]
     assert status[LOST] is FrameStatus.MISSING
     assert facts.facts["quantity"] == f"keypoints of an animal (stated by {options.keypoints})"
     assert facts.head_by == "given"
-    assert file.source == "captured from film, positions from points.csv"
+    assert file.source == f"captured from film, positions from {name}"
 
 
 @pytest.mark.slow

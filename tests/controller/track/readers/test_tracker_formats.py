@@ -16,6 +16,7 @@ from snakewalk.config.file_units import si_value
 from snakewalk.controller.track.choice import ALL, Choice
 from snakewalk.controller.track.readers.keypoints import Keypoints
 from snakewalk.controller.track.readers.load import load_file
+from tests.helpers import tracker_files
 from tests.helpers.travelling import FRAMES, RATE_HZ, ends, wave_angles
 
 BODY = ends(wave_angles(), 80.0)[:, ::10] + 200.0  # (60, 11, 2), y upwards
@@ -35,51 +36,22 @@ def same(track, length_m=None, rate_hz=RATE_HZ, frames=FRAMES):
     return track
 
 
-def dlc_rows(individuals=None, likelihood=None):
-    """Header and rows as pandas writes DeepLabCut's columns."""
-    likelihood = np.full(BODY.shape[:2], 0.99) if likelihood is None else likelihood
-    coords = ["x", "y", "likelihood"]
-    head = [["scorer"] + ["DLC_resnet50_eel"] * 33]
-    if individuals:
-        head.append(["individuals"] + [individuals] * 33)
-    head.append(["bodyparts"] + [n for n in NODES for _ in coords])
-    head.append(["coords"] + coords * 11)
-    values = np.concatenate([PIXELS, likelihood[..., None]], axis=2).reshape(FRAMES, 33)
-    return head, values
+def dlc_csv(path, likelihood=None, **options):
+    tracker_files.dlc_csv(
+        path, PIXELS, np.full(BODY.shape[:2], 0.99) if likelihood is None else likelihood, **options
+    )
 
 
-def dlc_csv(path, **options):
-    head, values = dlc_rows(**options)
-    rows = [",".join(map(str, row)) for row in head]
-    rows += [f"{k}," + ",".join(map(repr, row)) for k, row in enumerate(values.tolist())]
-    path.write_text("\n".join(rows) + "\n")
+def dlc_h5(path, likelihood=None, **options):
+    tracker_files.dlc_h5(
+        path, PIXELS, np.full(BODY.shape[:2], 0.99) if likelihood is None else likelihood, **options
+    )
 
 
-def dlc_h5(path, columns=None, protocol=0, **options):
-    head, values = dlc_rows(**options)
-    names = list(zip(*(row[1:] for row in head), strict=True)) if columns is None else columns
-    kind = np.dtype([("index", "<i8"), ("values_block_0", "<f8", (values.shape[1],))])
-    table = np.zeros(FRAMES, kind)
-    table["index"], table["values_block_0"] = np.arange(FRAMES), values
-    with h5py.File(path, "w") as file:
-        group = file.create_group("df_with_missing")
-        group.create_dataset("table", data=table)
-        stored = names if isinstance(names, bytes) else pickle.dumps([(1, names)], protocol)
-        group.attrs["non_index_axes"] = np.bytes_(stored) if protocol == 0 else np.void(stored)
-
-
-def sleap_h5(path, animals=1, scores=None):
-    tracks = np.full((FRAMES, 11, 2, 2), np.nan)
-    for k in range(animals):
-        tracks[..., k] = PIXELS + 50.0 * k
-    marks = np.full((FRAMES, 11, 2), np.nan)
-    marks[..., 0] = 0.9 if scores is None else scores
-    with h5py.File(path, "w") as file:  # transposed, as SLEAP does for MATLAB
-        file["tracks"] = tracks.T
-        file["track_occupancy"] = np.isfinite(tracks).any((1, 2)).astype(np.uint8)
-        file["point_scores"] = marks.T
-        file["node_names"] = [n.encode() for n in NODES]
-        file["track_names"] = [b"eel", b"other"]
+def sleap_h5(path, scores=None, **options):
+    tracker_files.sleap_h5(
+        path, PIXELS, np.full(BODY.shape[:2], 0.9) if scores is None else scores, **options
+    )
 
 
 def wcon(**more):
@@ -281,7 +253,7 @@ def test_faults_of_wcon_are_one_line(tmp_path: Path) -> None:
 
 
 def test_faults_of_deeplabcut_and_scores_are_one_line(tmp_path: Path) -> None:
-    head, _ = dlc_rows(individuals="eel")
+    head, _ = tracker_files.dlc_rows(PIXELS, PIXELS[..., 0], "eel")
     columns = list(zip(*(row[1:] for row in head), strict=True))
     path = tmp_path / "bad.h5"
     both = [("s", "a" if k < 15 else "b", *name[2:]) for k, name in enumerate(columns)]
