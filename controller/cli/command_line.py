@@ -306,7 +306,7 @@ def _print_fault(error: Any) -> None:
         text = f"{error.message}; did you mean {near[0]}?" if near else error.message
     text = re.sub(r"^Invalid value for '([^']+)'(?: / '[^']+')*: ", r"\1: ", text)
     text = re.sub(r": (?:dir|file) ('.*' is a (?:file|directory))\.$", r": \1", text)
-    text = re.sub(r"^Missing (?:option|argument) '([^']+)'.*\.$", r"\1: is required", text)
+    text = re.sub(r"^Missing (?:option|argument) '([^']+)'.*$", r"\1: is required", text)
     print(f"snakewalk: {text} (see {path} --help)", file=sys.stderr)
 
 
