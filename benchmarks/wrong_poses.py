@@ -148,6 +148,7 @@ def main() -> int:
     )
     parser.add_argument("--run", default="flat-slalom")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--errors", action="store_true", help="robot and ground have errors, too")
     parser.add_argument("--write", type=Path, help="file of rows")
     parser.add_argument("--most", type=int, default=10_000, help="largest number of new rehearsals")
@@ -158,7 +159,7 @@ def main() -> int:
     rows = [json.loads(line) for line in lines]
     done = {(row["kind"], row["run"], row["seed"], row["has_errors"]) for row in rows}
     new = 0
-    for seed in range(given.seeds):
+    for seed in range(given.first_seed, given.first_seed + given.seeds):
         for kind in given.kinds or changes():
             key = (kind, given.run, seed, given.errors)
             if key in done or new >= given.most:

@@ -18,7 +18,12 @@ from snakewalk.controller.console.options import Force, Json, Robot, RunPort, Wo
 from snakewalk.controller.console.result_files import refuse_to_overwrite, write_result
 from snakewalk.controller.kinematics.smoothstep import cubic
 from snakewalk.controller.motion.parted_recording import recording
-from snakewalk.controller.pose.mount_fit import fit_mount, predicted_ways, scale_interval
+from snakewalk.controller.pose.mount_fit import (
+    MOUNT_OFF,
+    fit_mount,
+    predicted_ways,
+    scale_interval,
+)
 from snakewalk.controller.pose.sample import ArrivedPose, PoseFeed, PoseSample, turned
 from snakewalk.controller.pose.sender_clock import SenderClock
 from snakewalk.controller.run.backend import RehearsedPort
@@ -86,7 +91,7 @@ def calibrate_source(
     show(
         {
             "body": "the tracked body is {:+.3f} m ahead of the centre of its link, {:+.3f} m "
-            "left, {:+.3f} m up".format(*config.offset_m),
+            "left, {:+.3f} m up, within {:.3f} m".format(*config.offset_m, MOUNT_OFF * residual_m),
             "ground": "the source's origin is {:+.3f} m ahead of the head's first place, {:+.3f} m "
             "left".format(*config.world_m),
             "pose": config.model_dump(exclude_defaults=True),
@@ -135,7 +140,7 @@ def calibrated(
     before = robot.pose or PoseConfig()
     stamps_s, places_m, rotations = (np.array(column) for column in zip(*rows, strict=True))
     cycle = result.record.cycle
-    nodded_s = cycle.time_s[(cycle.sent_rad[:, robot.pitch_joints[:2]] > 0.9 * NOD_RAD).any(axis=1)]
+    nodded_s = cycle.time_s[(cycle.sent_rad[:, robot.pitch_joints[:2]] > 0.9 * NOD_RAD).any(1)]
     swung_s = nodded_s[0] - REST_S if len(nodded_s) else np.inf
     swings, poses = cycle.time_s < swung_s, stamps_s < swung_s
     time_s = cycle.time_s[swings]
@@ -162,8 +167,8 @@ def calibrated(
         nodding = (stamps_s > late_s[0]) & (stamps_s < late_s[1])
         resting = poses & (stamps_s > swung_s - 0.5)
         _check_vertical(mount.config, rotations[resting], rotations[nodding])
-    ahead_m, left_m, up_m = mount.config.offset_m
-    offset_m = ahead_m, left_m, round(up_m - robot.body_radius_m, 4)
+    *level_m, up_m = mount.config.offset_m
+    offset_m = *level_m, round(up_m - robot.body_radius_m, 4)
     found = mount.config.model_dump(exclude_unset=True) | {"offset_m": offset_m}
     return before.model_copy(update=found), mount.residual_m
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from snakewalk.config.arrays import Floats
 from snakewalk.config.errors import InputError
 from snakewalk.config.pose import PoseConfig
-from snakewalk.controller.pose.mount_fit import fit_mount
+from snakewalk.controller.pose.mount_fit import MOUNT_OFF, fit_mount
 from snakewalk.controller.pose.sample import PoseSample, turned
 from snakewalk.controller.pose.tracked_body import tracked_link
 from snakewalk.drivers.attitude import about_up
@@ -56,6 +56,17 @@ def test_the_fit_finds_the_source() -> None:
     np.testing.assert_allclose(found.offset_m, CONFIG.offset_m, atol=0.005)
     np.testing.assert_allclose(found.world_m, CONFIG.world_m, atol=0.02)
     assert found.latency_s == pytest.approx(0.12, abs=0.01)
+
+
+@pytest.mark.parametrize("factor", [0.1, 0.5, 0.8, 1.0, 1.2, 2.0, 3.0])
+def test_another_friction_mirrors_nothing_and_the_stated_error_contains_the_mount(
+    factor: float,
+) -> None:
+    # with another friction the link moves ``factor`` times as far as the joints predict
+    predicted = way(TIMES_S) * [factor, factor, 1.0]
+    found = fit_mount(TIMES_S, predicted, *poses(), CONFIG.scale)
+    off_m = np.linalg.norm(np.subtract(found.config.offset_m, CONFIG.offset_m))
+    assert off_m < MOUNT_OFF * found.residual_m
 
 
 def test_the_found_source_places_the_link() -> None:

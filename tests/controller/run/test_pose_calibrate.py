@@ -10,7 +10,7 @@ from tests.helpers.command import snakewalk
 
 @pytest.mark.slow
 def test_a_drawn_mount_is_found() -> None:
-    off = errors(found(4, NO_DEVIATION, lambda sample, time_s: sample), drawn(4))
+    off = errors(found(4, NO_DEVIATION, lambda sample, time_s: sample)[0], drawn(4))
     assert all(each <= most for each, most in zip(off, LIMITS, strict=True)), off
 
 
@@ -24,7 +24,7 @@ def test_a_scale_that_friction_hides_is_not_written() -> None:
 
 @pytest.mark.slow
 def test_a_stated_scale_is_kept() -> None:
-    config = found(
+    config, _ = found(
         2, NO_DEVIATION, lambda sample, time_s: sample, "alternating16", states_scale=True
     )
     assert config.scale == pytest.approx(drawn(2).scale, abs=1e-4)
