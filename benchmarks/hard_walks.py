@@ -168,7 +168,7 @@ def walked(seed: int, *, is_planted: bool = False) -> dict[str, Any]:
             row |= {"fault": name, "joint": joint, "at_s": at_s, "found": label in text}
         return row
     row |= {"trip": result.outcome.tripped, "duration_s": round(result.outcome.duration_s, 2)}
-    if is_planted:
+    if is_planted and result.record.end_s > at_s:  # others ended before their fault
         label = walk.robot.joint_label(joint)
         row |= {"fault": name, "joint": joint, "at_s": at_s}
         row["found"] = _is_found(result, label, at_s)

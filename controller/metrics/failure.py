@@ -15,7 +15,7 @@ from snakewalk.controller.terrain.climb import CLIMBED_RAD
 
 Cause = Literal["safety", "roll", "joint", "slip", "climb", "steering", "time"]
 
-ROLL_LIMIT_RAD = float(np.radians(60.0))
+ROLL_LIMIT_RAD = np.radians(60.0)
 """Roll of the head link beyond which the body counts as rolled over (ours)."""
 WINDOW_S = 30.0
 """Duration of the end of a run that is judged (ours): several body lengths of travel."""
@@ -24,11 +24,11 @@ CLAMP_SHARE = 0.2
 PROGRESS_SHARE = 0.5
 """Progress along the path over advance of the body, below which it goes elsewhere (ours)."""
 
-GRIP_SHARE = 0.35
-"""Way of the body over the advance of its links, below which they slip: 0.06 to 0.15 on ice, 0.7
-where it goes in circles (ours)."""
+SLID_SHARE = 0.5
+"""Slide over the advance of the links, above which they slip: at least 0.65 on ice and steep
+planes until the first new path, at most 0.36 where a body goes astray (ours)."""
 SLID_BODIES = 0.5
-"""Slide across the body, in its lengths, that leads it off its path (ours)."""
+"""Slide or advance, in lengths of the body, that leads it off its path (ours)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,7 @@ class Failure:
     """Why a run did not reach every waypoint."""
 
     cause: Cause
-    """The first that holds. The order is: safety stopped the run; the body rolled over at any time;
-    the time limit is shorter than the plan needs; the joints did not follow. Then: the body
-    advanced too little, on a climb or on other ground; it advanced, but not towards the waypoints;
-    it was on its way and ran out of time."""
+    """The first that applies (``docs/failures.md`` lists them in this order)."""
     text: str
     """Description of the failure, with the numbers that show it."""
 
@@ -51,14 +48,14 @@ def failure(record: RunRecord) -> Failure | None:
     """
     plan = record.header.plan
     pose = record.pose
-    cycle = record.cycle
     trip = next((event.text for event in record.events if event.kind == "trip"), None)
     if trip is not None:
         return Failure("safety", f"stopped by safety: {trip}")
     if len(waypoint_times_s(pose, plan)) == len(plan.waypoints_m):
         return None
     roll = np.abs(by_rows(roll_rad, pose.rotation))
-    walks = pose.pulse_m_s > 0.0 if record.header.run.gait is None else np.ones(len(roll), bool)
+    # of a gait no pulse is known
+    walks = (pose.pulse_m_s > 0.0) | (record.header.run.gait is not None)
     over = np.flatnonzero((roll > ROLL_LIMIT_RAD) & walks)  # rolling uphill does not count
     if len(over):
         return Failure(
@@ -75,13 +72,11 @@ def failure(record: RunRecord) -> Failure | None:
             f"its path needs {way_m / speed_m_s:.0f} s at the {speed_m_s:.2f} m/s of the plan; "
             f"time_limit_s is {limit_s:g}",
         )
-    clamped = np.array([verdict == "clamp" for verdict in cycle.verdict], dtype=bool)
-    clamped = clamped[cycle.time_s >= record.end_s - WINDOW_S]
+    clamped = np.array(record.cycle.verdict, str) == "clamp"
+    clamped = clamped[record.cycle.time_s >= record.end_s - WINDOW_S]
     if len(clamped) and clamped.mean() > CLAMP_SHARE:
         return Failure("joint", f"joints do not follow: {clamped.mean():.0%} of goals clamped")
-    rows = np.flatnonzero(pose.time_s >= record.end_s - WINDOW_S)
-    if record.header.run.gait is None:  # of a gait no pulse is known
-        rows = rows[pose.pulse_m_s[rows] > 0.0]
+    rows = np.flatnonzero((pose.time_s >= record.end_s - WINDOW_S) & walks)
     if len(rows) < 2:
         return Failure("joint", "the shape did not travel along the body")
     return _of_advance(record, rows)
@@ -90,92 +85,99 @@ def failure(record: RunRecord) -> Failure | None:
 def _slope_text(record: RunRecord, row: int) -> str:
     """Return the slope under a body that rolled over, where it is steeper than friction holds."""
     ground = record.header.ground
-    slope_rad = 0.0
-    if ground is not None:
-        slope_rad = float(np.median(ground.slope_rad(*record.pose.links_m[row, :, :2].T)))
-    is_steep = slope_rad > max(_holds_rad(record), CLIMBED_RAD)
-    return f", on a slope of {np.degrees(slope_rad):.0f} deg" if is_steep else ""
+    if ground is None:
+        return ""
+    slope_rad = np.median(ground.slope_rad(*record.pose.links_m[row, :, :2].T))
+    if slope_rad <= max(_holds_rad(record), CLIMBED_RAD):
+        return ""
+    return f", on a slope of {np.degrees(slope_rad):.0f} deg"
 
 
 def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     """Judge the rows (n,) of the pose in which the shape travels."""
     pose = record.pose
     header = record.header
-    advanced = pose.speed_m_s[rows].mean()
-    predicted = pose.predicted_speed_m_s[rows].mean()
-    share = advanced / predicted if predicted > 0.0 else 1.0
+    friction = record.friction
+    across = header.world.friction.across
+    if len(friction.time_s) and friction.across_95[-1, 1] < across:
+        low, high = friction.across_95[-1]
+        found = f"{friction.across[-1]:.2g} ({low:.2g} to {high:.2g})"
+        return Failure("slip", f"friction across the body is {found}, in the file {across:g}")
+    replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
+    first = np.flatnonzero(pose.time_s < replanned_s)
+    first = first if len(first) > 1 else rows
+    for part in (first, rows):
+        if astray := _astray(record, part):
+            return Failure("steering", astray)
+    share, travelled, progress = _advance(record, rows)
     if share < header.run.safety.advance_fraction:
-        up_rad = np.mean(_inclination_rad(pose.links_m[rows]))
+        x, y, z = np.moveaxis(pose.links_m[rows, 0] - pose.links_m[rows, -1], -1, 0)
+        up_rad = np.arctan2(z, np.hypot(x, y)).mean()  # of the line from tail to head
         said = f"advanced {share:.0%} of the prediction"
         if up_rad <= _holds_rad(record):
             return Failure("slip", f"{said}, no steep climb")
-        return _of_climb(record, f"{said}, {np.degrees(up_rad):.0f} deg uphill")
-    remaining = _remaining_m(record, rows)
-    progress = remaining[0] - remaining[-1]
-    travelled = advanced * np.ptp(pose.time_s[rows])
-    if progress < PROGRESS_SHARE * travelled:
-        ahead_m = np.linspace(0.0, header.robot.length_m, 5)
-        steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
-        if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
-            return _of_climb(
-                record,
-                f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path, which "
-                f"climbs by {np.degrees(steep_rad):.0f} deg there",
-            )
-        slid_m, fall_rad = _slide(record, rows)
-        if slid_m > PROGRESS_SHARE * travelled and fall_rad > _holds_rad(record):
-            return Failure(
-                "slip",
-                f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg while it "
-                f"advanced {travelled:.1f} m",
-            )
-        forward_m = abs(_forward_m(record, rows))
-        if forward_m < GRIP_SHARE * travelled:
-            return Failure(
-                "slip",
-                f"its links moved {travelled:.1f} m along themselves, and the body only "
-                f"{forward_m:.1f} m",
-            )
-        return Failure(
-            "steering",
-            f"advanced {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path; "
-            f"up to {np.nanmax(path_error_m(record)[rows]):.2f} m off it",
+        return _of_climb(record, first, f"{said}, {np.degrees(up_rad):.0f} deg uphill")
+    if progress >= PROGRESS_SHARE * travelled:
+        left_m = length_m(record.paths[-1][1]) - pose.path_s_m[-1]
+        text = f"out of time with {left_m:.1f} m of path left"
+        slowed = [event.text for event in record.events if event.kind == "derating"]
+        return Failure("joint", f"{text}; {slowed[0]}") if slowed else Failure("time", text)
+    text = f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path"
+    ahead_m = np.linspace(0.0, header.robot.length_m, 5)
+    steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
+    if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
+        return _of_climb(
+            record, first, f"{text}, which climbs by {np.degrees(steep_rad):.0f} deg there"
         )
-    return Failure("time", f"out of time with {remaining[-1]:.1f} m of path left")
+    slid_m, fall_rad = _slide(record, rows)
+    falls = f"where the ground falls by {np.degrees(fall_rad):.0f} deg"
+    return Failure("slip", f"{text}, and slid {slid_m:.1f} m {falls}")
 
 
-def _of_climb(record: RunRecord, text: str) -> Failure:
-    """Return a climb, or the slide that led a body off its first path, which does not climb."""
-    body_m = record.header.robot.length_m
-    replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
-    rows = np.flatnonzero(record.pose.time_s < replanned_s)
-    if len(rows) > 1:
-        due_m = np.arange(0.0, length_m(record.header.plan.path_m), 0.25 * body_m)
-        slid_m, fall_rad = _slide(record, rows)
-        if (
-            _steepest_rad(record, 0, due_m) <= max(_holds_rad(record), CLIMBED_RAD)
-            and slid_m > SLID_BODIES * body_m
-            and fall_rad > _holds_rad(record)
-        ):
-            return Failure(
-                "slip",
-                f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg off its path, "
-                f"and did not come back: {text}",
-            )
-    return Failure("climb", text)
-
-
-def _directions(links_m: Floats) -> Floats:
-    """Level unit vectors (n, 2) from tail to head of links (n, L, 3)."""
-    along = links_m[:, 0, :2] - links_m[:, -1, :2]
-    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
-
-
-def _forward_m(record: RunRecord, rows: np.ndarray) -> float:
-    """Distance that the body moved along the line from its tail to its head."""
+def _advance(record: RunRecord, rows: np.ndarray) -> tuple[float, float, float]:
+    """Share of the predicted advance of the links, their advance, and that along the paths, m."""
     pose = record.pose
-    along = _directions(pose.links_m[rows])
-    return float((np.diff(pose.centre_m[rows, :2], axis=0) * along[:-1]).sum())
+    advanced = pose.speed_m_s[rows].mean()
+    predicted = pose.predicted_speed_m_s[rows].mean()
+    share = advanced / predicted if predicted > 0.0 else 1.0
+    path = np.searchsorted([since_s for since_s, _ in record.paths], pose.time_s[rows], "right")
+    progress = np.diff(pose.path_s_m[rows])[np.diff(path) == 0].sum()
+    return share, advanced * np.ptp(pose.time_s[rows]), progress
+
+
+def _astray(record: RunRecord, rows: np.ndarray) -> str | None:
+    """Describe a body that advanced without slip, but not along its path; None for others."""
+    _, travelled, progress = _advance(record, rows)
+    if (
+        travelled < SLID_BODIES * record.header.robot.length_m
+        or progress >= PROGRESS_SHARE * travelled
+        or _slide(record, rows)[0] >= SLID_SHARE * travelled
+    ):
+        return None
+    return (
+        f"advanced {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path; "
+        f"up to {np.nanmax(path_error_m(record)[rows]):.2f} m off it"
+    )
+
+
+def _of_climb(record: RunRecord, rows: np.ndarray, text: str) -> Failure:
+    """Return a climb, or the slide that led a body off its first path, which does not climb.
+
+    ``rows`` (n,) of the pose are those before the first new path.
+    """
+    body_m = record.header.robot.length_m
+    due_m = np.arange(0.0, length_m(record.header.plan.path_m), 0.25 * body_m)
+    slid_m, fall_rad = _slide(record, rows)
+    if (
+        _steepest_rad(record, 0, due_m) <= max(_holds_rad(record), CLIMBED_RAD)
+        and slid_m > SLID_BODIES * body_m
+    ):
+        return Failure(
+            "slip",
+            f"slid {slid_m:.1f} m down a slope of {np.degrees(fall_rad):.0f} deg off its path, "
+            f"and did not come back: {text}",
+        )
+    return Failure("climb", text)
 
 
 def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
@@ -185,7 +187,8 @@ def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
     the slide; 0 without a ground.
     """
     pose = record.pose
-    along = _directions(pose.links_m[rows])
+    along = pose.links_m[rows, 0, :2] - pose.links_m[rows, -1, :2]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
     speed_m_s = pose.speed_m_s[rows, None] * along
     steps_s = np.diff(pose.time_s[rows])[:, None]
     centre_m = pose.centre_m[rows, :2]
@@ -197,13 +200,7 @@ def _slide(record: RunRecord, rows: np.ndarray) -> tuple[float, float]:
     half_m = 0.125 * record.header.robot.length_m
     ahead_m, behind_m = (centre_m + sign * half_m * slide_m / slid_m for sign in (1.0, -1.0))
     fall_m = ground.elevation_m(*behind_m.T) - ground.elevation_m(*ahead_m.T)
-    return slid_m, float(np.arctan(np.mean(fall_m) / (2.0 * half_m)))
-
-
-def _inclination_rad(links_m: Floats) -> Floats:
-    """Inclination (n,) of the line from tail to head of links (n, L, 3); positive uphill."""
-    x, y, z = np.moveaxis(links_m[:, 0] - links_m[:, -1], -1, 0)
-    return np.asarray(np.arctan2(z, np.hypot(x, y)))
+    return slid_m, np.arctan(fall_m.mean() / (2.0 * half_m))
 
 
 def _steepest_rad(record: RunRecord, which: int, due_m: Floats) -> float:
@@ -227,11 +224,3 @@ def _steepest_rad(record: RunRecord, which: int, due_m: Floats) -> float:
 def _holds_rad(record: RunRecord) -> float:
     """Slope on which a straight body just does not slide back along itself."""
     return float(np.arctan(record.header.world.friction.along))
-
-
-def _remaining_m(record: RunRecord, rows: np.ndarray) -> Floats:
-    """Arc length (n,) from the place reached to the end of the path then in force."""
-    starts = [start for start, _ in record.paths]
-    lengths = np.array([length_m(path) for _, path in record.paths])
-    which = np.searchsorted(starts, record.pose.time_s[rows], side="right") - 1
-    return np.asarray(lengths[which] - record.pose.path_s_m[rows])

@@ -9,7 +9,7 @@ from snakewalk.config.heightfield import HeightField
 from snakewalk.controller.metrics.failure import failure
 from snakewalk.controller.metrics.ground_contact import roll_rad
 from snakewalk.controller.runlog.record import Event, PlanSummary, RunRecord
-from snakewalk.controller.runlog.topics import PoseTable
+from snakewalk.controller.runlog.topics import FrictionTable, PoseTable
 
 SECONDS, HZ, PULSE_M_S, PREDICTED_M_S = 60.0, 10.0, 0.3, 0.25
 PATH_M = np.array([[0.0, 0.0], [30.0, 0.0]])
@@ -133,6 +133,13 @@ def test_a_limit_too_short_for_the_plan_is_told_whatever_else_went_on(
     assert ("time_limit_s is 118" in found.text) == (cause == "time")
 
 
+def test_a_body_that_its_load_slows_down_is_late_because_of_its_joints(record: RunRecord) -> None:
+    slowed = Event(9.0, "warning", "derating", "slowing down: joint yaw_09 (ID 9) at 1.62 A")
+    found = failure(dataclasses.replace(made(record), events=(slowed,)))
+    assert found is not None
+    assert (found.cause, found.text[-9:]) == ("joint", "at 1.62 A")
+
+
 def test_a_run_that_reached_everything_has_no_failure(record: RunRecord) -> None:
     assert failure(made(record, seconds=130.0)) is None
 
@@ -167,46 +174,84 @@ def test_roll_beyond_a_right_angle(record: RunRecord, roll_deg: float) -> None:
     assert np.degrees(roll_rad(rotation)) == pytest.approx([roll_deg])
 
 
+def sliding(log: RunRecord, speed_m_s: tuple[float, float, float]) -> RunRecord:
+    """Move the body to the side of its motion, without its joints."""
+    aside_m = log.pose.time_s[:, None] * np.array(speed_m_s)
+    pose = dataclasses.replace(
+        log.pose,
+        links_m=log.pose.links_m + aside_m[:, None],
+        centre_m=log.pose.centre_m + aside_m,
+    )
+    return dataclasses.replace(log, pose=pose)
+
+
 @pytest.mark.parametrize(
-    ("slope_deg", "cause"), [(18.0, "climb"), (10.0, "steering"), (4.0, "steering")]
+    ("slope_deg", "slide_m_s", "cause"),
+    [(18.0, 0.2, "climb"), (10.0, 0.2, "slip"), (4.0, 0.2, "slip"), (18.0, 0.02, "steering")],
 )
-def test_a_path_too_steep_to_climb_is_no_fault_of_steering(
-    record: RunRecord, slope_deg: float, cause: str
+def test_a_body_that_slides_before_a_steep_path_does_not_climb_it(
+    record: RunRecord, slope_deg: float, slide_m_s: float, cause: str
 ) -> None:
     """A body that turns aside before a steep plane advances, but not along its path."""
-    x_m = np.arange(-1.0, 32.0, 0.5)
+    x_m = np.arange(-20.0, 32.0, 0.5)
     height_m = np.tile(np.tan(np.radians(slope_deg)) * np.maximum(x_m, 0.0), (9, 1))
-    log = made(record, progress=0.1)
-    ground = HeightField(height_m, 0.5, -1.0, -2.0)
+    log = sliding(made(record, progress=0.1), (-slide_m_s, 0.0, 0.0))
+    ground = HeightField(height_m, 0.5, -20.0, -2.0)
     header = dataclasses.replace(log.header, ground=ground)
     found = failure(dataclasses.replace(log, header=header))
+    assert found is not None
     assert found.cause == cause
 
 
-@pytest.mark.parametrize(
-    ("fall_deg", "cause"), [(14.0, "slip"), (7.0, "slip"), (5.0, "steering"), (-14.0, "steering")]
-)
-def test_a_slide_to_the_side_is_judged_by_the_slope_under_the_body(
-    record: RunRecord, fall_deg: float, cause: str
+@pytest.mark.parametrize(("astray_s", "cause"), [(20.0, "steering"), (0.1, "slip")])
+def test_a_body_that_went_astray_before_it_slid_was_steered_there(
+    record: RunRecord, astray_s: float, cause: str
+) -> None:
+    """It advanced without slip until its first new path; it slid later."""
+    log = made(record, progress=0.0)
+    aside_m = np.zeros((len(log.pose.time_s), 3))
+    aside_m[:, 0] = 0.2 * np.maximum(log.pose.time_s - astray_s, 0.0)
+    pose = dataclasses.replace(
+        log.pose, links_m=log.pose.links_m + aside_m[:, None], centre_m=log.pose.centre_m + aside_m
+    )
+    paths = ((0.0, PATH_M), (astray_s, PATH_M))
+    found = failure(dataclasses.replace(log, pose=pose, paths=paths))
+    assert found is not None
+    assert found.cause == cause
+
+
+@pytest.mark.parametrize("fall_deg", [14.0, 5.0])
+def test_a_slide_to_the_side_states_the_slope_under_the_body(
+    record: RunRecord, fall_deg: float
 ) -> None:
     """A path along a hillside is level, and the body slides off it downhill."""
     y_m = np.arange(-20.0, 20.0, 0.5)
     height_m = np.tile(-np.tan(np.radians(fall_deg)) * y_m[:, None], (1, 66))
-    log = made(record)
-    aside_m = np.zeros((len(log.pose.time_s), 1, 3))
-    aside_m[:, 0, 1] = 0.2 * log.pose.time_s
-    stuck_m = np.full(len(aside_m), 1.0)
-    pose = dataclasses.replace(
-        log.pose,
-        links_m=log.pose.links_m + aside_m,
-        centre_m=log.pose.centre_m + aside_m[:, 0],
-        path_s_m=stuck_m,
-    )
+    log = sliding(made(record), (0.0, 0.2, 0.0))
+    pose = dataclasses.replace(log.pose, path_s_m=np.full(len(log.pose.time_s), 1.0))
     header = dataclasses.replace(log.header, ground=HeightField(height_m, 0.5, -1.0, -20.0))
     found = failure(dataclasses.replace(log, header=header, pose=pose))
     assert found is not None
+    assert found.cause == "slip"
+    assert f"where the ground falls by {fall_deg:.0f} deg" in found.text
+
+
+@pytest.mark.parametrize(("high", "cause"), [(0.69, "slip"), (0.71, "time")])
+def test_less_friction_than_in_the_file_is_a_slip(
+    record: RunRecord, high: float, cause: str
+) -> None:
+    """A body that is late on slippery ground slips, even if it stays on its path."""
+    friction = FrictionTable(
+        time_s=np.array([10.0]),
+        along=np.array([0.1]),
+        across=np.array([0.5]),
+        along_95=np.array([[0.08, 0.12]]),
+        across_95=np.array([[0.4, high]]),
+    )
+    assert record.header.world.friction.across == 0.7
+    found = failure(dataclasses.replace(made(record), friction=friction))
+    assert found is not None
     assert found.cause == cause
-    assert (f"down a slope of {fall_deg:.0f} deg" in found.text) == (cause == "slip")
 
 
 def test_a_body_whose_links_advance_while_it_stays_slips(record: RunRecord) -> None:
@@ -232,7 +277,8 @@ def test_a_slide_off_a_level_path_is_told_before_the_climb_back(
     log = made(record)
     time_s = log.pose.time_s
     aside_m = np.zeros((len(time_s), 1, 3))
-    aside_m[:, 0, 1] = -0.1 * np.minimum(time_s, 20.0)
+    aside_m[:, 0, 0] = -0.9 * PREDICTED_M_S * np.maximum(time_s - 20.0, 0.0)
+    aside_m[:, 0, 1] = -0.2 * np.minimum(time_s, 20.0)
     pose = dataclasses.replace(
         log.pose,
         links_m=log.pose.links_m + aside_m,
@@ -240,13 +286,13 @@ def test_a_slide_off_a_level_path_is_told_before_the_climb_back(
         path_s_m=np.full(len(time_s), 1.0),
         pulse_m_s=np.where(time_s < walks_from_s, 0.0, log.pose.pulse_m_s),
     )
-    back_m = np.array([[0.0, -2.0], [0.0, 8.0]])
+    back_m = np.array([[0.0, -4.0], [0.0, 8.0]])
     header = dataclasses.replace(log.header, ground=HeightField(height_m, 0.5, -1.0, -20.0))
     paths = ((0.0, PATH_M), (20.0, back_m))
     found = failure(dataclasses.replace(log, header=header, pose=pose, paths=paths))
     assert found is not None
     assert found.cause == "slip"
-    assert "slid 2.0 m down a slope of 20 deg off its path, and did not come back" in found.text
+    assert "slid 4.0 m down a slope of 20 deg off its path, and did not come back" in found.text
     alone = failure(dataclasses.replace(log, header=header, pose=pose, paths=((0.0, back_m),)))
     assert alone is not None
     assert alone.cause == "climb"
