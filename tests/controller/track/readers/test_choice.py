@@ -17,10 +17,10 @@ from tests.controller.track.readers.test_tracker_formats import (
     BODY,
     NODES,
     PIXELS,
-    dlc_rows,
     same,
     wcon,
 )
+from tests.helpers.tracker_files import dlc_rows
 from tests.helpers.travelling import FRAMES, RATE_HZ
 
 EEL, OTHER = Choice(individual="eel"), Choice(individual="other")
@@ -28,8 +28,9 @@ EEL, OTHER = Choice(individual="eel"), Choice(individual="other")
 
 def two_dlc(path: Path) -> None:
     """Two animals and a body part of none, as DeepLabCut writes them."""
-    head, values = dlc_rows(individuals="eel")
-    _, other = dlc_rows(individuals="other")
+    scores = np.full(BODY.shape[:2], 0.99)
+    head, values = dlc_rows(PIXELS, scores, "eel")
+    _, other = dlc_rows(PIXELS, scores, "other")
     rows = [
         [head[0][0], *head[0][1:], *head[0][1:], "s", "s"],
         ["individuals", *["eel"] * 33, *["other"] * 33, "single", "single"],
