@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -56,47 +57,46 @@ def lines_of(terminal: int) -> Iterator[str]:
         yield from whole
 
 
-@pytest.mark.slow
-def test_enter_runs_the_same_live(tmp_path: Path) -> None:
-    pytest.importorskip("mujoco")
+@contextmanager
+def demo_in_terminal(
+    folder: Path, **variables: str
+) -> Iterator[tuple[subprocess.Popen[bytes], int, Iterator[str]]]:
+    """Run ``demo`` in a terminal: the program, the terminal, and the lines that it prints."""
     ours, theirs = pty.openpty()
     with subprocess.Popen(
         [sys.executable, "-c", COMMAND, "demo", "--view-at", "127.0.0.1:0"],
-        cwd=tmp_path,
+        cwd=folder,
         stdin=theirs,
         stdout=theirs,
         stderr=theirs,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "200"},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "200"} | variables,
     ) as child:
         os.close(theirs)
-        lines = lines_of(ours)
+        try:
+            yield child, ours, lines_of(ours)
+        finally:
+            child.kill()
+            os.close(ours)
+
+
+@pytest.mark.slow
+def test_enter_runs_the_same_live(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    with demo_in_terminal(tmp_path) as (_, terminal, lines):
         assert any("a recorded run; ^C ends" in line for line in lines)
         assert any("snakewalk run --view  runs the same live" in line for line in lines)
-        os.write(ours, b"\n")
+        os.write(terminal, b"\n")
         assert any("token=" in line for line in lines)
-        child.kill()
-    os.close(ours)
 
 
 @pytest.mark.slow
 def test_an_interrupt_of_it_alone_ends_its_compiling_children(tmp_path: Path) -> None:
     """They went on, and printed a traceback (BrokenPipeError) each. The text ends with them."""
-    ours, theirs = pty.openpty()
-    variables = {"NUMBA_CACHE_DIR": str(tmp_path), "TERM": "xterm", "COLUMNS": "200"}
-    with subprocess.Popen(
-        [sys.executable, "-c", COMMAND, "demo", "--view-at", "127.0.0.1:0"],
-        cwd=tmp_path,
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)} | variables,
-    ) as child:
-        os.close(theirs)
-        lines = lines_of(ours)
+    with demo_in_terminal(tmp_path, NUMBA_CACHE_DIR=str(tmp_path), TERM="xterm") as opened:
+        child, _, lines = opened
         assert any(re.search(r"compiling loops .*[1-9]%", line) for line in lines)
         child.send_signal(signal.SIGINT)
         said = "\n".join(lines)
         assert child.wait() == 130
-    os.close(ours)
     assert "interrupted" in said
     assert "Traceback" not in said
