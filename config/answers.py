@@ -14,10 +14,13 @@ class Answers(Strict):
     )
 
 
-LISTED = BeforeValidator(
-    lambda given: [part.strip() for part in given.split(",")] if isinstance(given, str) else given
-)
-"""Rule that reads a list from words: A,B,C."""
+def _listed(given: object) -> object:
+    parts = [part.strip() for part in given.split(",")] if isinstance(given, str) else given
+    return tuple(parts) if isinstance(parts, list) else parts
+
+
+LISTED = BeforeValidator(_listed)
+"""Rule that reads a tuple from words, A,B,C, or from a stored list."""
 
 
 class TableAnswers(Strict):

@@ -20,6 +20,7 @@ from tokenize import TokenError
 from typing import IO, TYPE_CHECKING, Any
 
 from snakewalk.config.errors import InputError
+from snakewalk.config.near_names import file_hint
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,7 +68,7 @@ def why_no_file(path: Path, missing: str = "no such file") -> str:
         return f"{path}: is a folder"
     if path.exists():
         return f"{path}: is a pipe or a device; copy its contents into a file"
-    return f"{path}: {missing}"
+    return f"{path}: {missing}{file_hint(path)}"
 
 
 def read_bytes(file: Path, most_bytes: int = MOST_BYTES) -> bytes:

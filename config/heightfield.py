@@ -153,8 +153,6 @@ def read_map(file: Path) -> HeightField:
         if z_m.size > MOST_SAMPLES:
             raise ValueError(f"holds {z_m.size} samples; {MOST_SAMPLES} are the most")
         return HeightField(z_m, spacing_m, x0_m, y0_m, is_known, arrays.get("colour"))
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file") from None
     except OSError as error:
         raise InputError(f"{file}: {error.strerror or error}") from None
     except KeyError as error:

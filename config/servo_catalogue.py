@@ -1,6 +1,6 @@
 """Servo models by name, by number or by file."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from snakewalk.config.errors import ConfigError
+from snakewalk.config.near_names import name_hint
 from snakewalk.config.servo_model import ServoModel
 from snakewalk.config.strict_toml import checked, read_toml
 
@@ -17,13 +18,6 @@ _MISTYPED = 0.8
 """Likeness of two names from which one counts as mistyped (ours)."""
 _MOST_FILES = 5
 """Longest chain of files that are each like the next (ours)."""
-
-
-def name_hint(name: str, names: Iterable[str]) -> str:
-    """Hint on an unknown name: the closest ones."""
-    lower = {known.lower(): known for known in names}
-    near = [lower[close] for close in get_close_matches(name.lower(), lower, 3, 0.5)]
-    return f"; did you mean {', '.join(near)}?" if near else ""
 
 
 def printed_name(name: str) -> str:

@@ -261,17 +261,14 @@ def load_capture(path: Path) -> CaptureFile:
     """Read what ``save_capture`` wrote.
 
     Raises:
-        InputError: no such file, or it was not captured from a film.
+        InputError: it was not captured from a film.
+        OSError: it cannot be read.
 
     """
     try:
         arrays, _ = read_arrays(path)
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
     except ValueError:
-        raise InputError(
-            f"{path}: is no .npz; a track that `animal capture` wrote is needed"
-        ) from None
+        raise InputError(f"{path}: is no .npz; give a track that `animal capture` wrote") from None
     frames = len(arrays["verdict"]) if "verdict" in arrays and arrays["verdict"].ndim == 1 else 0
     shapes: dict[str, tuple[int, ...]] = {}
     shapes |= dict.fromkeys(_OF_FRAMES, (frames,))

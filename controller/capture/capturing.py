@@ -35,7 +35,11 @@ from snakewalk.controller.capture.review import picture_scale
 from snakewalk.controller.capture.verification.film_check import REJECTED
 from snakewalk.controller.console.messages import LOGGER, stderr_console
 from snakewalk.controller.console.progress import ProgressBar
-from snakewalk.controller.console.result_files import atomic_write, refuse_to_overwrite
+from snakewalk.controller.console.result_files import (
+    atomic_write,
+    check_ending,
+    refuse_to_overwrite,
+)
 from snakewalk.controller.images.body_detector import (
     BodyDetector,
     make_detector,
@@ -148,8 +152,7 @@ def correct_recording(options: CaptureOptions) -> CorrectionFacts:
             "--corrections: works with TRACK.npz of an earlier capture, -o and --force only; "
             "leave the other options out"
         )
-    if options.output.suffix.lower() != ".npz":
-        raise InputError(f"{options.output}: a track is an .npz")
+    check_ending(options.output, "a corrected track", ".npz")
     refuse_to_overwrite([options.output], options.force)
     said = read_corrections(options.corrections)
     corrected = apply_corrections(load_capture(options.recording), said, str(options.corrections))

@@ -72,11 +72,12 @@ def _check_frames(corrections: Corrections, count: int, name: str) -> None:
         beyond = [k for k in frames if not 0 <= k < count]
         if beyond:
             raise InputError(
-                f"{name}: frame {min(beyond)} is not there: the track has {count}, from 0"
+                f"{name}: frame {min(beyond)} is not there: the track has {count}, from 0; "
+                "delete it"
             )
         twice = [k for k, times in Counter(frames).items() if times > 1]
         if twice:
-            raise InputError(f"{name}: {key}: frame {twice[0]} is listed twice")
+            raise InputError(f"{name}: {key}: frame {twice[0]} is listed twice; delete one")
 
 
 def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) -> CaptureFile:
@@ -120,7 +121,7 @@ def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) ->
         skeletons.append(after)
     length = np.array([skeleton.length_px for skeleton in skeletons])
     if np.isfinite(length).sum() < 2:
-        raise InputError(f"{name}: fewer than 2 frames with points stay; no motion is left")
+        raise InputError(f"{name}: fewer than 2 frames with points stay; leave fewer out")
     corrected = replace(
         captured,
         points_px=np.stack([skeleton.points_px for skeleton in skeletons]),
@@ -152,6 +153,6 @@ def _redrawn(where: str, drawn: RedrawnFrame, usual_px: float, radius_px: Floats
     if body is None:
         raise InputError(
             f"{where}: the line cannot be divided into {SEGMENTS} equal chords; it is folded upon "
-            "itself"
+            "itself; redraw it"
         )
     return replace(body, status=FrameStatus.BY_HAND)

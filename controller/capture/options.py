@@ -6,7 +6,7 @@ import numpy as np
 
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.film.film_options import CaptureOptions
-from snakewalk.controller.console.result_files import refuse_to_overwrite
+from snakewalk.controller.console.result_files import check_ending, refuse_to_overwrite
 from snakewalk.controller.track.readers.writers import SUFFIXES
 
 _FILMS = (".mp4", ".mkv", ".avi")
@@ -50,24 +50,17 @@ def check_options(options: CaptureOptions) -> None:
 
 def _check_files(options: CaptureOptions) -> None:
     """Reject a name of a result whose end is not a format of that result."""
-    if options.output.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{options.output}: a track is written as one of {', '.join(SUFFIXES)}")
-    if options.wide and options.output.suffix.lower() != ".csv":
-        raise InputError(f"--wide: is a form of a .csv, not of {options.output}; leave it out")
-    if options.cropped and options.output.suffix.lower() == ".csv":
-        raise InputError(
-            f"{options.output}: a .csv cannot state that places were not recorded (--cropped); "
-            "write an .npz or a .wcon"
-        )
-    if options.review is not None and options.output.suffix.lower() != ".npz":
-        raise InputError(f"--review: corrects an .npz, not {options.output}; name an .npz")
-    if options.overlay is not None and options.overlay.suffix.lower() not in _FILMS:
-        raise InputError(f"{options.overlay}: an overlay film is one of {', '.join(_FILMS)}")
+    check_ending(options.output, "a track", *SUFFIXES)
+    if options.wide:
+        check_ending(options.output, "the table of --wide", ".csv")
+    if options.cropped:
+        check_ending(options.output, "a track without places (--cropped)", ".npz", ".wcon")
+    if options.review:
+        check_ending(options.output, "the track of --review", ".npz")
+    check_ending(options.overlay, "an overlay film", *_FILMS)
     for picture in (options.sheet, options.steps, options.trail):
-        if picture is not None and picture.suffix.lower() not in _SHEETS:
-            raise InputError(f"{picture}: a picture is one of {', '.join(_SHEETS)}")
-    if options.review is not None and options.review.suffix.lower() not in _PAGES:
-        raise InputError(f"{options.review}: a review page is an .html")
+        check_ending(picture, "a picture", *_SHEETS)
+    check_ending(options.review, "a review page", *_PAGES)
 
 
 def _check_animals(options: CaptureOptions, animals: str) -> None:

@@ -16,6 +16,7 @@ from typing import IO, Any
 
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import missing_extra
+from snakewalk.config.near_names import file_hint
 from snakewalk.config.plain_text import plain
 from snakewalk.controller.console.imports import make_path_safe, without_collections
 from snakewalk.drivers.clock import WallClock
@@ -167,7 +168,7 @@ def _end_by(error: Exception) -> None:
         case PortError(faults=faults):
             _end(begun, "; ".join(faults), *notes)
         case InputError(faults=faults):
-            _end(2, *faults)
+            _end(2, *faults[:-1], f"{faults[-1]}{_near(error)}")
         case DriverError():
             _end(1, _with_notes(str(error), error))
         case ModuleNotFoundError() if (needed := missing_extra(error)) is not None:
@@ -179,11 +180,19 @@ def _end_by(error: Exception) -> None:
             _end(1, _with_notes(f"{place}: {error.strerror}; free space", error))
         case OSError():
             place = f"{Path(str(error.filename))}: " if error.filename else ""
-            _end(begun, _with_notes(f"{place}{error.strerror or error}", error))
+            _end(begun, _with_notes(f"{place}{error.strerror or error}{_near(error)}", error))
         case MemoryError() | ImportError() if _is_out_of_memory(error):
             _end(begun, _with_notes(_NO_MEMORY, error))
         case _:
             raise error
+
+
+def _near(error: Exception) -> str:
+    """Hint on the missing file that is the error, or its cause."""
+    for cause in (error, error.__context__):
+        if isinstance(cause, FileNotFoundError) and cause.filename:
+            return file_hint(Path(cause.filename))
+    return ""
 
 
 def _stop_at_once(words: list[str]) -> None:

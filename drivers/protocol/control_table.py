@@ -7,9 +7,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from snakewalk.config.errors import ConfigError
+from snakewalk.config.near_names import name_hint
 from snakewalk.config.servo_catalogue import (
     models_by_number,
-    name_hint,
     servo_model,
     shipped_models,
 )

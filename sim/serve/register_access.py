@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from snakewalk.config.errors import InputError
-from snakewalk.config.servo_catalogue import name_hint
+from snakewalk.config.near_names import name_hint
 from snakewalk.sim.ax12.line import Ax12Line
 from snakewalk.sim.line.sim_line import SimLine
 from snakewalk.sim.servo.bench import BenchPlant

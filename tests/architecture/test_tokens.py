@@ -68,7 +68,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.bench": (22_800, "0257-a-pendulum-is-a-chain-of-one-joint.md"),
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "controller.images": (15_150, "0264-one-place-decides-about-units.md"),
-    "config": (21_030, "0264-one-place-decides-about-units.md"),
+    "config": (21_080, "0353-missing-files-have-near-names.md"),
     "controller.mapping": (21_010, "0283-poses-from-both-depths.md"),
     "controller.motion": (10_300, "0267-facts-of-a-file-have-sources.md"),
     "controller.pose": (8_550, "0243-a-known-motion-calibrates-a-source.md"),
@@ -80,7 +80,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),
     "controller.metrics": (6_640, "0262-a-slide-is-judged-by-the-slope-under-it.md"),
     "controller.capture": (29_550, "0305-keypoints-as-the-detector.md"),
-    "controller.cli": (2_800, "0254-faults-of-the-system.md"),
+    "controller.cli": (2_830, "0353-missing-files-have-near-names.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""
 

@@ -12,7 +12,7 @@ import pytest
 
 from snakewalk.config.archive import FREE_BYTES, read_bytes
 from snakewalk.config.errors import InputError
-from snakewalk.config.reading import Fact, by_names, stated
+from snakewalk.config.reading import Fact, by_names, stated, with_stored
 from snakewalk.controller.exchange.robot_import.robot_choice import RobotChoice
 from snakewalk.controller.exchange.robot_import.robot_import import import_robot
 from snakewalk.controller.mapping.elevation_choice import ElevationChoice
@@ -50,6 +50,14 @@ def test_answers_about_a_track_are_used_by_later_commands(tmp_path: Path) -> Non
     assert later.facts["time"].source == "user"
     shown = snakewalk("animal", "analyse", str(file), "--json")
     assert json.loads(shown.stdout)[0]["rate_hz"] == pytest.approx(30.0, rel=1e-4)
+
+
+def test_stored_lists_are_used_by_later_commands(tmp_path: Path) -> None:
+    file = midlines(tmp_path / "m.csv")
+    (tmp_path / "m.csv.reading.toml").write_text('keypoints = ["p0", "p2"]\n')
+    assert with_stored(file, Choice())[0].keypoints == ("p0", "p2")
+    (tmp_path / "m.csv.reading.toml").write_text("classes = [2, 9]\n")
+    assert with_stored(file, ElevationChoice())[0].classes == (2, 9)
 
 
 def test_answers_about_joint_angles_elevations_and_robots_are_used(tmp_path: Path) -> None:

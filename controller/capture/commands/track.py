@@ -21,6 +21,7 @@ from snakewalk.controller.console.options import (
 from snakewalk.controller.console.progress import show_progress
 from snakewalk.controller.console.result_files import (
     atomic_write,
+    check_ending,
     check_picture,
 )
 from snakewalk.controller.track.choice import Choice
@@ -63,9 +64,8 @@ def track(
     check_picture(picture)
 
     names = recordings or list(EMBEDDED)
-    if output is not None and output.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{output}: a track is written as one of {', '.join(SUFFIXES)}")
-    if output is not None and len(names) > 1:
+    check_ending(output, "a track", *SUFFIXES)
+    if output and len(names) > 1:
         raise InputError(f"{output}: one recording makes one file; {len(names)} are named")
     tracked = [
         examine(

@@ -60,7 +60,10 @@ class KeypointLines:
             if body is not None:
                 bodies[number] = body
         if not bodies:
-            raise InputError(f"{file}: no frame has a line through its keypoints")
+            raise InputError(
+                f"{file}: no frame has a line through its keypoints; list those that are seen as "
+                f"`keypoints = [...]` in {file.name}.reading.toml, or leave --keypoints out"
+            )
         length_px = float(np.median([body.length_px for body in bodies.values()]))
         return cls(bodies, np.full(SEGMENTS + 1, _RADIUS * length_px))
 

@@ -53,12 +53,7 @@ def foreign_joints(track: str, robot: RobotConfig, asked: JointRequest) -> Joint
 def _reader(path: Path, asked: JointRequest) -> JointReader | None:
     if not path.exists():
         return None
-    head = b""
-    if path.is_file():
-        try:
-            head = read_head(path, _HEAD_BYTES)
-        except OSError as error:
-            raise InputError(f"{path}: {error.strerror or error}") from None
+    head = read_head(path, _HEAD_BYTES) if path.is_file() else b""
     columns = asked.columns or stored(path).get("columns")
     if columns:
         head = ",".join([*columns, "joint"]).encode()

@@ -84,7 +84,8 @@ class Keypoints:
         ]
         if unseen_nodes and len(unseen_nodes) < len(order):
             raise InputError(
-                f"{file}: {', '.join(unseen_nodes)} is never seen; give --keypoints without it"
+                f"{file}: {', '.join(unseen_nodes)} is never seen; list the others as "
+                f"`keypoints = [...]` in {file.name}.reading.toml"
             )
         return places
 

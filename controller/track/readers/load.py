@@ -8,6 +8,7 @@ from snakewalk.config.archive import ending, read_head, read_text
 from snakewalk.config.errors import InputError
 from snakewalk.config.extras import require_extra
 from snakewalk.config.loader import load
+from snakewalk.config.near_names import file_hint
 from snakewalk.config.reading import Fact, Facts, answered
 from snakewalk.config.recording import RecordingConfig
 from snakewalk.controller.track.choice import ALL, Choice
@@ -52,8 +53,8 @@ def load_track(name_or_path: str, choice: Choice = ALL) -> Track:
         return embedded(name_or_path)
     if not path.exists():
         raise InputError(
-            f"{name_or_path}: no such recording or file; shipped are {', '.join(EMBEDDED)}; "
-            f"a file may be {KNOWN}"
+            f"{name_or_path}: no such recording or file{file_hint(path)}; shipped are "
+            f"{', '.join(EMBEDDED)}; a file may be {KNOWN}"
         )
     if path.suffix == ".toml":
         return generate(load(path, RecordingConfig))

@@ -16,12 +16,7 @@ SUFFIXES = (".npz", ".csv", ".wcon")
 
 
 def write_track(path: Path, track: Track, suffix: str) -> None:
-    """Write a track in the format of a suffix.
-
-    Raises:
-        InputError: the suffix is not in ``SUFFIXES``.
-
-    """
+    """Write a track in the format of a suffix of ``SUFFIXES``."""
     if suffix.lower() == ".npz":
         save_track(path, track)
     else:
@@ -46,18 +41,15 @@ def write_tracks(
         unit: of the points: ``m``, ``px`` or ``lengths``; None: that of the tracks.
 
     Raises:
-        InputError: another suffix, or a table of a recording without places.
+        InputError: a table of a recording without places.
 
     """
     if unit is None:
         unit = "lengths" if tracks[0].length_m is None else "m"
-    match suffix.lower():
-        case ".csv":
-            _write_csv(path, tracks, unit, wide=wide)
-        case ".wcon":
-            _write_wcon(path, tracks, unit)
-        case _:
-            raise InputError(f"{path}: a track is written as one of {', '.join(SUFFIXES)}")
+    if suffix.lower() == ".csv":
+        _write_csv(path, tracks, unit, wide=wide)
+    else:
+        _write_wcon(path, tracks, unit)
 
 
 def _write_csv(path: Path, tracks: Sequence[Track], unit: str, *, wide: bool) -> None:

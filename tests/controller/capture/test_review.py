@@ -164,11 +164,14 @@ def test_wrong_files_and_options_are_refused(folder: Path, tmp_path: Path) -> No
             "leave the other options out",
         ),
         (film_options(track, track, corrections=junk), "exists; --force"),
-        (film_options(track, tmp_path / "a.csv", corrections=junk), "a track is an .npz"),
+        (
+            film_options(track, tmp_path / "a.csv", corrections=junk),
+            "a corrected track ends in .npz",
+        ),
     ):
         with pytest.raises(InputError, match=said):
             correct_recording(options)
-    with pytest.raises(InputError, match=r"a review page is an \.html"):
+    with pytest.raises(InputError, match=r"a review page ends in \.html"):
         capture_recording(film_options(folder / "frames", new, review=tmp_path / "a.doc"))
     np.savez(tmp_path / "other.npz", points=np.zeros((3, 5, 2)))
     for file in (tmp_path / "other.npz", junk):
