@@ -14,6 +14,9 @@ Name = Annotated[
 ]
 """A name that becomes part of a file's: no path, nothing that steers a terminal, not hidden."""
 
+Share = Annotated[float, Field(ge=0.0, lt=1.0)]
+"""A share of something, below all of it."""
+
 
 class Strict(BaseModel):
     """Frozen, refuses unknown keys, NaN and infinities; every key has a description."""

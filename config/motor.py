@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Share, Strict
 
 
 class MotorConfig(Strict):
@@ -48,22 +48,14 @@ class MotorConfig(Strict):
     stribeck_exponent: float = Field(
         2.0, gt=0.0, le=20.0, description="exponent of the fading of a slow shaft's friction"
     )
-    by_motor: float = Field(
-        0.0, ge=0.0, lt=1.0, description="friction as a share of the motor's torque"
-    )
-    by_load: float = Field(
-        0.0, ge=0.0, lt=1.0, description="friction as a share of the load's torque"
-    )
-    by_motor_slow: float = Field(
+    by_motor: Share = Field(0.0, description="friction as a share of the motor's torque")
+    by_load: Share = Field(0.0, description="friction as a share of the load's torque")
+    by_motor_slow: Share = Field(
         0.0,
-        ge=0.0,
-        lt=1.0,
         description="additional share of the motor's torque while the shaft is slow",
     )
-    by_load_slow: float = Field(
+    by_load_slow: Share = Field(
         0.0,
-        ge=0.0,
-        lt=1.0,
         description="additional share of the load's torque while the shaft is slow",
     )
     by_motor_square: float = Field(

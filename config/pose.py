@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Share, Strict
 
 Metres3 = tuple[
     Annotated[float, Field(ge=-1000.0, le=1000.0)],
@@ -109,9 +109,7 @@ class TrackerConfig(Strict):
     clock_drift_ppm: float = Field(
         0.0, ge=-1000.0, le=1000.0, description="drift of the sender's clock"
     )
-    lost_share: float = Field(
-        0.0, ge=0.0, lt=1.0, description="share of the datagrams that are lost, at random"
-    )
+    lost_share: Share = Field(0.0, description="share of the datagrams that are lost, at random")
     dropout_every_s: float = Field(
         0.0, ge=0.0, description="mean time between dropouts; 0: no dropouts"
     )

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from snakewalk.config.base import Name, Strict
+from snakewalk.config.base import Name, Share, Strict
 from snakewalk.config.camera import CameraConfig, MappingConfig, PoseName
 from snakewalk.config.compliance import ComplianceConfig
 from snakewalk.config.constants import DEFAULT_ROBOT, DEFAULT_WORLD
@@ -167,8 +167,8 @@ class BehaviourConfig(Strict):
         le=3.0,
         description="speed of the walk: body lengths that the wave travels in a second",
     )
-    sliding: float = Field(
-        0.0, ge=0.0, lt=1.0, description="share of the pulse speed that is lost by sliding (w_d)"
+    sliding: Share = Field(
+        0.0, description="share of the pulse speed that is lost by sliding (w_d)"
     )
     curvature: float | None = Field(
         None,
@@ -265,10 +265,8 @@ class SafetyConfig(Strict):
         "of a serial port, -rts:PORT or -dtr:PORT clears it, command:/PROGRAM ARGUMENT starts a "
         "program; a simulated run opens the simulated supply",
     )
-    advance_fraction: float = Field(
+    advance_fraction: Share = Field(
         0.5,
-        ge=0.0,
-        lt=1.0,
         description="share of the expected advance below which the run raises an alarm",
     )
     watchdog_s: float = Field(

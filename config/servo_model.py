@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from snakewalk.config.base import Strict
+from snakewalk.config.base import Share, Strict
 from snakewalk.config.value_faults import MARK_PATTERN
 
 TABLE_BYTES = 1024
@@ -252,14 +252,10 @@ class FrictionRow(Strict):
     stribeck_rad_s: float = Field(
         0.3, gt=0.0, description="speed at which the additional friction of a slow shaft has faded"
     )
-    by_motor: float = Field(
-        0.0, ge=0.0, lt=1.0, description="friction as a share of the motor's torque"
-    )
-    by_load: float = Field(
-        0.0, ge=0.0, lt=1.0, description="friction as a share of the load's torque"
-    )
-    by_load_slow: float = Field(
-        0.0, ge=0.0, lt=1.0, description="additional share of the load's torque of a slow shaft"
+    by_motor: Share = Field(0.0, description="friction as a share of the motor's torque")
+    by_load: Share = Field(0.0, description="friction as a share of the load's torque")
+    by_load_slow: Share = Field(
+        0.0, description="additional share of the load's torque of a slow shaft"
     )
 
 

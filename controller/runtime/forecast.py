@@ -71,15 +71,16 @@ class Forecast:
     @property
     def joint_speed_rad_s(self) -> Floats:
         """(J,) largest speed asked of each joint."""
-        speeds = np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None]
-        return np.asarray(np.abs(speeds).max(axis=0))
+        return np.asarray(np.abs(self._speeds_rad_s()).max(axis=0))
 
     @property
     def joint_acceleration_rad_s2(self) -> Floats:
         """(J,) largest acceleration asked of each joint."""
-        speeds = np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None]
-        changes = np.diff(speeds, axis=0) / np.diff(self.time_s)[1:, None]
+        changes = np.diff(self._speeds_rad_s(), axis=0) / np.diff(self.time_s)[1:, None]
         return np.asarray(np.abs(changes).max(axis=0, initial=0.0))
+
+    def _speeds_rad_s(self) -> Floats:
+        return np.asarray(np.diff(self.joint_rad, axis=0) / np.diff(self.time_s)[:, None])
 
     @property
     def joint_torque_n_m(self) -> Floats:

@@ -350,6 +350,20 @@ class CaseSummary:
     """Runs in which the head link was over 90 degrees on its side."""
 
 
+_MEANS = {
+    "reached": 2,
+    "duration_s": 1,
+    "path_error_m": 3,
+    "eta": 2,
+    "cost_of_transport": 2,
+    "in_air": 2,
+    "speed_m_s": 4,
+    "head_error_m": 3,
+}
+_LARGEST = {"path_error_max_m": 2, "lead_max_rad": 3, "current_max_a": 2, "roll_max_deg": 0}
+"""Values of trials whose mean or largest value is in the row of a case, and their digits."""
+
+
 def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummary]:
     """One row per case: complete runs, means and extremes, and reasons of failures."""
     rows: list[CaseSummary] = []
@@ -357,8 +371,14 @@ def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummar
         some = sorted((t for t in all_trials if t.case == case), key=lambda t: t.seed)
         complete = sum(t.complete for t in some)
         first = sum(t.first_pass for t in some)
+        statistics: dict[str, Any] = {
+            name: statistic([getattr(t, name) for t in some], digits)
+            for statistic, names in ((_mean, _MEANS), (_largest_value, _LARGEST))
+            for name, digits in names.items()
+        }
         rows.append(
             CaseSummary(
+                **statistics,
                 run=case.run,
                 robot=case.robot or "",
                 motion=case.motion,
@@ -370,25 +390,13 @@ def table(all_trials: Sequence[Trial], cases: Sequence[Case]) -> list[CaseSummar
                 complete_95=wilson(complete, len(some)),
                 first_pass=first,
                 first_pass_95=wilson(first, len(some)),
-                reached=_mean([t.reached for t in some], 2),
                 passed_by=sum(t.missed for t in some),
-                duration_s=_mean([t.duration_s for t in some], 1),
-                path_error_m=_mean([t.path_error_m for t in some], 3),
-                path_error_max_m=_largest_value([t.path_error_max_m for t in some], 2),
-                eta=_mean([t.eta for t in some], 2),
-                cost_of_transport=_mean([t.cost_of_transport for t in some], 2),
-                lead_max_rad=_largest_value([t.lead_max_rad for t in some], 3),
-                current_max_a=_largest_value([t.current_max_a for t in some], 2),
-                roll_max_deg=_largest_value([t.roll_max_deg for t in some], 0),
-                in_air=_mean([t.in_air for t in some], 2),
                 alarms=sum(t.alarms for t in some),
                 causes=_counts([t.cause for t in some if not t.complete]),
                 why=reasons([t for t in some if not t.complete]),
                 compliance={None: "", True: "on", False: "off"}[case.compliance],
-                speed_m_s=_mean([t.speed_m_s for t in some], 4),
                 speed_sd_m_s=_deviation([t.speed_m_s for t in some], 4),
                 truly_complete=_truly_complete(some),
-                head_error_m=_mean([t.head_error_m for t in some], 3),
                 world=case.world or "",
                 pose=_evidence(some),
                 exit_codes=_counts([str(t.exit_code) for t in some]),
@@ -439,16 +447,20 @@ def _number(value: object) -> float:
     return float(value) if isinstance(value, int | float) else math.nan
 
 
+def _finite(values: list[float] | list[int]) -> list[float]:
+    return [value for value in values if np.isfinite(value)]
+
+
 def _mean(values: list[float] | list[int], digits: int) -> float | None:
-    finite_values = [v for v in values if np.isfinite(v)]
+    finite_values = _finite(values)
     return round(float(np.mean(finite_values)), digits) if finite_values else None
 
 
 def _deviation(values: list[float], digits: int) -> float | None:
-    finite_values = [v for v in values if np.isfinite(v)]
+    finite_values = _finite(values)
     return round(float(np.std(finite_values, ddof=1)), digits) if len(finite_values) > 1 else None
 
 
 def _largest_value(values: list[float], digits: int) -> float | None:
-    finite_values = [v for v in values if np.isfinite(v)]
+    finite_values = _finite(values)
     return round(max(finite_values), digits) if finite_values else None

@@ -152,7 +152,7 @@ def track_from_points(
             f"{name}: only {int(is_complete.sum())} of {len(points)} frames hold a midline"
         )
     kept = points[is_complete]
-    even, length = _even_bodies(kept)
+    even, length = even_bodies(kept)
     return Track(
         name=name,
         angles_rad=_over_time(tangent_angles(even)),
@@ -169,7 +169,7 @@ def track_from_points(
     )
 
 
-def _even_bodies(bodies: Floats) -> tuple[Floats, float]:
+def even_bodies(bodies: Floats) -> tuple[Floats, float]:
     """Bodies (T, 101, 2) at equal arc lengths, and the median of their lengths."""
     even = np.stack([equal_arc_length(body) for body in bodies])
     return even, float(np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1)))

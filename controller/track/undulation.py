@@ -7,8 +7,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Floats, Ints
 from snakewalk.controller.track.frame_runs import consecutive
-from snakewalk.controller.track.resample import body_points, equal_arc_length
-from snakewalk.controller.track.track import Track
+from snakewalk.controller.track.resample import body_points
+from snakewalk.controller.track.track import Track, even_bodies
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +32,8 @@ def even_points(track: Track) -> Floats | None:
     heads = track.points[:, 0]
     if np.ptp(heads, axis=0).max() <= 1e-9:
         return None
-    even = np.stack([equal_arc_length(body) for body in track.points])
-    length = np.median(np.hypot(*np.diff(even, axis=1).transpose(2, 0, 1)).sum(axis=1))
-    return np.asarray(even / length)
+    even, length = even_bodies(track.points)
+    return even / length
 
 
 def measure_undulation(track: Track, frequency_hz: float) -> Undulation:

@@ -363,7 +363,7 @@ class Course:
         if not len(left_m):
             return _Onward(path, self._passed_m, path.length_m)
         points_m = np.vstack([kept_m[-1], left_m])
-        avoid_m = np.array(self._stalls_m).reshape(-1, 2)
+        avoid_m = self._avoid_m
         heading = path.heading_rad(max(join_m - 0.05, 0.0))
         number = len(behind) + 1
         more = at_once(self._plan(points_m, None, avoid_m=avoid_m, number=number))
@@ -415,19 +415,22 @@ class Course:
 
     def _request(self, why: str, heading_rad: Callable[[], float], *, is_miss: bool) -> None:
         points_m = np.vstack([self._followers_m[1], self.waypoints_m[self.reached :]])
-        stalls_m = np.array(self._stalls_m).reshape(-1, 2)
-        number = self.reached + 1
-        request = PathRequest(why, points_m, heading_rad(), stalls_m, number, is_miss)
+        request = PathRequest(
+            why, points_m, heading_rad(), self._avoid_m, self.reached + 1, is_miss
+        )
         self._replanning = Replanning(request, self._plan)
 
     def _lay(self, from_m: Floats, heading_rad: float | None) -> None:
         """Plan from a point, with the body's heading, through the remaining waypoints."""
         points_m = np.vstack([from_m, self.waypoints_m[self.reached :]])
-        stalls_m = np.array(self._stalls_m).reshape(-1, 2)
-        number = self.reached + 1
         self._replanning = None
-        plan = self._plan(points_m, heading_rad, avoid_m=stalls_m, number=number)
+        plan = self._plan(points_m, heading_rad, avoid_m=self._avoid_m, number=self.reached + 1)
         self._follow_path(at_once(plan))
+
+    @property
+    def _avoid_m(self) -> Floats:
+        """(n, 2) places at which the body made no progress."""
+        return np.array(self._stalls_m).reshape(-1, 2)
 
     def _follow_path(self, path: SplinePath) -> None:
         """Put a path in force that begins at the head."""

@@ -224,7 +224,7 @@ class Pilot(OnCourse):
 
     def begin(self, view: BodyView) -> Floats:
         """Fit the first shape to the ground; return the first targets (J,)."""
-        self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
+        self._goal_rad = self._on_ground(0.0, view)
         self._last_rad = self._earlier_rad = self._goal_rad
         return self._goal_rad
 
@@ -262,8 +262,7 @@ class Pilot(OnCourse):
         self._pitch_rad = None
         self._at_rest = True
         self._decides = True
-        self._goal_rad = self._on_ground(self._time_law.goal_rad(), 0.0, view)
-        self._last_rad = self._earlier_rad = self._goal_rad
+        self.begin(view)
         self._last_s = self._earlier_s = self._saved_s = 0.0
 
     def step(self, dt_s: float, view: BodyView) -> Floats:
@@ -333,7 +332,7 @@ class Pilot(OnCourse):
             self._offset_rad = before_rad - self._goal_rad
             self.course.lay_from_here("backed out", lambda: view.heading_rad)
             return self._goal_rad
-        return self._on_ground(self._time_law.goal_rad(), dt_s, view)
+        return self._on_ground(dt_s, view)
 
     def _prepare_decision(self, view: BodyView) -> bool:
         """Prepare the next piece of track, or decide; return whether that fills the cycle.
@@ -357,7 +356,7 @@ class Pilot(OnCourse):
 
     def _move(self, dt_s: float, view: BodyView) -> Floats:
         self._time_law.advance(dt_s)
-        goal_rad = self._on_ground(self._time_law.goal_rad(), dt_s, view)
+        goal_rad = self._on_ground(dt_s, view)
         return goal_rad if self._roll is None else self._roll(goal_rad, view, dt_s)
 
     def use_twin(self, twin: TwinRollout) -> None:
@@ -422,11 +421,12 @@ class Pilot(OnCourse):
         end = min(other.head + LENGTH_BODIES * track.points, track.end - _LOOKAHEAD_SEGMENTS)
         return self._twin.roll(pose, lambda: other.head >= end, other._move)
 
-    def _on_ground(self, goal_rad: Floats, dt_s: float, view: BodyView) -> Floats:
-        """Add to yaw goals (J,) the pitch that fits the body to the ground.
+    def _on_ground(self, dt_s: float, view: BodyView) -> Floats:
+        """(J,) goals of the time law, with the pitch that fits the body to the ground.
 
         The pitch is smoothed over ``_PITCH_SMOOTHING_S``, because the ground consists of facets.
         """
+        goal_rad = self._time_law.goal_rad()
         if self._pitch_fitter is None:
             return goal_rad
         head_m, headings_rad = self._head_and_headings_ahead(view)

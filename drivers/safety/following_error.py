@@ -70,7 +70,7 @@ class FollowingError:
         output = np.zeros((3, joints)) if limits.output is None else limits.output
         self._rules = np.vstack([limits.following_limit_rad, limits.following_effort_a, output])
         self._memory = np.zeros((4, joints))
-        self._since_s, self._idle_s, self._last_rad, self._driven_rad = self._memory
+        self._since_s, self._idle_s, _, self._driven_rad = self._memory
         self._steady = np.zeros((5, joints))
         self._goals: deque[tuple[float, Floats]] = deque(maxlen=16)
         self.joint = -1
@@ -81,10 +81,8 @@ class FollowingError:
 
     def reset(self) -> None:
         """Forget the past: the joints rest at their goals."""
-        self._since_s[:] = np.nan
+        self._memory[:] = np.nan
         self._idle_s[:] = 0.0
-        self._last_rad[:] = np.nan
-        self._driven_rad[:] = np.nan
         self._steady[:] = np.nan
         self._goals.clear()
         self._time_s = math.inf
@@ -93,18 +91,7 @@ class FollowingError:
         """Evaluate a state and the goals (J,) sent before it; return a reason to stop, or None."""
         last_s, self._time_s = self._time_s, state.time_s
         goal_rad = self._nearest_goals(state, goal_rad)
-        joint = _judge(
-            goal_rad,
-            state.position_rad,
-            state.velocity_rad_s,
-            state.current_a,
-            state.valid,
-            state.time_s,
-            last_s,
-            self._rules,
-            self._memory,
-        )
-        steady = _steady_joint(
+        measured = (
             goal_rad,
             state.position_rad,
             state.current_a,
@@ -112,8 +99,9 @@ class FollowingError:
             state.time_s,
             last_s,
             self._rules,
-            self._steady,
         )
+        joint = _judge(*measured, self._memory, state.velocity_rad_s)
+        steady = _steady_joint(*measured, self._steady)
         self.is_idle = joint >= 0 and bool(self._idle_s[joint] >= IDLE_TIME_S)
         if self.is_idle:
             self.joint = joint
@@ -190,20 +178,20 @@ class FollowingError:
 
 
 @compiled(
-    f"int64({', '.join([_FLOATS] * 4)}, {readonly_array('boolean')}, float64, float64,"
-    " float64[:, ::1], float64[:, ::1])",
+    f"int64({', '.join([_FLOATS] * 3)}, {readonly_array('boolean')}, float64, float64,"
+    f" float64[:, ::1], float64[:, ::1], {_FLOATS})",
     makes_arrays=False,
 )
 def _judge(  # noqa: C901  a compiled loop
     goal_rad: Floats,
     position_rad: Floats,
-    velocity_rad_s: Floats,
     current_a: Floats,
     valid: Bools,
     time_s: float,
     last_s: float,
     rules: Floats,
     memory: Floats,
+    velocity_rad_s: Floats,
 ) -> int:
     """Note how long each joint does not follow, and how long each motor draws no current.
 
@@ -213,7 +201,6 @@ def _judge(  # noqa: C901  a compiled loop
     Args:
         goal_rad: (J,) goals sent before the state.
         position_rad: (J,)
-        velocity_rad_s: (J,)
         current_a: (J,)
         valid: (J,) whether the joint was read.
         time_s: time of the state.
@@ -222,6 +209,7 @@ def _judge(  # noqa: C901  a compiled loop
             ``SafetyLimits.output``.
         memory: (4, J) time since which a joint does not follow, or NaN; time without current, s;
             previous position, or NaN; error at the last current.
+        velocity_rad_s: (J,)
 
     Returns:
         The first joint whose motor has drawn no current for ``IDLE_TIME_S``, else the joint that

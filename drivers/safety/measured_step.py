@@ -116,13 +116,12 @@ def _is_all_believable(
 def _held_state(state: JointState, believed: JointState, is_held: np.ndarray) -> JointState:
     """State with the credible values of the joints in ``is_held`` (J,)."""
     age_s = believed.age_s + (state.time_s - believed.time_s)
+    believed = believed._replace(age_s=age_s)
     arrays = {
-        "position_rad": np.where(is_held, believed.position_rad, state.position_rad),
-        "velocity_rad_s": np.where(is_held, believed.velocity_rad_s, state.velocity_rad_s),
-        "current_a": np.where(is_held, believed.current_a, state.current_a),
-        "age_s": np.where(is_held, age_s, state.age_s),
-        "valid": state.valid & ~is_held,
+        name: np.where(is_held, getattr(believed, name), getattr(state, name))
+        for name in ("position_rad", "velocity_rad_s", "current_a", "age_s")
     }
+    arrays["valid"] = state.valid & ~is_held
     for array in arrays.values():
         array.setflags(write=False)
     return state._replace(**arrays)

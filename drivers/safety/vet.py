@@ -143,8 +143,7 @@ def over_current_since_s(state: JointState, last: SafetyMemory, limits: SafetyLi
     over = np.abs(state.current_a) > limits.current_limit_a
     if not over.any() and not np.isfinite(since).any():
         return _unlimited(len(since))
-    started = np.where(np.isnan(since), state.time_s, since)
-    return np.where(state.valid, np.where(over, started, np.nan), since)
+    return np.where(state.valid, _started_s(over, since, state.time_s), since)
 
 
 def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyLimits) -> Floats:
@@ -153,8 +152,12 @@ def under_voltage_since_s(state: JointState, last: SafetyMemory, limits: SafetyL
     low = state.voltage_v < limits.voltage_min_v
     if not low.any():
         return _unlimited(len(since))
-    started = np.where(np.isnan(since), state.time_s - state.slow_age_s, since)
-    return np.where(low, started, np.nan)
+    return _started_s(low, since, state.time_s - state.slow_age_s)
+
+
+def _started_s(is_beyond: Bools, since_s: Floats, now_s: Floats | float) -> Floats:
+    """(J,) time since which each joint is beyond its limit; NaN within it."""
+    return np.where(is_beyond, np.where(np.isnan(since_s), now_s, since_s), np.nan)
 
 
 def stale_fault(state: JointState, limits: SafetyLimits, now_s: float) -> str | None:

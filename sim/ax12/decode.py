@@ -96,15 +96,19 @@ class Decoder1:
             self._asked = None
             if packet.params:
                 values = self._values(asked.params[0], packet.params)
-        return DecodedPacket(
-            time_s, "answer", packet.servo_id, self._outcome(packet.instruction), values, raw
-        )
+        return self._reply(time_s, packet, values, raw)
 
-    def _outcome(self, error: int) -> str:
+    def _reply(
+        self, time_s: float, packet: Packet1, values: dict[str, object], raw: str
+    ) -> DecodedPacket:
         alarms = [
-            str(alarm.name).lower().replace("_", " ") for alarm in self.errors if error & alarm
+            str(alarm.name).lower().replace("_", " ")
+            for alarm in self.errors
+            if packet.instruction & alarm
         ]
-        return ", ".join(alarms) or "ok"
+        return DecodedPacket(
+            time_s, "answer", packet.servo_id, ", ".join(alarms) or "ok", values, raw
+        )
 
     def _decode(self, cell: RegisterRow, data: bytes) -> int:
         """Value of a register whose bytes begin ``data``; servos of another make override it."""

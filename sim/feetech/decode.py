@@ -54,10 +54,7 @@ class FeetechDecoder(Decoder1):
         if asked is None or asked.instruction != FeetechInstruction.SYNC_READ:
             return super()._answer(time_s, packet, raw)
         self._turns.remove(packet.servo_id)
-        values = self._values(asked.params[0], packet.params)
-        return DecodedPacket(
-            time_s, "answer", packet.servo_id, self._outcome(packet.instruction), values, raw
-        )
+        return self._reply(time_s, packet, self._values(asked.params[0], packet.params), raw)
 
     def _decode(self, cell: RegisterRow, data: bytes) -> int:
         return decode_word(data, cell, self._facts)

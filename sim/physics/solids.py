@@ -15,6 +15,7 @@ from snakewalk.config.world import (
     PipeObstacle,
     PoleObstacle,
 )
+from snakewalk.drivers.attitude import about_up
 
 STAVE_COUNT = 24
 """Number of boxes of a pipe: its wall is flat by less than 1 % of its radius."""
@@ -67,10 +68,8 @@ def solids(thing: Obstacle) -> list[Solid]:
     stave = (STAVE_M / 2, half, thing.length_m / 2)
     parts = []
     for angle in 2.0 * math.pi * np.arange(STAVE_COUNT) / STAVE_COUNT:
-        c, s = math.cos(angle), math.sin(angle)
-        place = out * np.array([c, s, 0.0])
-        axes = turn @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        parts.append(Solid("box", stave, middle + turn @ place, axes, GLASS))
+        axes = turn @ about_up(angle)
+        parts.append(Solid("box", stave, middle + out * axes[:, 0], axes, GLASS))
     return parts
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import mujoco
 import mujoco.viewer
-import numpy as np
 
 from snakewalk.config.arrays import Floats, Image
 from snakewalk.config.errors import InputError
@@ -41,10 +40,7 @@ class ChaseView:
     def draw(self, qpos: Floats) -> Image:
         """Draw a pose, (height, width, 3), top row first; a new array."""
         camera = self._camera
-        camera.lookat[:] = self._pose.move(qpos)
-        camera.distance = self._pose.distance_m
-        camera.elevation = ELEVATION_DEG
-        camera.azimuth = AZIMUTH_DEG
+        self._pose.show(qpos, camera)
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(
             self._pose.model, self._pose.data, self._option, None, camera, every, self._scene
@@ -62,15 +58,18 @@ class _Pose:
     def __init__(self, robot: RobotConfig, world: WorldConfig, ground: HeightField | None) -> None:
         self.model = dressed_model(Scene(robot, world, ground))
         self.data = mujoco.MjData(self.model)
-        self.distance_m = DISTANCE_LENGTHS * robot.length_m
+        self._distance_m = DISTANCE_LENGTHS * robot.length_m
 
-    def move(self, qpos: Floats) -> Floats:
-        """Move the body; return its middle, (3,) m."""
+    def show(self, qpos: Floats, camera: mujoco.MjvCamera) -> None:
+        """Move the body, and point a camera at its middle."""
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
-        return np.array(self.data.subtree_com[1])
+        camera.lookat[:] = self.data.subtree_com[1]
+        camera.distance = self._distance_m
+        camera.elevation = ELEVATION_DEG
+        camera.azimuth = AZIMUTH_DEG
 
 
 class ChaseWindow:
@@ -96,11 +95,7 @@ class ChaseWindow:
         if not self._window.is_running():
             return
         with self._window.lock():
-            camera = self._window.cam
-            camera.lookat[:] = self._pose.move(qpos)
-            camera.distance = self._pose.distance_m
-            camera.elevation = ELEVATION_DEG
-            camera.azimuth = AZIMUTH_DEG
+            self._pose.show(qpos, self._window.cam)
         self._window.sync()
 
     def close(self) -> None:

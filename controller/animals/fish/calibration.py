@@ -79,13 +79,14 @@ def _with_fins(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> F
 
 def _value(model: FishModel, frame: SilhouetteFrame, match: Match) -> float:
     """V of a fitted posture, with another model."""
+    target = _target(model, frame, match)
+    return float("-inf") if target is None else TopViewFit(target, model).value(match.parameters)
+
+
+def _target(model: FishModel, frame: SilhouetteFrame, match: Match) -> Target | None:
     scale = min(1.0, 200.0 / model.length_px)
     window = window_of(frame, model, match.parameters[:2], scale)
-    return (
-        float("-inf")
-        if window is None
-        else TopViewFit(Target(frame, window, 3), model).value(match.parameters)
-    )
+    return None if window is None else Target(frame, window, 3)
 
 
 def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floats:
@@ -106,11 +107,9 @@ def _widths(model: FishModel, good: list[tuple[SilhouetteFrame, Match]]) -> Floa
 
 def _size(model: FishModel, frame: SilhouetteFrame, match: Match) -> tuple[float, float]:
     """Factors of length and width of the largest V, the fish free to slide along its head."""
-    scale = min(1.0, 200.0 / model.length_px)
-    window = window_of(frame, model, match.parameters[:2], scale)
-    if window is None:
+    target = _target(model, frame, match)
+    if target is None:
         return 1.0, 1.0
-    target = Target(frame, window, 3)
     ahead = np.array([np.cos(match.parameters[2]), np.sin(match.parameters[2])])
 
     def value(size: Floats) -> float:

@@ -134,10 +134,8 @@ def _ornament_rotation(ornament: OrnamentConfig) -> Floats:
 
 def _facing(forward: Floats, up: Floats) -> Floats:
     """(T, 3, 3) turns whose x is along ``forward`` and whose z is as near to ``up`` as possible."""
-    x = forward / np.linalg.norm(forward, axis=1, keepdims=True)
-    y = np.cross(np.broadcast_to(up, x.shape), x)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y, np.cross(x, y)], axis=-1)
+    y = np.cross(np.broadcast_to(up, forward.shape), forward)
+    return _rotation_from_axes(forward, y / np.linalg.norm(y, axis=1, keepdims=True))
 
 
 def _rotation_from_axes(forward: Floats, y: Floats) -> Floats:

@@ -224,13 +224,17 @@ def _scaled_constants(values: Floats, factor: float) -> Floats:
     return out
 
 
+def _searched(logs: Sequence[PendulumLog], values: Floats) -> tuple[Floats, Floats]:
+    """Ends of the ranges of the first values."""
+    searched = ranges(logs[0].actuator)
+    return searched.low[: len(values)], searched.high[: len(values)]
+
+
 def _inseparable_factors(
     logs: Sequence[PendulumLog], values: Floats, squares: Floats
 ) -> tuple[float, float]:
     """Range of the factor of ``_scaled_constants`` that the recordings do not separate from 1."""
-    searched = ranges(logs[0].actuator)
-    lowest = searched.low[: len(values)]
-    highest = searched.high[: len(values)]
+    lowest, highest = _searched(logs, values)
     limit = _cost(values, logs, squares) * (1.0 + _CHI_SQUARE / _blocks(logs))
     ends = []
     for step in (1.0 / _FACTOR, _FACTOR):
@@ -254,9 +258,7 @@ def _intervals(
     intervals grow with the blocks' sums, not shrink with the number of samples. Values that the
     logs do not determine have an interval as wide as their range.
     """
-    searched = ranges(logs[0].actuator)
-    lowest = searched.low[: len(values)]
-    highest = searched.high[: len(values)]
+    lowest, highest = _searched(logs, values)
     width = highest - lowest
     steps = _FINE_TURN * np.maximum(np.abs(values), 0.01 * width)
     steps[FITTED:] = _BACKLASH_TURN * values[FITTED:]
@@ -296,5 +298,5 @@ def _intervals(
     if not low[[NAMES.index(name) for name in _SLOW_TERMS]].any():
         # whether friction grows when the shaft is slow is open, so how slow is open, too
         shape = [NAMES.index(name) for name in ("stribeck_rad_s", "stribeck_exponent")]
-        low[shape], high[shape] = searched.low[shape], searched.high[shape]
+        low[shape], high[shape] = lowest[shape], highest[shape]
     return low, high
