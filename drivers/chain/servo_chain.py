@@ -424,7 +424,9 @@ class ServoChain:
         """Decode a group read of the state; return its time, s."""
         measured_at_s = self._clock.now_s() - self._cycle.since_sent_s
         alerted = self._readings.update(reply, measured_at_s, again=again)
-        lines = self._motion_sensors.update(self._readings.motion, reply.valid, measured_at_s)
+        lines = self._motion_sensors.update(
+            self._readings.motion, self._goal_rad, reply.valid, measured_at_s
+        )
         for line in (*self._alarms.update(alerted), *lines):
             self.on_event(line)
         return measured_at_s

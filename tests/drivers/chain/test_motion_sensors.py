@@ -48,7 +48,7 @@ def swing(
             ]
         )
         change(motion)
-        lines += [(k, line) for line in sensors.update(motion, valid, k * step_s)]
+        lines += [(k, line) for line in sensors.update(motion, np.zeros(2), valid, k * step_s)]
     return lines
 
 
@@ -121,7 +121,7 @@ def test_a_constant_speed_with_its_constant_current_is_not_reported() -> None:
     sensors = MotionSensors(ROBOT)
     for k in range(300):
         motion = np.array([[0.1, 0.1], [0.5, 0.5], [0.5 * k * STEP_S, 0.5 * k * STEP_S]])
-        assert sensors.update(motion, READ, k * STEP_S) == []
+        assert sensors.update(motion, np.zeros(2), READ, k * STEP_S) == []
 
 
 def test_unread_unknown_and_rare_readings_are_not_judged() -> None:

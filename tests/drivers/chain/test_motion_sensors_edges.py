@@ -1,5 +1,6 @@
 """Bounds of the motion sensors: the very read at which a sensor is reported, and times between."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,10 +11,14 @@ from snakewalk.drivers.chain.motion_sensors import (
     BACK_RAD,
     CURRENT_READS,
     CURRENT_TRAVEL_RAD,
+    GOALS_RAD,
     LONGEST_STEP_S,
     MISMATCH_RAD,
     MISMATCH_RAD_S,
     SPEED_READS,
+    STANDING_RAD,
+    STANDING_S,
+    SWUNG_RAD,
     WINDOW_S,
     MotionSensors,
 )
@@ -29,13 +34,15 @@ def reports(
     velocity_rad_s: Sequence[float],
     position_rad: Sequence[float],
     times_s: Sequence[float] | None = None,
+    goals_rad: Sequence[float] | None = None,
 ) -> list[tuple[int, str]]:
     """Reads at which sensors of the first joint are reported; the second joint stands."""
     sensors, found = MotionSensors(ROBOT), []
     for k, reading in enumerate(zip(current_a, velocity_rad_s, position_rad, strict=True)):
         motion = np.array([[value, 0.0] for value in reading])
         time_s = k * STEP_S if times_s is None else times_s[k]
-        lines = sensors.update(motion, np.ones(2, bool), time_s)
+        goal_rad = np.array([0.0 if goals_rad is None else goals_rad[k], 0.0])
+        lines = sensors.update(motion, goal_rad, np.ones(2, bool), time_s)
         found += [(k, line.split(": ")[1].split()[0]) for line in lines]
     return found
 
@@ -141,7 +148,7 @@ def test_each_sensor_is_reported_once_though_others_follow() -> None:
                 [to_and_fro, to_and_fro],
             ]
         )
-        lines += sensors.update(motion, np.ones(2, bool), k * STEP_S)
+        lines += sensors.update(motion, np.zeros(2), np.ones(2, bool), k * STEP_S)
     assert [line.split(": ")[0] for line in lines] == [ROBOT.joint_label(j) for j in (0, 1)]
 
 
@@ -171,3 +178,63 @@ def test_a_comparison_begins_again_after_a_reading_that_is_unknown() -> None:
     position[10] = NAN
     ((read, sensor),) = reports(varied(60), still(60), position)
     assert (read, sensor) == (11 + SPEED_READS, "velocity")
+
+
+def swings(forth_reads: int, back_reads: int, speed_rad_s: float = 0.25) -> list[float]:
+    """Velocities of a joint that turns forth and back after a rest."""
+    return [*still(30), *[speed_rad_s] * forth_reads, *[-speed_rad_s] * back_reads, *still(20)]
+
+
+def test_a_constant_position_contradicts_a_velocity_that_swings() -> None:
+    """A soft joint with a constant angle swung by 0.06 rad for 6 s, and nothing reported it."""
+    reads = math.ceil(SWUNG_RAD / 0.25 / STEP_S)
+    velocity = swings(reads + 1, reads + 1)
+    ((read, sensor),) = reports(varied(len(velocity)), velocity, [0.1] * len(velocity))
+    assert sensor == "position"
+    assert read > 30 + reads
+    for few in (swings(reads - 2, 40), swings(20, reads - 2), swings(40, 0)):
+        assert reports(varied(len(few)), few, [0.1] * len(few)) == []
+
+
+def test_a_swing_of_slow_velocities_is_noise() -> None:
+    velocity = swings(200, 200, 0.99 * MISMATCH_RAD_S) * 3
+    assert reports(varied(len(velocity)), velocity, [0.1] * len(velocity)) == []
+
+
+def test_a_swing_begins_again_when_the_position_changes() -> None:
+    reads = math.ceil(SWUNG_RAD / 0.25 / STEP_S)
+    velocity = swings(reads + 1, reads + 1)
+    position = [0.1] * (30 + reads) + [0.1015] * (len(velocity) - 30 - reads)
+    assert reports(varied(len(velocity)), velocity, position) == []
+
+
+def jam(
+    goal_rad: float, moved_rad: float = 0.0, seconds: float = STANDING_S + 1.0
+) -> list[tuple[int, str]]:
+    """Reports of a joint whose goals swing once to ``goal_rad``, and that moves meanwhile."""
+    count = round(seconds / STEP_S)
+    goals = [goal_rad * (30 < k < 90) for k in range(count)]
+    position = [moved_rad * (k % 40 < 20) for k in range(count)]
+    return reports(varied(count), [0.01 * (k % 3) for k in range(count)], position, None, goals)
+
+
+def test_a_joint_that_stands_while_its_goals_swing_is_reported() -> None:
+    """A jammed soft joint pushed with its permitted current, and nothing reported it."""
+    for goal_rad in (GOALS_RAD, -GOALS_RAD):
+        for moved_rad in (0.0, STANDING_RAD):
+            ((read, word),) = jam(goal_rad, moved_rad)
+            assert word == "has"
+            assert STANDING_S <= read * STEP_S < STANDING_S + 0.1
+
+
+def test_ground_that_holds_a_joint_off_for_a_moment_is_not_reported() -> None:
+    assert jam(0.99 * GOALS_RAD) == []
+    assert jam(GOALS_RAD, 1.01 * STANDING_RAD) == []
+    assert jam(GOALS_RAD, seconds=STANDING_S) == []
+
+
+def test_a_pause_ends_a_standstill() -> None:
+    count = round((STANDING_S + 1.0) / STEP_S)
+    goals = [GOALS_RAD * (k < 90) for k in range(count)]
+    times_s = [k * STEP_S + (0.2 if k > 100 else 0.0) for k in range(count)]
+    assert reports(varied(count), varied(count), still(count), times_s, goals) == []
