@@ -6,16 +6,10 @@ from pydantic import Field
 
 from snakewalk.config.base import Share, Strict
 
-Metres3 = tuple[
-    Annotated[float, Field(ge=-1000.0, le=1000.0)],
-    Annotated[float, Field(ge=-1000.0, le=1000.0)],
-    Annotated[float, Field(ge=-1000.0, le=1000.0)],
-]
-Degrees3 = tuple[
-    Annotated[float, Field(ge=-360.0, le=360.0)],
-    Annotated[float, Field(ge=-360.0, le=360.0)],
-    Annotated[float, Field(ge=-360.0, le=360.0)],
-]
+Metres = Annotated[float, Field(ge=-1000.0, le=1000.0)]
+Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
+Metres3 = tuple[Metres, Metres, Metres]
+Degrees3 = tuple[Degrees, Degrees, Degrees]
 
 
 class PoseConfig(Strict):
@@ -39,6 +33,12 @@ class PoseConfig(Strict):
     )
     world_deg: Degrees3 = Field(
         (0.0, 0.0, 0.0), description="roll, pitch and yaw of the source's axes in the world"
+    )
+    world_sd_deg: float = Field(
+        10.0,
+        gt=0.0,
+        le=180.0,
+        description="standard deviation of the yaw in `world_deg`; smaller if it was measured",
     )
     scale: float = Field(
         1.0, gt=0.0, le=1000.0, description="factor on the positions of the source, for metres"

@@ -117,8 +117,8 @@ def verdict(record: RunRecord, numbers: RunSummary, log: str = "log.mcap") -> Ru
     elif numbers.waypoints and sd_m > MOST_RADII * radius_m:
         exit_code = NOT_MEASURED
         cause = (
-            f"the pose of {numbers.pose_source} states an accuracy of {sd_m:.2g} m, and a waypoint "
-            f"has a radius of {radius_m:g} m: the arrival is not shown; improve the source"
+            f"the pose of {numbers.pose_source} states an accuracy of {sd_m:.2g} m, a waypoint has "
+            f"a radius of {radius_m:g} m: the arrival is not shown; use snakewalk pose calibrate"
         )
     elif numbers.waypoints and not numbers.is_measured:
         exit_code = NOT_MEASURED

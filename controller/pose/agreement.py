@@ -75,13 +75,13 @@ class Agreement:
         self._rows: deque[_Row] = deque()
         self._scales: list[float] = []
         self._judged_s = self._scaled_s = -np.inf
-        self._begun_s: float | None = None
         self._doubt_s = self._seconds = 0.0
         self._named: str | None = None
         self.scale_sd = self._allowed
         """Standard deviation of the source's scale, over 1."""
         self._aside_m = 0j
-        self._summed_s = -np.inf
+        self._summed_s = self._untimed_s = -np.inf
+        self._begun_s = np.inf
         self.step_rad = 0.0
         """Largest step of the heading of poses, by which the joints did not turn; 0 on hills."""
         self.has_agreed = False
@@ -134,8 +134,11 @@ class Agreement:
         self._doubt_s = 0.0
         self._named = None
 
-    def add(self, measured: HeadMeasurement, then: Moment) -> None:
-        """Compare a measurement with those before; a head that lies on its side shows nothing."""
+    def add(self, measured: HeadMeasurement, then: Moment, *, is_timed: bool = True) -> None:
+        """Compare a measurement with those before; a head that lies on its side shows nothing.
+
+        Unless the delay of the source is known (``is_timed``), a turning head looks like a step.
+        """
         if measured.rotation[2, 2] < LEAST_UP:
             self._rows.clear()
             return
@@ -145,7 +148,9 @@ class Agreement:
             return
         if rows and time_s - rows[-1].time_s > JUDGE_S:
             rows.clear()
-        self._begun_s = time_s if self._begun_s is None else self._begun_s
+        if not is_timed:
+            self._untimed_s = time_s
+        self._begun_s = min(self._begun_s, time_s)
         self._seconds = time_s - self._begun_s
         seen_rad = heading_of(measured.rotation)
         place_m, predicted_m = complex(*measured.position_m[:2]), complex(*then.place[:2])
@@ -160,19 +165,17 @@ class Agreement:
         columns = (np.array(column) for column in zip(*self._rows, strict=True))
         times, measured_m, measured_rad, predicted_m, predicted_rad = columns
         line = np.column_stack([np.ones(len(times)), times - times.mean()])
-        expected = _detrended_values(np.unwrap(predicted_rad), line)
-        turns = _detrended_values(np.unwrap(measured_rad), line)
+        predicted_rad, measured_rad = np.unwrap(predicted_rad), np.unwrap(measured_rad)
+        expected = _detrended_values(predicted_rad, line)
+        turns = _detrended_values(measured_rad, line)
         if np.sqrt(np.mean(expected**2)) < LEAST_TURN_RAD:
             return
         share = float(turns @ expected / (expected @ expected))
         related = float(expected @ turns) / _size(expected, turns)
-        off_rad = np.unwrap(np.unwrap(measured_rad) - np.unwrap(predicted_rad))
-        # a delay that is not known yet moves the heading by the rate of turning
-        rate_rad_s = np.gradient(np.unwrap(predicted_rad), times)
-        off_rad -= _fitted(off_rad, np.column_stack([line, rate_rad_s]))[2] * rate_rad_s
+        off_rad = measured_rad - predicted_rad
         means_rad = np.convolve(off_rad, np.full(STEP_ROWS, 1.0 / STEP_ROWS), "valid")
         step_rad = float(np.abs(means_rad[STEP_ROWS:] - means_rad[:-STEP_ROWS]).max(initial=0.0))
-        if self._is_level and step_rad > STEP_RAD:
+        if self._is_level and step_rad > STEP_RAD and times[0] > self._untimed_s:
             self.step_rad = max(self.step_rad, step_rad)
         slow_rad = off_rad - _detrended_values(off_rad, line)
         steps = np.diff(predicted_m) * np.exp(1j * slow_rad[:-1])
@@ -186,9 +189,9 @@ class Agreement:
         shape = _detrended_values(measured_m, line)
         named = _mirrored_swing(related, shape, swing)
         swings = related > SHARE and np.sqrt(np.mean(np.abs(swing) ** 2)) >= LEAST_SWING_M
-        if swings and named is None:
-            named = self._swing_fault(shape, swing, times[-1])
         is_alike = swings and abs(np.vdot(swing, shape)) > SHARE * _size(swing, shape)
+        if is_alike and named is None:
+            named = self._swing_fault(shape, swing, times[-1])
         agrees = named is None and related > SHARE and TURNS[0] < share < TURNS[1]
         doubt_s = JUDGE_S if swings or not agrees else QUIET_SHARE * JUDGE_S
         if named is None and not is_alike and (self._named or not self.has_agreed):
@@ -202,8 +205,6 @@ class Agreement:
 
     def _swing_fault(self, shape: Floats, swing: Floats, time_s: float) -> str | None:
         """Return what is wrong with direction or size of a measured swing; None if nothing is."""
-        if abs(np.vdot(swing, shape)) < SHARE * _size(swing, shape):
-            return None
         same = np.vdot(swing, shape) / np.vdot(swing, swing).real
         angle_deg = np.degrees(np.angle(same))
         if abs(angle_deg) > TURNED_DEG:
@@ -263,9 +264,4 @@ def _size(a: Floats, b: Floats) -> float:
 
 def _detrended_values(values: Floats, line: Floats) -> Floats:
     """Return values (n,), real or complex, without their straight line (n, 2)."""
-    return values - line @ _fitted(values, line)
-
-
-def _fitted(values: Floats, columns: Floats) -> Floats:
-    """Return the coefficients (c,) of columns (n, c) that fit values (n,) best."""
-    return np.asarray(np.linalg.lstsq(columns, values, rcond=None)[0])
+    return np.asarray(values - line @ np.linalg.lstsq(line, values)[0])

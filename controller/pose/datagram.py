@@ -97,9 +97,11 @@ def _numbers(key: str, values: Any, count: int) -> list[float]:
         UnusablePoseError: there are not ``count`` of them, or one is not finite.
 
     """
-    if not isinstance(values, list) or len(values) != count:
-        raise UnusablePoseError(f"{key}: must be {count} numbers")
-    if any(isinstance(v, bool) or not isinstance(v, int | float | None) for v in values):
+    if (
+        not isinstance(values, list)
+        or len(values) != count
+        or any(isinstance(v, bool) or not isinstance(v, int | float | None) for v in values)
+    ):
         raise UnusablePoseError(f"{key}: must be {count} numbers")
     try:
         numbers = [math.nan if value is None else float(value) for value in values]

@@ -60,12 +60,9 @@ class LatencyEstimate:
         times = history.times_s
         if self._is_fixed or len(times) < 2 or stamped_s - LONGEST_S < times[0]:
             return
-        if self._last is None:
-            step_s = 0.0
-            heading = heading_rad
-        else:
-            step_s = stamped_s - self._last[0]
-            heading = self._last[1] + math.remainder(heading_rad - self._last[1], math.tau)
+        last_s, last_rad = self._last or (stamped_s, heading_rad)
+        step_s = stamped_s - last_s
+        heading = last_rad + math.remainder(heading_rad - last_rad, math.tau)
         if not 0.0 <= step_s < 0.5 * SLOW_S:  # a gap: begin again
             self._last = None
             self._seconds = 0.0
@@ -97,6 +94,10 @@ class LatencyEstimate:
         self.latency_s += follow * float(shift_s - self.latency_s)
 
 
+START_SD_DEG = 5.0
+"""Standard deviation of the heading in which people lay down a robot (ours)."""
+REST_M = 0.003
+"""Way of the head from which on a body moves: joints at rest are noisy (ours)."""
 AGAIN_S = 10.0
 """Time after which the same fault is reported again (ours)."""
 FROZEN = 10
@@ -159,15 +160,17 @@ class ExternalPose:
         self._is_level = is_level
         self._clock = SenderClock()
         self._check = Agreement(is_level=is_level)
-        self._start_m: Floats | None = None
-        self._start_off = 0.0, 0.0
+        self._start: PlacedPose | None = None
+        self._rests = True
+        self._turns_rad: deque[float] = deque(maxlen=50)
+        """Turns from the stated heading of the start, of the newest poses before the motion."""
         self._relocation = Relocation()
         self._has_slid = False
         self._latency = LatencyEstimate(config.latency_s)
         self._senders = Senders(config.sender)
         self._frame = config.frame
         self._early: list[ArrivedPose] = []
-        self._equal: tuple[int, np.ndarray, np.ndarray] = (0, np.zeros(12), np.zeros(2))
+        self._equal: tuple[int, Floats, Floats] = (0, np.zeros(12), np.zeros(2))
         self._measured: deque[TimedHead] = deque(maxlen=_MOST_KEPT_POSES)
         self._now_s = self._used_s = -np.inf
         self._used: PoseSample | None = None
@@ -203,20 +206,26 @@ class ExternalPose:
     def position_sd_m(self) -> float:
         """Standard deviation of the head's position, with errors that agreement cannot show.
 
-        A wrong scale or a turned frame moves a body more that is far from its start. Nothing shows
-        whether robot or frame was off at the start: half of the difference is a standard deviation.
+        A wrong scale or a turned frame moves a body more that is far from its start. The start
+        shows only the difference between the turns of frame and robot. Both have a normal prior;
+        ``share`` of the difference is the mean turn of the frame. Half of a displacement is the
+        frame's.
         """
-        if self._start_m is None:
+        start = self._start
+        if start is None:
             return self._filter.position_sd_m
         check = self._check
-        away_m = math.hypot(*(self._filter.head_m - self._start_m)[:2])
-        off_m, turned_rad = self._start_off
+        away_m = math.hypot(*(self._filter.head_m - start.position_m)[:2])
+        share = 1.0 / (1.0 + (START_SD_DEG / self._config.world_sd_deg) ** 2)
+        turns_rad = (
+            share * float(np.mean(self._turns_rad)),
+            math.sqrt(share) * math.radians(START_SD_DEG),
+            check.step_rad,
+        )
         parts = (
             self._filter.position_sd_m,
-            check.scale_sd * away_m,
-            0.5 * turned_rad * away_m,
-            check.step_rad * away_m,
-            0.5 * off_m,
+            math.hypot(check.scale_sd, *turns_rad) * away_m,
+            0.5 * math.hypot(*(start.position_m[:2] - start.odometry_m)),
             check.aside_m,
         )
         return math.hypot(*parts)
@@ -273,8 +282,7 @@ class ExternalPose:
         sample = arrived.sample
         placed = self._senders.place(arrived)
         if placed.order in ("late", "other"):
-            is_late = placed.order == "late"
-            self._reject(placed.text, placed.text, counts_as_reason=is_late)
+            self._reject(placed.text, placed.text, counts_as_reason=placed.order == "late")
             return
         if isinstance(sample, UnusablePoseError):
             self._reject("damaged", str(sample))
@@ -289,8 +297,8 @@ class ExternalPose:
         self._clock.add(sample.time_s, arrived.arrival_s)
         stamped_s = self._clock.local_s(sample.time_s, arrived.arrival_s)
         measured_s = stamped_s - self._latency.latency_s
-        if self._filter.is_placed and self._now_s - measured_s > self._config.max_age_s:
-            late_s = self._now_s - measured_s
+        late_s = self._now_s - measured_s
+        if self._filter.is_placed and late_s > self._config.max_age_s:
             self._reject("late", f"stale: poses arrive {late_s:.1f} s after they were measured")
             return
         self._use(sample, stamped_s, measured_s)
@@ -302,14 +310,12 @@ class ExternalPose:
         if self._is_frozen(sample, then):
             self._reject("frozen", "stale: the same pose is sent while the head moves")
             return
-        self._check.add(measured, then)
+        self._check.add(measured, then, is_timed=self._latency.is_known)
         if self._check.fault is not None:
             self._reject("contradiction", self._check.fault)
             return
         off = self._filter.innovation(measured, then)
         placed = _placed_pose(measured, then, self._filter.turn_rad(measured, then))
-        if not self._filter.is_placed:
-            self._compare_start(placed)
         if not self._filter.is_placed or not off.is_jump:
             self._filter.update(measured, then, off)
         elif not self._body_has_relocated(placed):
@@ -322,6 +328,8 @@ class ExternalPose:
             return
         else:
             self._filter.place_again(measured, then)
+        if self._rests:
+            self._compare_start(placed)
         self._relocation.use(placed)
         if self._latency.is_known:
             self._measured.append(TimedHead(measured_s, measured))
@@ -331,18 +339,24 @@ class ExternalPose:
         self._reason = ""
 
     def _compare_start(self, placed: PlacedPose) -> None:
-        """Compare the first pose, within a standard deviation, with the start of the run.
+        """Compare the poses before the first motion with the start of the run.
+
+        The mean heading may be off by its standard deviation as well.
 
         Raises:
             InputError: the robot lies elsewhere, or points elsewhere.
 
         """
         config = self._config
-        self._start_m = placed.position_m.copy()
-        away_m = math.hypot(*(placed.position_m[:2] - placed.odometry_m))
-        self._start_off = away_m, placed.turn_rad
-        turned_deg = math.degrees(placed.turn_rad)
-        most_deg = config.start_deg + math.degrees(placed.turn_sd_rad)
+        start = self._start = self._start or placed
+        turns_rad = self._turns_rad
+        self._rests = math.hypot(*(placed.odometry_m - start.odometry_m)) < REST_M
+        if not self._rests:
+            return
+        turns_rad.append(placed.turn_rad)
+        away_m = math.hypot(*(start.position_m[:2] - start.odometry_m))
+        turned_deg = math.degrees(np.mean(turns_rad))
+        most_deg = config.start_deg + math.degrees(placed.turn_sd_rad) / math.sqrt(len(turns_rad))
         if away_m <= config.start_m and abs(turned_deg) <= most_deg:
             return
         raise InputError(

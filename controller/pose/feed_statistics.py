@@ -96,9 +96,9 @@ class FeedStatistics:
             "jitter_max_s": _rounded_value(late_s.max()),
             "noise_m": self._noise_m(),
             "noise_deg": self._noise_deg(),
-            "position_m": [_rounded_value(value) for value in position_m],
+            "position_m": position_m.round(4).tolist(),
             "heading_deg": round(math.degrees(heading_of(axes)), 1),
-            "up": [round(float(value), 3) for value in axes[:, 2]],
+            "up": axes[:, 2].round(3).tolist(),
         }
 
     def _noise_m(self) -> float | None:

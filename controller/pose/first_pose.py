@@ -56,18 +56,16 @@ def await_first_pose(
     """
     until_s = clock.now_s() + WAIT_S
     senders = Senders(host)
-    arrived = list[ArrivedPose]()
     reason = ""
     while clock.now_s() < until_s:
         for arrival in _of_source(feed, clock, senders):
-            arrived.append(arrival)
             if isinstance(arrival.sample, UnusablePoseError):
                 reason = str(arrival.sample)
                 continue
             fault = judge(arrival.sample)
             if fault is not None:
                 raise InputError(f"pose {source}: {fault}")
-            return _watched_poses(source, feed, clock, senders, arrived)
+            return _watched_poses(source, feed, clock, senders, arrival)
         clock.sleep_until_s(clock.now_s() + LOOK_S)
     raise InputError(
         f"pose {source}: no usable pose within {WAIT_S:g} s: "
@@ -76,12 +74,11 @@ def await_first_pose(
 
 
 def _of_source(feed: PoseFeed, clock: Clock, senders: Senders) -> list[ArrivedPose]:
-    arrived = feed.arrived(clock.now_s())
-    return [each for each in arrived if senders.place(each).order != "other"]
+    return [each for each in feed.arrived(clock.now_s()) if senders.place(each).order != "other"]
 
 
 def _watched_poses(
-    source: str, feed: PoseFeed, clock: Clock, senders: Senders, arrived: list[ArrivedPose]
+    source: str, feed: PoseFeed, clock: Clock, senders: Senders, first: ArrivedPose
 ) -> list[ArrivedPose]:
     """Receive the poses of a robot at rest, whose source should not drift.
 
@@ -89,6 +86,7 @@ def _watched_poses(
         InputError: the poses move.
 
     """
+    arrived = [first]
     for _ in range(WATCHES):
         until_s = clock.now_s() + WATCH_S
         arrived = arrived[-1:]

@@ -122,9 +122,7 @@ def _follows(last: PlacedPose, pose: PlacedPose, most_s: float) -> bool:
 def _agree(poses: list[PlacedPose]) -> bool:
     """Whether poses differ by the motion of the joints and by noise only."""
     newest = poses[-1]
-    turns = newest.turn_rad + np.array(
-        [math.remainder(p.turn_rad - newest.turn_rad, math.tau) for p in poses]
-    )
+    turns = np.unwrap([pose.turn_rad for pose in poses])
     turn_rad = float(turns.mean())
     places_m = np.array([pose.moved_to(newest, turn_rad) for pose in poses])
     off_m = np.linalg.norm(places_m - places_m.mean(axis=0), axis=1)

@@ -44,8 +44,9 @@ class Senders:
     def place(self, arrived: ArrivedPose) -> Placed:
         """Return the order of a message; a pose is the newest, unless it is late or ignored."""
         if self._host is not None and arrived.host != self._host:
-            text = f"{arrived.sender} is ignored: it is not {self._host} (pose.sender)"
-            return Placed("other", text)
+            return Placed(
+                "other", f"{arrived.sender} is ignored: it is not {self._host} (pose.sender)"
+            )
         before = self.newest
         placed = Placed("next")
         if before is not None and arrived.sender != before.sender:

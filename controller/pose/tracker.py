@@ -79,14 +79,9 @@ class SimulatedTracker:
 
     def due(self, now_s: float) -> Sequence[Sent]:
         """Return the datagrams that are to arrive by now, in the order of their arrival."""
-        due = sorted(
-            (outgoing for outgoing in self._outgoing if outgoing.due_s <= now_s), key=_due_s
-        )
-        if due:
-            self._outgoing = deque(
-                outgoing for outgoing in self._outgoing if outgoing.due_s > now_s
-            )
-        return due
+        waiting = self._outgoing
+        self._outgoing = deque(outgoing for outgoing in waiting if outgoing.due_s > now_s)
+        return sorted((outgoing for outgoing in waiting if outgoing.due_s <= now_s), key=_due_s)
 
     def _next_noise(self) -> Floats:
         config = self.config

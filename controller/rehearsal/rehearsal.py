@@ -17,6 +17,7 @@ from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.controller.kinematics.links import SpineLinks
 from snakewalk.controller.metrics.summary import RunSummary, summary
+from snakewalk.controller.pose.external_pose import START_SD_DEG
 from snakewalk.controller.pose.udp_feed import SimulatedDatagrams
 from snakewalk.controller.rehearsal.judgement import clock_offset_s, judge
 from snakewalk.controller.run.backend import Backend
@@ -191,7 +192,6 @@ RUNS = (
 )
 """Runs that are rehearsed by default."""
 START_SD_M = 0.05
-START_SD_DEG = 5.0
 """Standard deviation of the robot's place at the start (ours)."""
 LATE_S = 0.04
 """Delay of the goals, in addition to ``Deviation.drawn`` (ours)."""

@@ -42,6 +42,8 @@ class Scene:
     config: PoseConfig = field(default_factory=lambda: PoseConfig(latency_s=0.06))
     delay_s: float = 0.06
     noise_m: float = 0.0
+    begins_s: float = 0.0
+    """When the joints begin to move."""
     rest_s: float = np.inf
     """When the joints come to rest."""
     events: list[str] = field(default_factory=list)
@@ -65,7 +67,8 @@ class Scene:
         """Let time pass; ``change`` makes messages of the true sample."""
         for _ in range(round(seconds / CYCLE_S)):
             time_s = self.cycles * CYCLE_S
-            state = joint_state(min(time_s, self.rest_s))._replace(time_s=time_s)
+            moving_s = max(min(time_s, self.rest_s) - self.begins_s, 0.0)
+            state = joint_state(moving_s)._replace(time_s=time_s)
             head = self._true(state)
             true = BodyPose(time_s, np.append(head.head_in_world_m[:2], 0.03), head.rotation)
             position_m, axes = self._body.body(true, state.position_rad)

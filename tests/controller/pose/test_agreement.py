@@ -31,6 +31,7 @@ def checked(
     check: Agreement | None = None,
     step_s: float = 0.02,
     side: float = 0.2,
+    timed_s: float = 0.0,
 ) -> Agreement:
     """Check of a head that swings at 0.4 Hz while its body goes on at 0.2 m/s.
 
@@ -43,6 +44,7 @@ def checked(
         check: goes on after an earlier call.
         step_s: time between two poses.
         side: metres that the head swings to the side, for each radian.
+        timed_s: time from which the delay of the source is known.
 
     """
     check = Agreement(is_level=is_level) if check is None else check
@@ -55,7 +57,7 @@ def checked(
         true = frame @ [0.2 * slip * time_s, side_m, 0.0]
         at_m, axes = change(time_s, true + 0.005 * rng.standard_normal(3), turned(heading))
         moment = Moment(time_s, np.array([*known[:2], heading]), np.zeros(1))
-        check.add(HeadMeasurement(at_m, axes, NONE, NONE), moment)
+        check.add(HeadMeasurement(at_m, axes, NONE, NONE), moment, is_timed=time_s >= timed_s)
     return check
 
 
@@ -157,15 +159,16 @@ def test_a_small_error_of_scale_is_stated_as_accuracy() -> None:
 
 
 def test_a_delay_is_no_step_of_the_heading_and_a_step_is_one() -> None:
-    """The heading that is seen is that of 0.1 s before, while the delay is not known yet."""
+    """The heading that is seen is that of 0.2 s before, until the delay is known at 3 s."""
 
-    def seen(time_s: float, delay_s: float, step_rad: float) -> np.ndarray:
-        phase = 2.0 * np.pi * 0.4 * (time_s - delay_s)
-        return turned(0.3 + 0.5 * np.sin(phase) + step_rad * (time_s > 6.0))
+    def seen(time_s: float, step_rad: float) -> np.ndarray:
+        phase = 2.0 * np.pi * 0.4 * (time_s - 0.2 * (time_s < 3.0))
+        return turned(0.3 + 0.5 * np.sin(phase) + step_rad * (time_s > 8.0))
 
-    late = checked(lambda t, at_m, axes: (at_m, seen(t, 0.1, 0.0)))
+    late = checked(lambda t, at_m, axes: (at_m, seen(t, 0.0)), timed_s=3.0)
     assert late.step_rad == 0.0
-    stepped = checked(lambda t, at_m, axes: (at_m, seen(t, 0.1, 0.25)))
+    assert checked(lambda t, at_m, axes: (at_m, seen(t, 0.0))).step_rad > 0.1
+    stepped = checked(lambda t, at_m, axes: (at_m, seen(t, 0.25)), timed_s=3.0)
     assert stepped.step_rad == pytest.approx(0.25, abs=0.08)
 
 

@@ -171,6 +171,48 @@ def test_a_turn_at_the_start_makes_the_accuracy_worse() -> None:
 
 
 @pytest.mark.costs("feeds poses and joints for a long walk")
+def test_the_accuracy_contains_how_accurately_a_robot_is_laid_down() -> None:
+    """A robot that lies as far off as the frame hides it, unless the frame was measured."""
+    stated_m = []
+    for world_sd_deg in (10.0, 1.0):
+        scene = Scene(PoseConfig(latency_s=0.06, world_sd_deg=world_sd_deg))
+        scene.run(6.0)
+        stated_m.append(scene.pose.position_sd_m)
+    away_m = np.hypot(*scene.pose(joint_state(6.0)).head_in_world_m[:2])
+    # of two priors of 10 and 5 degrees, and of 1 and 5 degrees
+    hidden_deg = np.sqrt(10.0**2 * 5.0**2 / 125.0 - 1.0**2 * 5.0**2 / 26.0)
+    more_m = np.sqrt(stated_m[0] ** 2 - stated_m[1] ** 2)
+    assert more_m == pytest.approx(np.radians(hidden_deg) * away_m, rel=0.05)
+
+
+def test_the_heading_of_the_start_is_the_mean_of_the_poses_at_rest() -> None:
+    """The first pose is 18 degrees off by noise, the mean of the others 1 degree."""
+    scene = Scene(begins_s=0.3)
+
+    def noisy(time_s: float, sample: PoseSample) -> list[PoseSample]:
+        turn = turned((0.0, 0.0, 18.0 if time_s == 0.0 else 0.0))
+        return [replace(sample, rotation=turn @ sample.rotation)]
+
+    scene.run(7.0, noisy)
+    sound = Scene(begins_s=0.3)
+    sound.run(7.0)
+    assert scene.pose.position_sd_m < 1.1 * sound.pose.position_sd_m
+
+
+def test_the_mean_heading_before_the_first_motion_is_compared_with_the_start() -> None:
+    """A first pose that is right by noise does not hide a frame that is turned by 30 degrees."""
+    scene = Scene(begins_s=0.3)
+    angles_deg = iter([12.0, 38.0])
+
+    def noisy(time_s: float, sample: PoseSample) -> list[PoseSample]:
+        turn = turned((0.0, 0.0, next(angles_deg, 30.0)))
+        return [replace(sample, rotation=turn @ sample.rotation)]
+
+    with pytest.raises(InputError, match=r"turned by \+2[45] degrees"):
+        scene.run(0.3, noisy)
+
+
+@pytest.mark.costs("feeds poses and joints for a long walk")
 def test_drift_in_motion_makes_the_accuracy_worse() -> None:
     """A source that drifts to the side by 2 cm/s from 6 s on."""
 

@@ -56,6 +56,7 @@ def test_the_fit_finds_the_source() -> None:
     np.testing.assert_allclose(found.offset_m, CONFIG.offset_m, atol=0.005)
     np.testing.assert_allclose(found.world_m, CONFIG.world_m, atol=0.02)
     assert found.latency_s == pytest.approx(0.12, abs=0.01)
+    assert found.world_sd_deg == 1.0
 
 
 @pytest.mark.parametrize("factor", [0.1, 0.5, 0.8, 1.0, 1.2, 2.0, 3.0])

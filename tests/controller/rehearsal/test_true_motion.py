@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from snakewalk.controller.pose.external_pose import START_SD_DEG
 from snakewalk.controller.rehearsal.rehearsal import (
-    START_SD_DEG,
     START_SD_M,
     moved,
     slip_alarms,
