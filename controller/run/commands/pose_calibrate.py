@@ -132,8 +132,8 @@ def calibrated(
         sample = each.sample
         if isinstance(sample, PoseSample):
             clock.add(sample.time_s, each.arrival_s)
-            stamp_s = clock.local_s(sample.time_s, each.arrival_s)
-            rows.append((stamp_s, sample.position_m, sample.rotation))
+            local_s = clock.local_s(sample.time_s, each.arrival_s)
+            rows.append((local_s, sample.position_m, sample.rotation))
     if result.outcome.tripped or len(rows) < LEAST:
         raise InputError(f"pose calibrate: {result.outcome.tripped or 'few poses arrived'}")
     robot = prepared.robot
@@ -151,6 +151,7 @@ def calibrated(
     )
     seen = stamps_s[poses], places_m[poses], rotations[poses]
     fits = [fit_mount(time_s, way, *seen) for way in ways]
+    stated = fits
     interval = scale_interval(fits)
     if interval is not None:
         low, high = interval
@@ -160,15 +161,19 @@ def calibrated(
                 f"{high:.3g}; measure it, and state pose.scale in the robot file (1 if it is in "
                 "exact metres)"
             )
-        fits = [fit_mount(time_s, way, *seen, before.scale) for way in ways]
-    mount = min(fits, key=lambda fit: fit.residual_m)
+        stated = [fit_mount(time_s, way, *seen, before.scale) for way in ways]
+        fits += stated
+    mount = min(stated, key=lambda fit: fit.residual_m)
     if len(nodded_s):
         late_s = nodded_s[[0, -1]] + (mount.config.latency_s or 0.0)
         nodding = (stamps_s > late_s[0]) & (stamps_s < late_s[1])
         resting = poses & (stamps_s > swung_s - 0.5)
         _check_vertical(mount.config, rotations[resting], rotations[nodding])
-    *level_m, up_m = mount.config.offset_m
-    offset_m = *level_m, round(up_m - robot.body_radius_m, 4)
+    # fits with a fitted and with a stated scale are off to opposite sides: the size of the way
+    # depends on the friction, and what is wrong with it goes into the offset
+    weights = [fit.residual_m**-6.0 for fit in fits]
+    *level_m, _ = np.average([fit.config.offset_m for fit in fits], 0, weights).round(4).tolist()
+    offset_m = *level_m, round(mount.config.offset_m[2] - robot.body_radius_m, 4)
     found = mount.config.model_dump(exclude_unset=True) | {"offset_m": offset_m}
     return before.model_copy(update=found), mount.residual_m
 

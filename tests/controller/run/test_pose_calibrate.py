@@ -1,10 +1,11 @@
 """``pose calibrate``: a served robot swings its head, and its source is found."""
 
+import numpy as np
 import pytest
 
 from benchmarks.pose_mounts import LIMITS, contains, drawn, errors, found, wrong
 from snakewalk.config.errors import InputError
-from snakewalk.controller.run.deviation import NO_DEVIATION
+from snakewalk.controller.run.deviation import NO_DEVIATION, Deviation
 from tests.helpers.command import snakewalk
 
 
@@ -23,11 +24,15 @@ def test_a_scale_that_friction_hides_is_not_written() -> None:
 
 
 @pytest.mark.slow
-def test_a_stated_scale_is_kept() -> None:
+def test_a_stated_scale_is_kept_and_another_friction_moves_no_mount() -> None:
+    """With the stated scale alone, the fit is 12 mm off."""
+    friction = Deviation(along=0.77, across=0.64, law="ellipse")
     config, _ = found(
-        2, NO_DEVIATION, lambda sample, time_s: sample, "alternating16", states_scale=True
+        21, friction, lambda sample, time_s: sample, "alternating16", states_scale=True
     )
-    assert config.scale == pytest.approx(drawn(2).scale, abs=1e-4)
+    assert config.scale == pytest.approx(drawn(21).scale, abs=1e-4)
+    off_m = np.linalg.norm(np.subtract(config.offset_m, drawn(21).offset_m))
+    assert off_m < 0.005
 
 
 @pytest.mark.slow
