@@ -96,6 +96,8 @@ class LatencyEstimate:
 
 START_SD_DEG = 5.0
 """Standard deviation of the heading in which people lay down a robot (ours)."""
+UNKNOWN_S = 0.1
+"""Standard deviation of a delay that is not known yet (ours)."""
 REST_M = 0.003
 """Way of the head from which on a body moves: joints at rest are noisy (ours)."""
 AGAIN_S = 10.0
@@ -289,8 +291,7 @@ class ExternalPose:
             return
         if placed.order == "restarted":
             self._restart(placed.text)
-        if self._frame is None:
-            self._frame = sample.frame
+        self._frame = self._frame or sample.frame
         if sample.frame != self._frame:
             self._reject("frame", f"wrong frame: {sample.frame!r}, expected {self._frame!r}")
             return
@@ -305,7 +306,9 @@ class ExternalPose:
 
     def _use(self, sample: PoseSample, stamped_s: float, measured_s: float) -> None:
         then = self._history.at(measured_s)
-        measured = self._body.head(sample, then.joint_rad)
+        # while the delay is not known, a pose may be as old as this
+        before = self._history.at(measured_s - UNKNOWN_S * (not self._latency.is_known))
+        measured = self._body.head(sample, then.joint_rad, then.place[2] - before.place[2])
         self._latency.add(stamped_s, heading_of(measured.rotation), self._history)
         if self._is_frozen(sample, then):
             self._reject("frozen", "stale: the same pose is sent while the head moves")

@@ -234,5 +234,5 @@ def _gain_and_covariance(prior: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Return the gain (3, 3) of a measurement, and the covariance after it."""
     gain = prior @ np.linalg.inv(prior + noise)
     remainder = np.eye(3) - gain
-    after = remainder @ prior @ remainder.T + gain @ noise @ gain.T
+    after = remainder @ prior
     return gain, 0.5 * (after + after.T)

@@ -43,7 +43,7 @@ class Senders:
 
     def place(self, arrived: ArrivedPose) -> Placed:
         """Return the order of a message; a pose is the newest, unless it is late or ignored."""
-        if self._host is not None and arrived.host != self._host:
+        if self._host not in (None, arrived.host):
             return Placed(
                 "other", f"{arrived.sender} is ignored: it is not {self._host} (pose.sender)"
             )

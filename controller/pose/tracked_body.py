@@ -46,13 +46,19 @@ class TrackedBody:
         self._world_m = np.array(config.world_m)
         self._world = turned(config.world_deg)
 
-    def head(self, sample: PoseSample, joint_rad: Floats) -> HeadMeasurement:
-        """Return the head's pose for joint angles (J,) at the time of the sample."""
+    def head(
+        self, sample: PoseSample, joint_rad: Floats, unknown_rad: float = 0.0
+    ) -> HeadMeasurement:
+        """Return the head's pose for joint angles (J,) at the time of the sample.
+
+        ``unknown_rad`` is a standard deviation of its turn, in addition to that of the sample.
+        """
         link_m, link = tracked_link(sample, self._config)
         joint_in_head, link_in_head = self._in_head(joint_rad)
         rotation = link @ link_in_head.T
         head_m = link_m - rotation @ joint_in_head
         position, turn = self._covariances(sample)
+        turn = turn + unknown_rad**2 * np.eye(3)
         body_m = link_m + link @ np.array(self._config.offset_m)
         # an angle error moves the head by the lever arm
         arm = np.cross(head_m - body_m, np.eye(3))

@@ -61,7 +61,7 @@ class SimulatedTracker:
         is_lost = rng.random() < config.lost_share or now_s < self._dropout_until_s
         delay_s = config.delay_s + config.jitter_s * rng.random()
         sequence = self._sequence
-        self._sequence = self._sequence + 1
+        self._sequence += 1
         if is_lost:
             return sequence, None
         sample = PoseSample(

@@ -227,12 +227,7 @@ def rehearse(case: RehearsalCase, changes: Mapping[str, Any] | None = None) -> d
 
 def described(case: RehearsalCase) -> dict[str, Any]:
     """Return a case, ready for JSON."""
-    return {
-        "run": case.run,
-        "seed": case.seed,
-        "has_errors": case.has_errors,
-        "tracker": case.tracker.model_dump(),
-    }
+    return {**asdict(case), "tracker": case.tracker.model_dump()}
 
 
 def case_of(row: dict[str, Any]) -> RehearsalCase:
@@ -253,11 +248,11 @@ def generator(seed: int) -> np.random.Generator:
 
 def moved(start: Place, rng: np.random.Generator) -> Place:
     """Draw the true start pose of the robot, which the run does not know."""
-    moved_m = START_SD_M * rng.standard_normal(2)
+    x_m, y_m = np.add(start.start_m, START_SD_M * rng.standard_normal(2)).tolist()
     turned_rad = np.radians(START_SD_DEG) * rng.standard_normal()
     return replace(
         start,
-        start_m=(start.start_m[0] + float(moved_m[0]), start.start_m[1] + float(moved_m[1])),
+        start_m=(x_m, y_m),
         heading_rad=start.heading_rad + float(turned_rad),
     )
 
@@ -298,14 +293,12 @@ def _friction_facts(result: RunResult, deviation: Deviation) -> dict[str, Any] |
         "true_along": round(friction_found.along_file * deviation.along, 4),
         "true_across": round(friction_found.across_file * deviation.across, 4),
     }
-    law = deviation.law or result.record.header.world.friction.law_name
     (low, high), (least, most) = friction_found.along_95, friction_found.across_95
     is_inside = low <= true["true_along"] <= high and least <= true["true_across"] <= most
-    used = any(event.kind == "friction" for event in result.record.events)
     return {
         **asdict(friction_found),
         **true,
-        "true_law": law,
+        "true_law": deviation.law or result.record.header.world.friction.law_name,
         "is_inside": is_inside,
-        "was_used": used,
+        "was_used": any(event.kind == "friction" for event in result.record.events),
     }

@@ -44,6 +44,8 @@ class Scene:
     noise_m: float = 0.0
     begins_s: float = 0.0
     """When the joints begin to move."""
+    pace: float = 1.0
+    """Rate of the joints over that of the wave."""
     rest_s: float = np.inf
     """When the joints come to rest."""
     events: list[str] = field(default_factory=list)
@@ -67,7 +69,7 @@ class Scene:
         """Let time pass; ``change`` makes messages of the true sample."""
         for _ in range(round(seconds / CYCLE_S)):
             time_s = self.cycles * CYCLE_S
-            moving_s = max(min(time_s, self.rest_s) - self.begins_s, 0.0)
+            moving_s = self.pace * max(min(time_s, self.rest_s) - self.begins_s, 0.0)
             state = joint_state(moving_s)._replace(time_s=time_s)
             head = self._true(state)
             true = BodyPose(time_s, np.append(head.head_in_world_m[:2], 0.03), head.rotation)

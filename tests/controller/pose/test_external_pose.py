@@ -199,6 +199,14 @@ def test_the_heading_of_the_start_is_the_mean_of_the_poses_at_rest() -> None:
     assert scene.pose.position_sd_m < 1.1 * sound.pose.position_sd_m
 
 
+def test_a_fast_curl_before_the_delay_is_known_leaves_no_jump() -> None:
+    """Late poses show the head as it lay before; when it rests, the next ones are right."""
+    scene = Scene(PoseConfig(), delay_s=0.1, noise_m=0.01, begins_s=0.3, pace=6.0, rest_s=0.8)
+    scene.run(1.5)
+    assert scene.events == []
+    assert scene.headings_rad[-1] < 0.03
+
+
 def test_the_mean_heading_before_the_first_motion_is_compared_with_the_start() -> None:
     """A first pose that is right by noise does not hide a frame that is turned by 30 degrees."""
     scene = Scene(begins_s=0.3)
