@@ -101,15 +101,28 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     across = header.world.friction.across
     if len(friction.time_s) and friction.across_95[-1, 1] < across:
         low, high = friction.across_95[-1]
-        found = f"{friction.across[-1]:.2g} ({low:.2g} to {high:.2g})"
-        return Failure("slip", f"friction across the body is {found}, in the file {across:g}")
+        return Failure(
+            "slip",
+            f"friction across the body is {friction.across[-1]:.2g} ({low:.2g} to {high:.2g}), "
+            f"in the file {across:g}",
+        )
     replanned_s = record.paths[1][0] if len(record.paths) > 1 else np.inf
     first = np.flatnonzero(pose.time_s < replanned_s)
     first = first if len(first) > 1 else rows
+    share, travelled, progress = _advance(record, rows)
+    text = f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path"
+    ahead_m = np.linspace(0.0, header.robot.length_m, 5)
+    steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
+    is_steep = steep_rad > max(_holds_rad(record), CLIMBED_RAD)
+    climb = _of_climb(
+        record, first, f"{text}, which climbs by {np.degrees(steep_rad):.0f} deg there"
+    )
+    place_m = np.ptp(pose.centre_m[rows, :2], axis=0)
+    if is_steep and np.hypot(*place_m) < PROGRESS_SHARE * travelled:  # it turns before the slope
+        return climb
     for part in (first, rows):
         if astray := _astray(record, part):
             return Failure("steering", astray)
-    share, travelled, progress = _advance(record, rows)
     if share < header.run.safety.advance_fraction:
         x, y, z = np.moveaxis(pose.links_m[rows, 0] - pose.links_m[rows, -1], -1, 0)
         up_rad = np.arctan2(z, np.hypot(x, y)).mean()  # of the line from tail to head
@@ -119,16 +132,11 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
         return _of_climb(record, first, f"{said}, {np.degrees(up_rad):.0f} deg uphill")
     if progress >= PROGRESS_SHARE * travelled:
         left_m = length_m(record.paths[-1][1]) - pose.path_s_m[-1]
-        text = f"out of time with {left_m:.1f} m of path left"
+        late = f"out of time with {left_m:.1f} m of path left"
         slowed = [event.text for event in record.events if event.kind == "derating"]
-        return Failure("joint", f"{text}; {slowed[0]}") if slowed else Failure("time", text)
-    text = f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path"
-    ahead_m = np.linspace(0.0, header.robot.length_m, 5)
-    steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
-    if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
-        return _of_climb(
-            record, first, f"{text}, which climbs by {np.degrees(steep_rad):.0f} deg there"
-        )
+        return Failure("joint", f"{late}; {slowed[0]}") if slowed else Failure("time", late)
+    if is_steep:
+        return climb
     slid_m, fall_rad = _slide(record, rows)
     falls = f"where the ground falls by {np.degrees(fall_rad):.0f} deg"
     return Failure("slip", f"{text}, and slid {slid_m:.1f} m {falls}")

@@ -16,6 +16,8 @@ class StarVisits:
     """Visits of a walk on a star of V states: M, F and the order."""
 
     def __init__(self, count: int) -> None:
+        if count == 0:
+            raise ValueError("the walk needs at least one shape")
         self._visits = np.zeros(count, dtype=np.int64)
         self._failures = np.zeros(count, dtype=np.int64)
         self.taken = [0]

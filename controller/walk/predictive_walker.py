@@ -92,8 +92,6 @@ class PredictiveWalker:
         ``walk`` limits the proposed states. ``make_steering`` is called with this walker's track.
         ``accept`` returns whether a body (N,) is within joint limits and does not touch itself.
         """
-        if len(shapes_rad) == 0:
-            raise ValueError("the walk needs at least one shape")
         self._shapes = shapes_rad
         self._walk = walk
         self._accept = accept

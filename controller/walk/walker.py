@@ -22,8 +22,6 @@ class Walker:
     """Grows an ``AngleTrack`` from a library of shapes (S, N), head first."""
 
     def __init__(self, shapes_rad: Floats, walk: WalkConfig, accept: Accept | None = None) -> None:
-        if len(shapes_rad) == 0:
-            raise ValueError("the walk needs at least one shape")
         self._shapes = shapes_rad
         self._walk = walk
         self._accept = accept

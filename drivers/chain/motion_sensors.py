@@ -171,9 +171,11 @@ def _compare(  # noqa: C901  a compiled loop
                     )
                 else:
                     limit = MISMATCH_RAD + MISMATCH_RAD_S * since[n, 1, k]
-                    is_dead[n, k] = reads >= SPEED_READS and abs(first - second) >= limit
-                    if n == 1 and first == 0.0:  # both constant: the position is reported
-                        is_dead[n, k] = False
+                    is_dead[n, k] = (
+                        reads >= SPEED_READS
+                        and abs(first - second) >= limit
+                        and (n == 2 or first != 0.0)  # both constant: the position is reported
+                    )
                     if n == 2 and reads >= SPEED_READS:
                         is_dead[n, k] |= min(since[n, 4, k], since[n, 5, k]) >= SWUNG_RAD
             last[n, k] = motion[n, k]

@@ -482,12 +482,11 @@ class SafeLink:
         except DriverError as fault:
             self._end_hold(str(fault))
             raise SafetyTrippedError(str(self.tripped)) from fault
-        doubt = None
         now_s = self._clock.now_s()
-        if self._state is not None:
-            state, doubt = self._steps.update(state, self._state)
-        self._state = state
+        assert self._state is not None
         assert self._memory is not None
+        state, doubt = self._steps.update(state, self._state)
+        self._state = state
         unsound, self._memory = check_state(state, self._memory, self._limits, now_s)
         reason = self._stop() or doubt or unsound or self._loads.update(state)
         if reason is not None or now_s >= self._hold_until_s:

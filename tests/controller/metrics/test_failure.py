@@ -203,6 +203,27 @@ def test_a_body_that_slides_before_a_steep_path_does_not_climb_it(
     assert found.cause == cause
 
 
+@pytest.mark.parametrize(("slope_deg", "cause"), [(32.0, "climb"), (10.0, "steering")])
+def test_a_body_that_turns_about_before_a_steep_plane_does_not_climb_it(
+    record: RunRecord, slope_deg: float, cause: str
+) -> None:
+    """It advanced by 5.1 m within half a metre of the foot, and was called badly steered."""
+    x_m = np.arange(-20.0, 32.0, 0.5)
+    height_m = np.tile(np.tan(np.radians(slope_deg)) * np.maximum(x_m, 0.0), (9, 1))
+    log = made(record, progress=0.0)
+    pose = log.pose
+    about_rad = pose.time_s / 3.0
+    turns = np.stack([np.cos(about_rad), np.sin(about_rad), 0.0 * about_rad], axis=1)
+    along_m = np.linspace(0.5, -0.5, pose.links_m.shape[1])
+    centre_m = 0.2 * np.roll(turns, 1, axis=1)
+    links_m = centre_m[:, None] + along_m[:, None] * turns[:, None]
+    pose = dataclasses.replace(pose, centre_m=centre_m, links_m=links_m)
+    header = dataclasses.replace(log.header, ground=HeightField(height_m, 0.5, -20.0, -2.0))
+    found = failure(dataclasses.replace(log, pose=pose, header=header))
+    assert found is not None
+    assert found.cause == cause
+
+
 @pytest.mark.parametrize(("astray_s", "cause"), [(20.0, "steering"), (0.1, "slip")])
 def test_a_body_that_went_astray_before_it_slid_was_steered_there(
     record: RunRecord, astray_s: float, cause: str
