@@ -86,20 +86,26 @@ def _distances(px: list[float]) -> str:
 def summary(done: list[JudgedFilm]) -> str:
     """The calibration of the expected error and of the head's certainty over all films."""
     good = [
-        (true, expected)
+        (true, expected, 2 * k < len(one.true_px))
         for one in done
-        for true, expected, is_good in zip(one.true_px, one.expected_px, one.are_good, strict=True)
-        if is_good
+        for k, (true, expected) in enumerate(zip(one.true_px, one.expected_px, strict=True))
+        if one.are_good[k]
     ]
     lines = []
     if good:
-        true, expected = np.array(good).T
-        above = int((true > 2.0 * expected).sum())
-        ratio = float(np.median(expected) / np.median(true))
-        lines.append(
-            f"\n{above} of {len(good)} good frames with truth ({above / len(good):.1%}) are above "
-            f"twice their expected error; median expected over median true error {ratio:.2f}."
-        )
+        true, expected, is_first = np.array(good).T
+        halves = {"": np.ones(len(true), bool), "First half of each film: ": is_first > 0.0}
+        halves["Second half: "] = is_first == 0.0
+        for words, part in halves.items():
+            above = int((true > 2.0 * expected)[part].sum())
+            count = int(part.sum())
+            ratio = float(np.median(expected[part]) / np.median(true[part])) if count else np.nan
+            lines.append(
+                f"{words}{above} of {count} good frames with truth ({above / max(count, 1):.1%}) "
+                "are above twice their expected error; median expected over median true error "
+                f"{ratio:.2f}."
+            )
+        lines[0] = f"\n{lines[0]}"
         for quarter in np.array_split(np.argsort(expected), min(4, len(good))):
             share = float((true[quarter] > 2.0 * expected[quarter]).mean())
             low, high = expected[quarter[[0, -1]]]

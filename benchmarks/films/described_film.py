@@ -3,7 +3,8 @@
 ``film`` names a video or a folder of images, relative to the folder of films or to the TOML file.
 ``[[animals]]`` have ``marks``: rows of frame, x and y between the eyes (or of the tip of the head),
 x and y of the tip of the tail. ``lines`` names an .npz whose array ``key`` (T, P, 2) has a midline
-for each frame, head first. ``length_px`` is the length of the animal.
+for each frame, head first; ``lines_end_early`` if they end before the tips. ``length_px`` is the
+length of the animal.
 """
 
 import tomllib
@@ -19,7 +20,8 @@ from snakewalk.controller.track.resample import equal_arc_length
 
 SHIPPED = Path(__file__).parent
 _VIDEOS = {".mp4", ".avi", ".mov", ".mkv", ".tif", ".tiff"}
-_KEYS = {"film", "source", "licence", "options", "animals", "lines", "key", "length_px", "notes"}
+_KEYS = {"film", "source", "licence", "options", "animals", "length_px", "notes"}
+_KEYS |= {"lines", "key", "lines_end_early"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +44,8 @@ class DescribedFilm:
     animals: tuple[Marks, ...] = ()
     lines_px: dict[int, Floats] = field(default_factory=dict)
     """By frame: (101, 2) the midline, head first."""
+    lines_end_early: bool = False
+    """Whether the midlines end before the tips: only stations that they cover are compared."""
     length_px: float | None = None
 
     @classmethod
@@ -84,6 +88,7 @@ class DescribedFilm:
             tuple(given.get("options", ())),
             animals,
             lines,
+            given.get("lines_end_early", False),
             given.get("length_px"),
         )
 

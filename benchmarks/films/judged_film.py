@@ -4,6 +4,7 @@ import json
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from benchmarks.films.described_film import DescribedFilm, Marks
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.capture import Capture, load_capture
 from snakewalk.controller.images.video import open_footage
-from tests.oracles.skeleton_accuracy import point_error, swapped
+from tests.oracles.skeleton_accuracy import covered_error, point_error, swapped
 
 _HEAD_PART = 20  # of 101 points: the point between the eyes lies next to these
 _TWICE = 2.0
@@ -89,7 +90,8 @@ def judge(film: DescribedFilm, folder: Path) -> JudgedFilm:
             off = np.abs(captured.length_px / film.length_px - 1.0)
             out.wrong_length += int((off > _LENGTH).sum())
         if film.lines_px:
-            compare_lines(out, captured, film.lines_px)
+            error = covered_error if film.lines_end_early else point_error
+            compare_lines(out, captured, film.lines_px, error)
     if film.animals:
         compare_marks(out, captures, film.animals)
     return out
@@ -104,14 +106,20 @@ def _tracks(answer: str) -> list[Path]:
     return [Path(one["track"]) for one in every if one is not None and "track" in one]
 
 
-def compare_lines(out: JudgedFilm, captured: Capture, lines_px: dict[int, Floats]) -> None:
+def compare_lines(
+    out: JudgedFilm,
+    captured: Capture,
+    lines_px: dict[int, Floats],
+    error: Callable[[Floats, Floats], float] = point_error,
+) -> None:
+    """Compare each line with the true one; a reversed line is not an error of its points."""
     right = []
     for k, true in lines_px.items():
         if k >= len(captured.status) or not captured.used[k]:
             continue
         found = captured.points_px[k]
         right.append(not swapped(found, true))
-        _add(out, captured, k, point_error(found if right[-1] else found[::-1], true))
+        _add(out, captured, k, error(found if right[-1] else found[::-1], true))
     out.heads.extend(right)
     out.exchanges += int(np.count_nonzero(np.diff(np.array(right, dtype=int))))
 

@@ -10,6 +10,8 @@ from benchmarks.films.rendered import SCENES, scenes
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
 from snakewalk.controller.track.frame_status import FrameStatus
+from snakewalk.controller.track.resample import equal_arc_length
+from tests.oracles.skeleton_accuracy import covered_error, point_error
 
 LINE = np.column_stack([np.linspace(0.0, 100.0, 101), np.zeros(101)])
 
@@ -55,8 +57,13 @@ def test_the_summary_has_the_calibration_of_each_quarter():
     expected = [0.5] * 4 + [1.0] * 4 + [2.0] * 4 + [4.0] * 4
     true = [0.4] * 4 + [0.9, 0.9, 0.9, 2.1] + [1.0] * 4 + [3.0] * 4
     film = JudgedFilm("a", true_px=true, expected_px=expected, are_good=[True] * 16)
-    above, *quarters = summary([film]).strip().splitlines()
+    above, first, second, *quarters = summary([film]).strip().splitlines()
     assert above.startswith("1 of 16 good frames")
+    assert first.startswith("First half of each film: 1 of 8 good frames")
+    assert second.endswith(
+        "0 of 8 good frames with truth (0.0%) are above twice their expected "
+        "error; median expected over median true error 1.50."
+    )
     assert len(quarters) == 4
     assert "median true error 3.00 px, above twice 0.0%" in quarters[-1]
 
@@ -88,6 +95,18 @@ def test_reversed_lines_are_counted_apart_from_their_error():
     assert judged.exchanges == 2
     assert judged.true_px == pytest.approx([0.0, 3.0, 0.0])
     assert judged.above_twice == 1
+
+
+def test_a_midline_that_ends_early_is_compared_where_it_goes():
+    inside = equal_arc_length(LINE[4:-2], 100)
+    shifted = LINE + np.array([0.0, 3.0])
+    judged = JudgedFilm("a")
+    short = equal_arc_length(LINE[20:], 100)
+    lines = dict.fromkeys(range(3), inside)
+    compare_lines(judged, _captured(LINE, shifted, short), lines, covered_error)
+    assert judged.true_px[:2] == pytest.approx([0.0, 3.0], abs=0.1)
+    assert judged.true_px[2] > 7.0, "a line that is too short has an error"
+    assert point_error(LINE, inside) > 1.5
 
 
 def test_marks_find_the_head_the_tip_and_an_exchange_of_animals():
