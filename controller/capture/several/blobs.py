@@ -20,7 +20,10 @@ SMALLEST = 0.3
 """Area of a blob over the usual area of an animal; smaller ones are dirt."""
 _LEAST_AREA = 0.97  # of the largest area of all animals: with it a background shows all of them
 _SURFACE = "a smooth surface through each frame"
-_AREA_GAIN = 1.25  # times the area against a fixed background: it contains parts of the animals
+_PIECE = 0.08  # of the usual area: a piece of an animal, not noise
+_SINGLE_AREA = 1.5  # of the usual area: a region is one animal
+_BROKEN = 0.1  # of the frames with an animal in pieces: the background contains its middle
+_LARGER = 1.05  # times the usual area: the surface shows more, and pieces are not chance contacts
 FEATURES = ("length", "width", "contrast")
 """Columns of ``Blobs.shape``."""
 
@@ -136,8 +139,8 @@ def detector_of_several(
 
     The median over frames shows animals where they rest or come back. A lighter or darker quantile
     of each pixel is used if animals are larger against it, or nearer to ``requested_count``. All of
-    them contain animals that hardly move. A surface fitted to each frame is used if it shows the
-    same moving animals clearly larger, and more alike in size.
+    them contain animals that hardly move. A surface fitted to each frame is used if it shows
+    animals in one piece that are in several pieces otherwise.
 
     Args:
         frames: (H, W[, C]), spread over the film.
@@ -168,38 +171,28 @@ def detector_of_several(
     tried = [trial for trial in tried if trial[1] == nearest]
     largest = max(area for _, _, area in tried)
     fixed = next(detector for detector, _, area in tried if area >= _LEAST_AREA * largest)
-    return surface if _shows_more(surface, fixed, frames) else fixed
+    return surface if _breaks_animals(surface, fixed, frames) else fixed
 
 
-def _shows_more(surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]) -> bool:
-    """Whether a fixed background hides parts of animals that a surface shows."""
-    whole_blobs, parts = (
+def _breaks_animals(
+    surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]
+) -> bool:
+    """Whether a fixed background hides the middles of animals that a surface shows."""
+    regions, parts = (
         [blobs_of(frame, detector.ground_of(frame), detector) for frame in frames]
         for detector in (surface, fixed)
     )
-    least = SMALLEST * usual_area(whole_blobs)
-    moving = []
-    for blobs, changed in zip(whole_blobs, parts, strict=True):
-        labels = np.unique(blobs.label[changed.label > 0])
-        areas = blobs.area_px[labels[labels > 0] - 1]
-        moving.append(areas[areas >= least])
-    if sum(areas_px.sum() for areas_px in moving) < _AREA_GAIN * sum(
-        part.area_px.sum() for part in parts
-    ):
-        return False
-    count, _ = count_of(parts)
-    counts = [len(areas_px) for areas_px in moving]
-    least = SMALLEST * usual_area(parts)
-    pieces = np.concatenate([part.area_px[part.area_px >= least] for part in parts])
-    steadier = np.std(counts) < np.std([int((part.area_px >= least).sum()) for part in parts])
-    more_alike = _relative_deviation(np.concatenate(moving)) < _relative_deviation(pieces)
-    return bool(steadier and more_alike and np.median(counts) >= 0.5 * count)
-
-
-def _relative_deviation(areas: Floats) -> float:
-    """Median deviation of areas from their median, over the median."""
-    usual = float(np.median(areas))
-    return float(np.median(np.abs(areas - usual))) / usual
+    usual = usual_area(regions)
+    broken = 0
+    for blobs, pieces in zip(regions, parts, strict=True):
+        common = (blobs.label > 0) & (pieces.label > 0)
+        pairs = np.stack([blobs.label[common], pieces.label[common]])
+        region, piece = np.unique(pairs, axis=1) - 1
+        is_piece = (pieces.area_px[piece] > _PIECE * usual) & (
+            blobs.area_px[region] < _SINGLE_AREA * usual
+        )
+        broken += int((np.bincount(region[is_piece]) > 1).any())
+    return broken > _BROKEN * len(frames) and usual > _LARGER * usual_area(parts)
 
 
 def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]:

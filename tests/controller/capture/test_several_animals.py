@@ -17,7 +17,11 @@ from snakewalk.controller.capture.capture import load_capture, save_capture
 from snakewalk.controller.capture.commands.capture import show_facts
 from snakewalk.controller.capture.film.results import write_captures
 from snakewalk.controller.capture.film_parts import FilmParts
-from snakewalk.controller.capture.several.animal_films import find_animals, merged_status
+from snakewalk.controller.capture.several.animal_films import (
+    find_animals,
+    merged_status,
+    with_bare_ground,
+)
 from snakewalk.controller.capture.several.blobs import blobs_of, detector_of_several
 from snakewalk.controller.capture.several.identities import identities_of
 from snakewalk.controller.capture.several.recording import AnimalsFacts, capture_several
@@ -50,6 +54,18 @@ def test_identities_are_kept_through_crossings(seed: int) -> None:
     assert count.found == 3
     assert count.kept == count.bridged > 0
     assert count.swapped_silently == 0
+
+
+@pytest.mark.slow_cases(3, "3 cases of 1.5 s of CPU")
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 4, 5])
+def test_animals_that_cross_in_a_short_film_are_not_followed_in_pieces(seed: int) -> None:
+    """Each animal moves less than its length: a fixed background contains its middle."""
+    scene = CrossingScene(animals=2, frames=20, rate_hz=10.0, seed=seed)
+    images = list(crossing_film(scene, crossing_midlines(scene)))
+    detector = with_bare_ground(detector_of_several(images), images)
+    found = find_animals(images, images, detector, requested_count=None, name="film")
+    assert len(found.identities) == 2
 
 
 @pytest.mark.nightly("a further film: 5 s of CPU")
