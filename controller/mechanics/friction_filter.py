@@ -28,8 +28,9 @@ _BOUND = math.log(4.0)
 DOUBT_99, DOUBT_95 = 9.21, 5.99
 """Squared distance of the file from the estimate, in standard deviations, from which on the file is
 out: 99 % and 95 % of chi square with two degrees of freedom."""
-_ESTIMATED_VARIANCE = 0.8
-"""Variance, divided by the prior's, below which a value counts as estimated (ours)."""
+_ESTIMATED_VARIANCE = 0.6
+"""Variance, divided by the prior's, below which a value counts as estimated (ours): 0.5 on a floor,
+which shows only the ratio."""
 _TRUST = 1.39
 """Squared distance of the file from the estimate below which the file holds again: 50 %."""
 _NORMAL_95 = 1.96
@@ -97,7 +98,7 @@ class FoundFriction:
     differs: bool
     """Whether the file's friction is out."""
     is_estimated: bool = True
-    """Whether motion made an interval narrower; otherwise the values are the file's."""
+    """Whether motion made both intervals narrower; otherwise the values are the file's."""
 
     @property
     def spread(self) -> float:
@@ -225,7 +226,7 @@ class FrictionFilter:
             (mean.along / along, mean.along * along),
             (mean.across / across, mean.across * across),
             self._differs,
-            mid - abs(uv) < _ESTIMATED_VARIANCE * self._prior.uu,
+            mid + abs(uv) < _ESTIMATED_VARIANCE * self._prior.uu,
         )
 
     def _friction(self, u: float, v: float) -> FrictionConfig:

@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from snakewalk.config.world import FrictionConfig
-from snakewalk.controller.mechanics.friction_filter import FoundFriction, FrictionFilter
+from snakewalk.controller.mechanics.friction_filter import (
+    FoundFriction,
+    FrictionFilter,
+    slide_evidence,
+)
 
 FILE = FrictionConfig(along=0.1, across=0.7)
 SIGMA = np.array([0.012, 0.012, 0.035])
@@ -67,6 +71,18 @@ def test_a_body_that_is_carried_off_is_not_believed() -> None:
     assert before.along_95[0] < after.friction.along < before.along_95[1]
     assert before.across_95[0] < after.friction.across < before.across_95[1]
     assert not after.differs
+
+
+@pytest.mark.parametrize(("ratio", "is_estimated"), [(-1.0, True), (0.0, False)])
+def test_friction_is_estimated_once_both_intervals_are_narrower(
+    ratio: float, is_estimated: bool
+) -> None:
+    """The ratio of the frictions narrows both; motion that shows one of them is not enough."""
+    u = 1.0 + ratio
+    direction = np.array([u, 1.0])
+    evidence = slide_evidence(400.0 * np.outer(direction, direction), np.zeros(2), 0.0, 3)
+    found = FrictionFilter(FILE).absorb(evidence, SPAN_S)
+    assert found.is_estimated == is_estimated
 
 
 def test_a_turn_around_is_not_a_turn_of_the_friction() -> None:
