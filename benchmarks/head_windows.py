@@ -8,7 +8,8 @@ the picture with a margin. No constant was chosen on these films (``benchmarks.h
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -24,6 +25,7 @@ from tests.helpers.film_options import film_options
 
 LENGTHS = (20, 40, 60)
 _MARGIN_PX = 60
+_BINS = (0.5, 0.7, 0.8, 0.9, 1.01)
 
 
 def heads_of(film: DescribedFilm) -> Iterator[tuple[str, dict[int, Floats], slice | None]]:
@@ -50,6 +52,7 @@ def main() -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", default="", metavar="WORD")
     given = parser.parse_args()
+    judged: list[tuple[float, bool]] = []
     for film in films_of(given.folder.resolve()):
         if given.only not in str(film.path):
             continue
@@ -64,8 +67,23 @@ def main() -> int:
                 images = [frame[corner[1] : y, corner[0] : x] for frame in frames]
             for start, stop in windows(len(frames)):
                 said = _judged(images[start:stop], start, ends_px, corner, film)
+                if not isinstance(said, str):
+                    judged.append(said)
+                    said = f"{said[0]:.3f} {said[1]}"
                 print(f"{film.path.name} {name} {start}-{stop - 1}: {said}", flush=True)
+    print(calibration(judged))
     return 0
+
+
+def calibration(judged: Sequence[tuple[float, bool]]) -> str:
+    """Right heads against those that the probabilities promise: by range, and below 0.9."""
+    lines = ["| probability | windows | expected right | right |", "| --- | --- | --- | --- |"]
+    for low, high in [*pairwise(_BINS), (0.5, 0.9), (0.5, 1.01)]:
+        some = [(sure, right) for sure, right in judged if low <= sure < high]
+        expected = sum(sure for sure, _ in some)
+        right = sum(right for _, right in some)
+        lines.append(f"| {low} to {min(high, 1)} | {len(some)} | {expected:.1f} | {right} |")
+    return "\n".join(lines)
 
 
 def _judged(
@@ -74,7 +92,8 @@ def _judged(
     ends_px: dict[int, Floats],
     corner: Floats,
     film: DescribedFilm,
-) -> str:
+) -> tuple[float, bool] | str:
+    """Probability of the head and whether it is right, or why there is no track."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch, "frames")
         folder.mkdir()
@@ -95,7 +114,7 @@ def _judged(
         head, tail = ends_px[start + number] - corner
         first = seen.points_px[number, 0]
         right.append(np.hypot(*(first - head)) < np.hypot(*(first - tail)))
-    return f"{seen.head_probability:.3f} {np.mean(right) > 0.5} {len(right)} {seen.head_by}"
+    return seen.head_probability, bool(np.mean(right) > 0.5)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ import numpy as np
 from snakewalk.config.errors import InputError
 from snakewalk.config.reading import Fact, Facts, by_file, by_user, texts
 from snakewalk.controller.capture.capture import (
+    ADVICE,
     Capture,
     CaptureFile,
     RejectedFilmError,
@@ -451,7 +452,7 @@ def warning_of(options: CaptureOptions, captured: Capture) -> str | None:
         reason = max(dict.fromkeys(unused), key=unused.count)
         doubts.append(
             f"{len(unused)} of {len(captured.status)} frames are not used, mostly because "
-            f"({reason}); look at --sheet"
+            f"({ADVICE.get(reason, reason)}); look at --sheet"
         )
     is_known = np.isfinite(captured.expected_px)
     if is_known.any():

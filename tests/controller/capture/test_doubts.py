@@ -120,6 +120,9 @@ def test_many_unused_frames_are_reported_with_their_usual_reason() -> None:
     assert text is not None
     assert text.startswith("film.avi: 10 of 20 frames are not used")
     assert str(bad) in text
+    text = warning_of(OPTIONS, captured([good] * 10 + [FrameStatus.SEVERAL] * 10))
+    assert text is not None
+    assert "(several animals: give --animals N or --animals auto); look at --sheet" in text
 
 
 def test_a_large_expected_error_is_reported() -> None:

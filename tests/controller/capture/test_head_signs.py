@@ -11,6 +11,7 @@ from benchmarks.head_signs import (
     repetition,
     stored,
 )
+from benchmarks.head_windows import calibration
 from snakewalk.controller.capture.stages.head import GROUPS
 
 
@@ -32,3 +33,15 @@ def test_a_film_of_the_table_has_its_signs_again() -> None:
     signs = measured(drawn(0), midlines_of(drawn(0), 0))
     for name, (value, error) in signs.items():
         assert (value, error) == pytest.approx(table[name][0], abs=0.02)
+
+
+def test_right_heads_are_compared_with_those_that_were_promised() -> None:
+    rows = calibration([(0.6, True), (0.65, False), (0.75, True), (0.95, True)]).splitlines()
+    assert rows[2:] == [
+        "| 0.5 to 0.7 | 2 | 1.2 | 1 |",
+        "| 0.7 to 0.8 | 1 | 0.8 | 1 |",
+        "| 0.8 to 0.9 | 0 | 0.0 | 0 |",
+        "| 0.9 to 1 | 1 | 0.9 | 1 |",
+        "| 0.5 to 0.9 | 3 | 2.0 | 2 |",
+        "| 0.5 to 1 | 4 | 3.0 | 3 |",
+    ]

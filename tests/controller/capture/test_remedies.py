@@ -236,6 +236,74 @@ def test_every_listed_rejection_exists(words: str) -> None:
     assert any(words in text for text in rejections())
 
 
+WARNINGS = {
+    "head and tail may be exchanged": "test_the_remedies_of_a_warning_end_it",
+    " frames show no usual length to compare with": "test_the_remedies_of_a_warning_end_it",
+    " frames are not used, mostly because ": "`remedy` tries the options",
+    "the points are expected to be off by": "`remedy` tries the options",
+    "%s: %s": "a sentence of `remedy`, whose command is tried",
+    "animal %d: %s": "a doubt about one animal",
+    "smaller objects, of less than": "test_a_smaller_animal_is_captured_alone_by_its_region",
+    "identity uncertain after frame": "test_the_page_shows_all_animals",
+    "image numbers are missing": "nothing to do: the times are right",
+}
+"""By words of a warning: the test of its remedy, or why it has none."""
+
+
+def warnings() -> Iterator[str]:
+    """The texts of all warnings and doubts of ``animal capture``."""
+    for file in Path(package.__path__[0]).rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in {
+                "LOGGER.warning", "doubts.append",
+            }:  # fmt: skip
+                parts = [part.value for part in ast.walk(node) if isinstance(part, ast.Constant)]
+                text = "".join(part for part in parts if isinstance(part, str))
+                if text not in {"", "%s"}:
+                    yield text
+
+
+def test_every_warning_has_a_tested_remedy_or_a_reason() -> None:
+    texts = [*warnings()]
+    assert [text for text in texts if not any(words in text for words in WARNINGS)] == []
+    assert [words for words in WARNINGS if not any(words in text for text in texts)] == []
+    files = Path(__file__).parent.glob("test_*.py")
+    tests = "".join(file.read_text(encoding="utf-8") for file in files)
+    names = [name for name in WARNINGS.values() if name.startswith("test_")]
+    assert [name for name in names if f"def {name}" not in tests] == []
+
+
+@pytest.mark.slow
+def test_the_remedies_of_a_warning_end_it(tmp_path: Path) -> None:
+    options = folder_of((frame for frame, _ in zip(film(SCENE), range(12), strict=False)), tmp_path)
+    short = capture_recording(options)
+    assert short.warning is not None
+    assert "fewer than 20 frames show no usual length to compare with; film longer" in short.warning
+    assert short.frames_rough == short.frames_used
+    (tmp_path / "longer").mkdir()
+    even = replace(SCENE, taper=0.05, tip=1.0)
+    longer = folder_of(film(even, turning(0.35)), tmp_path / "longer")
+    unsure = capture_recording(longer)
+    assert unsure.frames_rough < unsure.frames_used
+    assert unsure.warning is not None
+    said = re.search(r"head and tail may be exchanged .* give --head (\S+)$", unsure.warning)
+    assert said, unsure.warning
+    given = capture_recording(changed(longer, head=said[1], force=True))
+    assert (given.head_by, given.warning) == ("given", None)
+
+
+@pytest.mark.slow
+def test_a_smaller_animal_is_captured_alone_by_its_region(tmp_path: Path) -> None:
+    small = replace(SCENE, length_px=26.0)
+    both = (np.hstack(pair) for pair in zip(film(SCENE), film(small), strict=True))
+    options = changed(folder_of(both, tmp_path), animals="auto")
+    facts = capture_several(options)
+    assert (len(facts.animals), facts.smaller_objects) == (1, 1)
+    (animal,) = captured(changed(options, animals=None, roi="140,0,140,100", force=True))
+    assert animal is not None
+    assert animal.length_px == pytest.approx(26.0, rel=0.15)
+
+
 def captured(options: CaptureOptions) -> list[CaptureFacts | None]:
     facts: CaptureFacts | AnimalsFacts
     facts = (capture_recording if options.animals is None else capture_several)(options)
