@@ -38,7 +38,7 @@ class PoseConfig(Strict):
         10.0,
         gt=0.0,
         le=180.0,
-        description="standard deviation of the yaw in `world_deg`; smaller if it was measured",
+        description="standard deviation of the yaw in `world_deg`",
     )
     scale: float = Field(
         1.0, gt=0.0, le=1000.0, description="factor on the positions of the source, for metres"
