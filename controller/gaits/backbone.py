@@ -67,7 +67,7 @@ class SpaceCurve:
         count = int(np.ceil(run[-1] / robot.mean_link_length_m * SAMPLES_A_LINK)) + 1
         self.run_m = np.linspace(0.0, run[-1], count)
         fine_parameter = np.interp(self.run_m, run, fine)
-        self.points_m: Floats = np.asarray(spline(fine_parameter))
+        self.points_m: Floats = spline(fine_parameter)
         self._by_run = CubicSpline(self.run_m, self.points_m)
         tangents = self._by_run(self.run_m, 1)
         self.tangents: Floats = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
@@ -82,7 +82,7 @@ class SpaceCurve:
             run = np.clip(run, 0.0, self.run_m[-1])
         along = self._by_run(run, 1)
         along /= np.linalg.norm(along, axis=1, keepdims=True)
-        return np.asarray(self._by_run(run)), np.asarray(along)
+        return self._by_run(run), np.asarray(along)
 
 
 @dataclass(frozen=True, slots=True)

@@ -396,7 +396,7 @@ def _longest_path(thin: Bools) -> tuple[Floats, float] | None:
         return None
     wide = thin.shape[1]
     place = np.full(thin.size, -1)
-    flat = np.asarray(rows * wide + columns)
+    flat = rows * wide + columns
     place[flat] = np.arange(len(flat))
 
     def paths_from(start: Sequence[int]) -> tuple[Floats, Ints]:

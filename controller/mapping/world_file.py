@@ -60,7 +60,7 @@ class MapWorld:
         rows, columns = ground.z_m.shape
         x, y = ground.axes_m
         safe = self.relief.safe(*np.meshgrid(x, y))
-        room = np.asarray(distance_transform_edt(np.pad(safe, 1)))[1:-1, 1:-1]
+        room = distance_transform_edt(np.pad(safe, 1))[1:-1, 1:-1]
         row, column = np.unravel_index(int(room.argmax()), room.shape)
         return {
             "world": str(self.file),

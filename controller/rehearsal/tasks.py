@@ -153,7 +153,7 @@ def share(task: ControllerTask, result: RunResult) -> float:
     if task.run is None:
         return min(max(_moved_distance_m(record, task.axis) / task.distance_m, 0.0), 1.0)
     run = load_run(task.run)
-    way_m = np.asarray(record.pose.head_m[:, :2])
+    way_m = record.pose.head_m[:, :2]
     reached, _ = true_arrivals(way_m, np.array(run.waypoints_m), run.waypoint_radius_m)
     return reached / len(run.waypoints_m)
 

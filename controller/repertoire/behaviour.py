@@ -290,7 +290,7 @@ class Wandering:
             free &= gap > CLEAR_SIDE_LENGTHS * reach[:, None]
         widest = 0 if self.separated is None else gap.argmax(axis=1)
         first = np.where(free.any(axis=1), free.argmax(axis=1), widest)
-        return np.asarray(wrap(tried[np.arange(len(bodies)), first] - heading))
+        return wrap(tried[np.arange(len(bodies)), first] - heading)
 
     def _pull(self, body: int) -> Floats:
         """(2,) pull of a school: the mean direction of the neighbours, and that to its middle."""
@@ -321,7 +321,7 @@ class Wandering:
         is_deep = depth_m > 3.0 * DEPTH_LENGTHS * self.length_m[bodies][:, None]
         is_land = (depth_m < 0.0) & (self._ground.slope_rad(x, y) < STEEP_RAD)
         suits = np.where(self.swims[bodies][:, None], is_deep, is_land)
-        return np.asarray(self._ground.contains(x, y) & suits)
+        return self._ground.contains(x, y) & suits
 
     def _places(self, bodies: Indices) -> Floats:
         """(n, 3) a random place for each body, a tenth of the field from its edge.

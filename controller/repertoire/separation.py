@@ -52,7 +52,7 @@ class SeparatedCrowd:
             if not len(stopped):
                 break
             crowd.restore(before, stopped)
-        moved: Bools = np.asarray(self.blocker == NONE)
+        moved: Bools = self.blocker == NONE
         self.held[moved] = 0
         self.held[~moved] += 1
         for body in np.flatnonzero(self.held >= YIELDING_FRAMES).tolist():

@@ -177,40 +177,63 @@ def filled(z_m: Floats, holes: Bools) -> Floats:
     nearest = distance_transform_edt(holes, return_distances=False, return_indices=True)
     base = float(np.mean(z_m[~holes]))
     out = z_m[tuple(nearest)] - base
-    index = np.where(holes, np.cumsum(holes).reshape(holes.shape) - 1, -1)
-    count = int(holes.sum())
-    weight = np.zeros(count)
-    right = np.zeros(count)
-    pairs = []
-    for axis in (0, 1):
-        below, above = (
-            np.moveaxis(index, axis, 0)[part] for part in (slice(None, -1), slice(1, None))
-        )
-        low, high = (np.moveaxis(out, axis, 0)[part] for part in (slice(None, -1), slice(1, None)))
-        for cells, there, value in ((below, above, high), (above, below, low)):
-            inside = cells >= 0
-            np.add.at(weight, cells[inside], 1.0)
-            edge = inside & (there < 0)
-            np.add.at(right, cells[edge], value[edge])
-        both = (below >= 0) & (above >= 0)
-        pairs.append(np.stack([below[both], above[both]]))
-    low, high = np.concatenate(pairs, axis=1)
-    laplace = laplacian(weight, low, high)
-    solved, _ = cg(laplace, right, x0=out[holes], rtol=1e-6, maxiter=_ROUNDS)
+    system = LaplaceSystem.of(holes, ~holes, out[..., None])
+    solved, _ = cg(
+        system.matrix(), system.border_sum[:, 0], x0=out[holes], rtol=1e-6, maxiter=_ROUNDS
+    )
     filled_m = np.array(z_m, dtype=float)
     filled_m[holes] = solved + base
     return filled_m
 
 
-def laplacian(weight: Floats, low: Ints, high: Ints) -> csr_array:
-    """Matrix of samples with weights (n,), of which pairs (m,) are neighbours."""
-    diagonal = np.arange(len(weight))
-    return coo_array(
-        (
-            np.concatenate([weight, -np.ones(2 * len(low))]),
-            (np.concatenate([diagonal, low, high]), np.concatenate([diagonal, high, low])),
-        ),
-    ).tocsr()
+@dataclass(frozen=True, slots=True)
+class LaplaceSystem:
+    """Equations of n unknown samples of a grid: each is the mean of its neighbours."""
+
+    border_count: Floats
+    """(n,) number of neighbours with a given value."""
+    border_sum: Floats
+    """(n, k) sum of the values of these neighbours."""
+    low: Ints
+    """(m,) indices of unknown samples with an unknown neighbour."""
+    high: Ints
+    """(m,) indices of these neighbours."""
+
+    @classmethod
+    def of(cls, unknown: Bools, given: Bools, values: Floats) -> Self:
+        """Return the equations for a grid (H, W) with values (H, W, k), read where given."""
+        index = np.where(unknown, np.cumsum(unknown).reshape(unknown.shape) - 1, -1)
+        count = int(unknown.sum())
+        border_count = np.zeros(count)
+        border_sum = np.zeros((count, values.shape[-1]))
+        pairs = []
+        for turned in (lambda grid: grid, lambda grid: np.swapaxes(grid, 0, 1)):
+            below, above = turned(index)[:-1], turned(index)[1:]
+            for cells, beside in ((below, np.s_[1:]), (above, np.s_[:-1])):
+                edge = (cells >= 0) & turned(given)[beside]
+                np.add.at(border_count, cells[edge], 1.0)
+                np.add.at(border_sum, cells[edge], turned(values)[beside][edge])
+            both = (below >= 0) & (above >= 0)
+            pairs.append(np.stack([below[both], above[both]]))
+        return cls(border_count, border_sum, *np.concatenate(pairs, axis=1))
+
+    def matrix(self) -> csr_array:
+        """Return the matrix (n, n) of the equations; a sample without neighbours has weight 1."""
+        count = len(self.border_count)
+        weight = self.border_count.copy()
+        for end in (self.low, self.high):
+            weight += np.bincount(end, minlength=count)
+        weight[weight == 0.0] = 1.0
+        diagonal = np.arange(count)
+        return coo_array(
+            (
+                np.concatenate([weight, -np.ones(2 * len(self.low))]),
+                (
+                    np.concatenate([diagonal, self.low, self.high]),
+                    np.concatenate([diagonal, self.high, self.low]),
+                ),
+            ),
+        ).tocsr()
 
 
 def opened(holes: Bools, radius: float) -> Bools:
@@ -220,11 +243,11 @@ def opened(holes: Bools, radius: float) -> Bools:
     """
     far = math.ceil(radius) + 1
     wide = np.pad(holes, far, constant_values=True)
-    inner = np.asarray(distance_transform_edt(wide)) > radius
+    inner = distance_transform_edt(wide) > radius
     if not inner.any():
         return np.zeros_like(holes)
-    back = np.asarray(distance_transform_edt(~inner)) <= radius
-    return np.asarray((back & wide)[far:-far, far:-far])
+    back = distance_transform_edt(~inner) <= radius
+    return (back & wide)[far:-far, far:-far]
 
 
 def _shape(size_m: Floats, spacing_m: float, *, floor: bool = False) -> tuple[int, int]:

@@ -117,7 +117,7 @@ class GrowingMap:
             return None
         z_m = np.where(is_known_now, self.z_m, self._touched_m)
         holes = np.isnan(z_m)
-        far_m = np.asarray(distance_transform_edt(holes, sampling=self.spacing_m))
+        far_m = distance_transform_edt(holes, sampling=self.spacing_m)
         z_m[holes] = _coarsely_filled(z_m)[holes]
         trusted = is_known_now | ~opened(~is_known_now, 0.5 * _SMALL_HOLE_M / self.spacing_m)
         smooth = holes & (far_m <= _SMOOTH_M)

@@ -210,7 +210,7 @@ class SafeGraph:
             np.concatenate([edges.row, first]),
         )
         both = csr_array(coo_array((weight, ends), shape=(n + 1, n + 1)))
-        return np.asarray(dijkstra(both, directed=True, indices=[n]))[0, :n]
+        return dijkstra(both, directed=True, indices=[n])[0, :n]
 
     def cheapest_path(self, start: int, target: int) -> Floats | None:
         """(m, 2) nodes of the cheapest path, both ends included, or None."""

@@ -98,4 +98,4 @@ def _smooth(joints_rad: Floats, width: float) -> Floats:
         return joints_rad
     longer = np.pad(joints_rad, ((room, room), (0, 0)), mode="reflect", reflect_type="odd")
     smooth = gaussian_filter1d(longer, width, axis=0, mode="nearest")
-    return np.asarray(smooth[room : len(smooth) - room])
+    return smooth[room : len(smooth) - room]

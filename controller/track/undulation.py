@@ -96,9 +96,9 @@ def advance_of(body: Floats, number: Ints, step: int) -> Advance:
     gone = (middle[later] - middle[earlier]) * (segments / step)
     head = mean[:, :1]
     return Advance(
-        np.asarray((gone * mean).sum(axis=-1)),
-        np.asarray((gone * head).sum(axis=-1)),
-        np.asarray((mean * head).sum(axis=-1)),
+        (gone * mean).sum(axis=-1),
+        (gone * head).sum(axis=-1),
+        (mean * head).sum(axis=-1),
     )
 
 

@@ -157,9 +157,7 @@ class Course:
     def ahead_m(self, reach_m: float) -> Floats:
         """(2,) the point ``reach_m`` ahead on the path, at most the next waypoint."""
         target_along_m = min(float(self._along_m[0]) + reach_m, self._passed_m[self.reached])
-        return np.asarray(
-            self.path.position(target_along_m)
-        )  # the path's end if it leads to no waypoint yet
+        return self.path.position(target_along_m)  # the path's end if it leads to no waypoint yet
 
     @property
     def next_waypoint(self) -> tuple[Floats, float] | None:

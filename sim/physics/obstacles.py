@@ -146,7 +146,7 @@ def _touching(
 def _rotation(line: Floats, up: Floats, about_rad: float) -> Floats:
     """(3, 3) rotation of unit ``line`` to ``up``, then about it."""
     upright = Rotation.align_vectors(up, line)[0]
-    return np.asarray((Rotation.from_rotvec(about_rad * up) * upright).as_matrix())
+    return (Rotation.from_rotvec(about_rad * up) * upright).as_matrix()
 
 
 @dataclass(frozen=True, slots=True)

@@ -208,7 +208,7 @@ def _clearance_m(
     mujoco.mj_kinematics(m.model, m.data)
     spine = robot.link_count
     link = balls.link
-    axes = np.asarray(m.data.xmat[1 : 1 + spine]).reshape(-1, 3, 3)
+    axes = m.data.xmat[1 : 1 + spine].reshape(-1, 3, 3)
     # products by hand: BLAS sums in a processor-dependent order
     centres = m.data.xipos[1 : 1 + spine][link]
     points = centres + balls.along_m * axes[link, :, 0] + balls.aside_m * axes[link, :, 1]

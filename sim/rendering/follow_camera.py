@@ -160,7 +160,7 @@ def _smooth(values: Floats, frames: float) -> Floats:
         return values
     beyond = round(4.0 * frames)
     longer = np.pad(values, ((beyond, beyond), (0, 0)), mode="reflect", reflect_type="odd")
-    return np.asarray(gaussian_filter1d(longer, frames, axis=0)[beyond:-beyond])
+    return gaussian_filter1d(longer, frames, axis=0)[beyond:-beyond]
 
 
 def _spread(values: Floats, fps: int) -> Floats:

@@ -82,7 +82,7 @@ def _bend(place: Floats, begin: int, end: int, missing: Floats) -> tuple[Floats,
     """Shift places from ``begin`` on, in place; returns turns of head and pitch up to ``end``."""
     far = arc_lengths(place[begin : end + 1, :2])
     share = far / max(far[-1], 1e-12)
-    grown = np.asarray(quintic(share))
+    grown = quintic(share)
     before = place[begin : end + 1].copy()
     place[begin : end + 1] += grown[:, None] * missing
     place[end + 1 :] += missing

@@ -301,7 +301,7 @@ def _turns(
     cross = travel[:, None, 0] * step[..., 1] - travel[:, None, 1] * step[..., 0]
     heading = np.arctan2(cross, _components(step, travel))
     wave = np.exp(-1j * TURN * phase)
-    complete_cycles = np.asarray(phase - phase[0] < np.floor(phase[-1] - phase[0]))
+    complete_cycles = phase - phase[0] < np.floor(phase[-1] - phase[0])
     amplitude = 2.0 * (heading[complete_cycles] * wave[complete_cycles, None]).mean(axis=0)
     # the tail swings more than the hind girdle moves it: its segments do not show the girdle
     ahead_of_tail = places[1:] <= girdle_places[1] + 1e-9

@@ -234,7 +234,7 @@ def _foot_pitch(gait: PersonGait, foot_paths: Feet) -> tuple[Floats, Floats]:
     around = PchipInterpolator(
         np.concatenate([place - 1.0, place, place + 1.0]), np.radians(np.tile(angle, 3))
     )
-    pitch = np.asarray(around(foot_paths.at))
+    pitch = around(foot_paths.at)
     air = np.clip((foot_paths.at - foot_paths.duty) / (1.0 - foot_paths.duty), 0.0, 1.0)
     straight = np.clip(air / 0.45, 0.0, 1.0)
     straight = straight**2 * (3.0 - 2.0 * straight)

@@ -103,7 +103,7 @@ def with_random_states(
 
 def _distance(states: Complexes, others: Complexes) -> Floats:
     """(S, R) Euclidean distances of states (S, n) and (R, n)."""
-    return np.asarray(cdist(states.view(float), others.view(float)))
+    return cdist(states.view(float), others.view(float))
 
 
 def film_successors(film: FilmStates, points: int) -> list[list[int]]:

@@ -80,7 +80,7 @@ def direction_of(contrasts: Floats) -> Floats:
     """(C,) unit weights of the channels from contrasts (N, C), NaN where unknown."""
     known = contrasts[np.isfinite(contrasts).all(axis=1)]
     direction = np.median(known, axis=0) if len(known) else np.zeros(contrasts.shape[1])
-    return np.asarray(direction / max(float(np.linalg.norm(direction)), 1e-9))
+    return direction / max(float(np.linalg.norm(direction)), 1e-9)
 
 
 def _end_px(image: Singles, line: Floats, half: Floats, direction: Floats) -> float:

@@ -156,7 +156,7 @@ def _values_at(time: Floats, rows: Floats) -> Floats:
     """Angles at times (T,) from rows (N, 2) of time and angle; NaN in gaps and beyond the ends."""
     if len(rows) < 2:
         return np.where(time == rows[0, 0], rows[0, 1], np.nan)
-    values = np.asarray(np.interp(time, rows[:, 0], rows[:, 1], left=np.nan, right=np.nan))
+    values = np.interp(time, rows[:, 0], rows[:, 1], left=np.nan, right=np.nan)
     after = rows[gaps(rows[:, 0])]
     before = rows[gaps(rows[:, 0]) - 1]
     for (start_s, _), (end_s, _) in zip(before, after, strict=True):

@@ -268,7 +268,7 @@ class ChainFigures:
             kg = self._assumed.number(
                 f"{name}.mass_kg", 1e-4, 1000.0, f"link {name}: states no mass", likely
             )
-            centre = np.asarray(data_centre(self._data, group))
+            centre = data_centre(self._data, group)
             return _Mass(kg, centre, np.zeros((3, 3)))
         centre = masses @ self._data.xipos[group] / masses.sum()
         inertia = np.zeros((3, 3))

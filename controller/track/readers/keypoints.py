@@ -114,7 +114,7 @@ class Keypoints:
         """
         bridged, which = self.midline(choice)
         number = np.arange(len(bridged)) if self.frame is None else self.frame
-        is_complete = np.asarray(np.isfinite(bridged).all(axis=(1, 2)))
+        is_complete = np.isfinite(bridged).all(axis=(1, 2))
         bridged = bridged.copy()
         bridged[is_complete], exchanged = with_ends_in_place(
             bridged[is_complete], number[is_complete]

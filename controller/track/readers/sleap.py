@@ -119,7 +119,7 @@ def _in_order(stored: Any, axes: tuple[str, ...]) -> Floats:
     named = _json_attribute(stored, "dims")
     if not isinstance(named, list) or {*map(str, named)} != {*axes} or values.ndim != len(named):
         return values
-    return np.asarray(values.transpose([named.index(axis) for axis in axes]))
+    return values.transpose([named.index(axis) for axis in axes])
 
 
 def _stated_rate(h5_file: Any) -> float | None:
