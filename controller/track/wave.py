@@ -32,7 +32,7 @@ _ZOOMS = 3
 _COMPONENTS = 4
 
 
-class GappedWave(NamedTuple):
+class Pattern(NamedTuple):
     """The strongest travelling pattern of runs of frames."""
 
     turns_a_frame: float
@@ -45,7 +45,7 @@ class GappedWave(NamedTuple):
     """Curvature (T, N) of the runs that were used."""
 
 
-def gapped_wave(number: Ints, curvature: Floats) -> GappedWave:
+def pattern_of_runs(number: Ints, curvature: Floats) -> Pattern:
     """Fit one travelling wave to curvature (T, N) of frames (T,)."""
     mean = curvature.mean(axis=0)
     components = _components(curvature - mean)
@@ -66,7 +66,7 @@ def gapped_wave(number: Ints, curvature: Floats) -> GappedWave:
         for phasor in (signal @ mode.conj() for signal in signals)
     )
     turns = _refined_frequency(number, [run for run, _ in used], components, first)
-    return GappedWave(
+    return Pattern(
         float(np.copysign(turns, np.angle(sense))),
         np.asarray(mode),
         float(values[-1] / max(float(values.sum()), 1e-300)),
@@ -201,43 +201,38 @@ def measure_wave(track: Track) -> Wave:
     way. A reversal within the recording lowers ``share`` and counts in ``headward``.
     """
     number = np.rint(track.time_s * track.rate_hz).astype(np.int64)
-    if missing_frames(number):
-        return _of_runs(track, number)
-    even = np.arange(track.time_s[0], track.time_s[-1] + 0.5 / track.rate_hz, 1.0 / track.rate_hz)
-    angles = np.stack([np.interp(even, track.time_s, column) for column in track.angles_rad.T])
-    curvature = smooth_curvature(angles.T)
-    analytic = analytic_signal(curvature - curvature.mean(axis=0))
-    energy, modes = np.linalg.eigh(analytic.T @ analytic.conj())
-    mode = modes[:, -1]
-    slope = _slope(mode)
-    turns = _turns_a_frame(analytic @ mode.conj())
+    has_gaps = bool(missing_frames(number))
+    curvature = smooth_curvature(track.angles_rad if has_gaps else _even_angles_rad(track))
+    pattern = pattern_of_runs(number, curvature) if has_gaps else _pattern(curvature)
+    slope = _slope(pattern.mode)
+    turns = pattern.turns_a_frame
     cycle = 1.0 / max(abs(turns), 1e-9)
+    lengths = [len(run) for run in pattern.runs]
     return Wave(
         waves=float(abs(slope)),
         frequency_hz=abs(turns) * track.rate_hz,
         towards_tail=bool(slope * turns < 0.0),
-        share=float(energy[-1] / energy.sum()) if _bends(curvature) else 0.0,
-        headward=_headward([curvature], cycle),
+        share=pattern.share if _bends(curvature) else 0.0,
+        headward=_headward(pattern.runs, cycle),
         frames_a_cycle=cycle,
-        cycles=len(even) / cycle,
+        cycles=sum(lengths) / cycle,
+        longest_cycles=max(lengths) / cycle if has_gaps else None,
     )
 
 
-def _of_runs(track: Track, number: Ints) -> Wave:
-    curvature = smooth_curvature(track.angles_rad)
-    wave = gapped_wave(number, curvature)
-    slope = _slope(wave.mode)
-    cycle = 1.0 / max(abs(wave.turns_a_frame), 1e-9)
-    return Wave(
-        waves=float(abs(slope)),
-        frequency_hz=abs(wave.turns_a_frame) * track.rate_hz,
-        towards_tail=bool(slope * wave.turns_a_frame < 0.0),
-        share=wave.share if _bends(curvature) else 0.0,
-        headward=_headward(wave.runs, cycle),
-        frames_a_cycle=cycle,
-        cycles=sum(len(run) for run in wave.runs) / cycle,
-        longest_cycles=max(len(run) for run in wave.runs) / cycle,
-    )
+def _even_angles_rad(track: Track) -> Floats:
+    """(T, N) angles at even times."""
+    even = np.arange(track.time_s[0], track.time_s[-1] + 0.5 / track.rate_hz, 1.0 / track.rate_hz)
+    return np.stack([np.interp(even, track.time_s, column) for column in track.angles_rad.T]).T
+
+
+def _pattern(curvature: Floats) -> Pattern:
+    """Fit one travelling wave to curvature (T, N) without a gap."""
+    analytic = analytic_signal(curvature - curvature.mean(axis=0))
+    energy, modes = np.linalg.eigh(analytic.T @ analytic.conj())
+    mode = modes[:, -1]
+    share = float(energy[-1] / max(energy.sum(), 1e-300))
+    return Pattern(_turns_a_frame(analytic @ mode.conj()), mode, share, [curvature])
 
 
 def _slope(mode: Complexes) -> float:
