@@ -207,12 +207,13 @@ class LaplaceSystem:
         border_count = np.zeros(count)
         border_sum = np.zeros((count, values.shape[-1]))
         pairs = []
-        for turned in (lambda grid: grid, lambda grid: np.swapaxes(grid, 0, 1)):
-            below, above = turned(index)[:-1], turned(index)[1:]
-            for cells, beside in ((below, np.s_[1:]), (above, np.s_[:-1])):
-                edge = (cells >= 0) & turned(given)[beside]
-                np.add.at(border_count, cells[edge], 1.0)
-                np.add.at(border_sum, cells[edge], turned(values)[beside][edge])
+        for axis in (0, 1):
+            cells, is_given, sides = (grid.swapaxes(0, axis) for grid in (index, given, values))
+            below, above = cells[:-1], cells[1:]
+            for inner, beside in ((below, np.s_[1:]), (above, np.s_[:-1])):
+                edge = (inner >= 0) & is_given[beside]
+                np.add.at(border_count, inner[edge], 1.0)
+                np.add.at(border_sum, inner[edge], sides[beside][edge])
             both = (below >= 0) & (above >= 0)
             pairs.append(np.stack([below[both], above[both]]))
         return cls(border_count, border_sum, *np.concatenate(pairs, axis=1))
