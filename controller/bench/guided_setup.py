@@ -11,14 +11,20 @@ from pathlib import Path
 import typer
 
 from snakewalk.config.archive import read_json_object
-from snakewalk.config.errors import InputError
+from snakewalk.config.loader import load_robot
 from snakewalk.controller.console.result_files import write_result
 
 _GAIT = "lateral-undulation"
+_REHEARSAL = "rehearsal"
+"""Folder of the rehearsal's results."""
 _SLOW = ("-p", "frequency_hz=0.2")
 """Frequency of the first motion (ours)."""
-_SHORT = ("--seconds", "10", "--set", "run.safety.current_limit_a=0.6", "--force", "--no-film")
-"""Duration and torque limit of the first motion (ours)."""
+_SHORT = ("--seconds", "10", "--force", "--no-film")
+"""Duration of the first motion (ours)."""
+_REHEARSED_SHARE = 2.0
+"""Current limit of the first motion over the peak of its rehearsal (ours)."""
+_UNREHEARSED_SHARE = 0.5
+"""The same over the robot's own limit, without a rehearsal (ours)."""
 _DEAD_RECKONED = 3
 """Exit code of a successful run without a measured pose."""
 _INTERRUPTED = 130
@@ -43,6 +49,14 @@ class RobotFiles:
     def robot(self) -> Path:
         """Robot file with order, directions and zeros."""
         return self.folder / "robot.toml"
+
+    def current_limit_a(self) -> float:
+        """Return the current limit of the first motion: from its rehearsal, or of the robot."""
+        robot_a = load_robot(str(self.robot)).over_current_a
+        summary = self.folder / _REHEARSAL / "summary.json"
+        peak_a = read_json_object(summary).get("peak_current_a") if summary.exists() else None
+        limit_a = _REHEARSED_SHARE * peak_a if peak_a else _UNREHEARSED_SHARE * robot_a
+        return round(min(limit_a, robot_a), 2)
 
     def on_port(self, *words: str) -> list[str]:
         """Return words of a command on the robot's port."""
@@ -92,7 +106,8 @@ def _pose(files: RobotFiles) -> list[str]:
 
 def _move(files: RobotFiles) -> list[str]:
     page = ["--view"] if importlib.util.find_spec("viser") else []
-    return [*files.on_port(*_motion(files, "first-motion")), *page]
+    limit = ["--set", f"run.safety.current_limit_a={files.current_limit_a():g}"]
+    return [*files.on_port(*_motion(files, "first-motion"), *limit), *page]
 
 
 STEPS = (
@@ -112,12 +127,12 @@ STEPS = (
     SetupStep(
         "rehearse",
         "The same motion with simulated servos and real packets.",
-        partial(_motion, folder="rehearsal"),
+        partial(_motion, folder=_REHEARSAL),
     ),
     SetupStep("pose", "Check the external pose. Nothing moves.", _pose),
     SetupStep(
         "move",
-        "FIRST MOTION: 10 s, slow, little current. Hang the body up; a hand on the supply's "
+        "FIRST MOTION: 10 s, slow, with a current limit. Hang the body up; a hand on the supply's "
         "switch. Ctrl-C or `snakewalk stop` switches torque off.",
         _move,
     ),
@@ -156,7 +171,7 @@ class GuidedSetup:
 
         Raises:
             SystemExit: the person stops; with the exit code of the last command of the step.
-            InputError: a step was skipped that the others need.
+            InputError: the robot's file, or the rehearsal's results, are invalid.
 
         """
         while len(self._done) < len(STEPS):
@@ -187,8 +202,9 @@ class GuidedSetup:
             if answer.startswith("b"):
                 return False
             if answer.startswith("s"):
-                self._skip(step)
-                break
+                if self._can_skip(step):
+                    break
+                continue
             if answer not in ("", "y"):
                 continue
             code = self._run(words)
@@ -199,14 +215,21 @@ class GuidedSetup:
             words = step.words(self.files)
         return True
 
-    def _skip(self, step: SetupStep) -> None:
+    def _can_skip(self, step: SetupStep) -> bool:
+        """Tell what replaces the step, or which file is missing without it."""
         first = self.files.first_robot
-        if step.name == "find" and not first.exists():
-            raise InputError(f"{first}: the other steps need this file; run this step first")
-        if step.name == "calibrate" and not self.files.robot.exists():
-            shutil.copyfile(first, self.files.robot)
+        robot = self.files.robot
+        if step.name in ("find", "calibrate") and not (first.exists() or robot.exists()):
+            typer.echo(
+                f"  {first} is missing, and every later step needs it: find the servos, or copy a "
+                "robot file there"
+            )
+            return False
+        if step.name == "calibrate" and not robot.exists():
+            shutil.copyfile(first, robot)
         if step.if_skipped:
             typer.echo(f"  assumed: {step.if_skipped}")
+        return True
 
     def _axes(self) -> str:
         """Ask for the axes, which no servo knows."""

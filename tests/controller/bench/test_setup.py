@@ -1,8 +1,10 @@
 """``snakewalk setup``: its steps, its questions, and how it goes on after a stop."""
 
+import json
 import os
 import pty
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -11,7 +13,6 @@ from typing import Any
 
 import pytest
 
-from snakewalk.config.errors import InputError
 from snakewalk.config.loader import load_robot
 from snakewalk.controller.bench.guided_setup import STEPS, GuidedSetup, RobotFiles
 from snakewalk.sim.serve.servo_bus import ServoBus
@@ -34,6 +35,8 @@ class Bench:
         self.ran.append(list(words))
         if list(words[:2]) == ["bus", "inventory"]:
             (self.folder / "found.toml").write_text('name = "found"\njoint_axes = "ypyp"\n')
+        if list(words[:2]) == ["bus", "calibrate"]:
+            shutil.copyfile(self.folder / "found.toml", self.folder / "robot.toml")
         return self.codes.pop(0) if self.codes else 0
 
     def sets_up(self, *answers: str) -> list[str]:
@@ -124,12 +127,48 @@ def test_an_interrupted_calibration_is_resumed(bench: Bench) -> None:
     assert bench.ran[1][-3:] == ["--resume", "--port", "/dev/ttyUSB7"]
 
 
-def test_wrong_axes_are_asked_again_and_a_missing_file_ends_it(
+def test_wrong_axes_are_asked_again(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        bench.sets_up("yaw", "y", "q")
+    assert "'yaw': only the letters y and p" in capsys.readouterr().out
+
+
+def test_a_step_that_all_others_need_is_asked_again(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(InputError, match="the other steps need this file"):
-        bench.sets_up("yaw", "y", "s")
-    assert "'yaw': only the letters y and p" in capsys.readouterr().out
+    assert bench.sets_up("yp", "s", "", "", "", "s", "s", "", "s") == WHOLE[:3]
+    said = capsys.readouterr().out
+    assert f"{bench.folder / 'found.toml'} is missing, and every later step needs it" in said
+
+
+def test_a_file_of_the_person_replaces_the_search(bench: Bench) -> None:
+    bench.folder.mkdir()
+    (bench.folder / "found.toml").write_text('name = "mine"\njoint_axes = "yy"\n')
+    assert bench.sets_up("", "s", "s", "s", "s", "s", "", "s") == []
+    assert load_robot(str(bench.folder / "robot.toml")).joint_axes == "yy"
+
+
+@pytest.mark.parametrize(
+    ("peak_a", "limit_a"),
+    [
+        (0.27, 0.54),
+        (1.5, 2.0),  # not above the robot's own limit, which is 2 A for an XM430
+        (None, 1.0),  # servos that report no current
+    ],
+)
+def test_the_first_motion_has_a_limit_from_its_rehearsal(
+    bench: Bench, peak_a: float | None, limit_a: float
+) -> None:
+    results = bench.folder / "rehearsal"
+    results.mkdir(parents=True)
+    (results / "summary.json").write_text(json.dumps({"peak_current_a": peak_a}))
+    bench.sets_up("", "", "s", "s", "s", "s", "", "")
+    assert f"run.safety.current_limit_a={limit_a:g}" in bench.ran[-1]
+
+
+def test_without_a_rehearsal_the_limit_is_half_of_the_robots(bench: Bench) -> None:
+    bench.sets_up("", "", "s", "s", "s", "s", "", "")
+    assert "run.safety.current_limit_a=1" in bench.ran[-1]
 
 
 def test_its_port_has_no_default() -> None:
@@ -143,8 +182,9 @@ def test_without_a_terminal_it_says_so(tmp_path: Path) -> None:
     assert "a terminal is missing" in said
 
 
-def test_each_command_of_it_exists() -> None:
-    state = RobotFiles(Path("snake"), "/dev/ttyUSB7", pose="udp:9870")
+def test_each_command_of_it_exists(tmp_path: Path) -> None:
+    state = RobotFiles(tmp_path, "/dev/ttyUSB7", pose="udp:9870")
+    state.robot.write_text('name = "found"\njoint_axes = "ypyp"\n')
     for step in STEPS:
         words = step.words(state)
         group = " ".join(words[: 1 if words[0] == "doctor" else 2])
