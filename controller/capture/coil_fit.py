@@ -13,7 +13,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Bytes, Floats, Ints
 from snakewalk.controller.capture.small_body.crop import bends_of
-from snakewalk.controller.capture.small_body.ribbon import bend_basis
+from snakewalk.controller.capture.small_body.ribbon import bend_basis, headings, summed
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, resized
 from snakewalk.controller.images.silhouette import Silhouette
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -150,10 +150,7 @@ def curve(values: Floats, length: float, middle: Floats, pieces: int = _DISCS - 
     places = (np.arange(pieces) + 0.5) / pieces
     basis = _BASIS if pieces == len(_BASIS) else bend_basis(places, COIL_BENDS)
     angle = basis @ values[3:]
-    step = np.column_stack([np.cos(angle), np.sin(angle)]) * (
-        length * float(np.exp(values[2])) / pieces
-    )
-    line = np.vstack([np.zeros((1, 2)), -np.cumsum(step, axis=0)])
+    line = summed(headings(angle)[0] * (length * float(np.exp(values[2])) / pieces))
     return np.asarray(line - line.mean(axis=0) + middle + values[:2])
 
 
@@ -161,10 +158,9 @@ def line_slopes(values: Floats, length: float) -> Floats:
     """(_DISCS, 2, PARAMETERS) derivatives of the discs' places by the values of a frame."""
     angle = _BASIS @ values[3:]
     size = length * float(np.exp(values[2])) / len(angle)
-    turned = np.stack([-np.sin(angle), np.cos(angle)], axis=1)[:, :, None] * _BASIS[:, None, :]
-    ahead = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None]
-    step = np.concatenate([ahead * size, turned * size], axis=2)
-    moved = np.concatenate([np.zeros((1, *step.shape[1:])), -np.cumsum(step, axis=0)])
+    ahead, aside = headings(angle)
+    turned = aside[:, :, None] * _BASIS[:, None, :]
+    moved = summed(np.concatenate([ahead[:, :, None], turned], axis=2) * size)
     moved = moved - moved.mean(axis=0)
     place = np.broadcast_to(np.eye(2), (_DISCS, 2, 2))
     return np.concatenate([place, moved], axis=2)

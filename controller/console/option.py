@@ -39,7 +39,6 @@ class Flag:
     """Completion of the value."""
     is_argument: bool = False
     """Whether the value has no name before it."""
-    shows_default: bool = True
 
 
 def numbers(form: str, *counts: int) -> BeforeValidator:
@@ -147,7 +146,6 @@ def _typer_info(name: str, field: FieldInfo, kind: Any) -> ParameterInfo:
         "help": description_of(field),
         "metavar": flag.metavar,
         "autocompletion": flag.complete,
-        "show_default": flag.shows_default,
     }
     if {int, float} & {kind, *get_args(kind)}:
         facts |= {"min": bounds.get("ge"), "max": bounds.get("le")}

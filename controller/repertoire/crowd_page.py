@@ -16,7 +16,7 @@ from snakewalk.controller.repertoire.crowd_film import MIDDLE, DetailedCrowd
 from snakewalk.controller.view.live_view import host_and_port
 from snakewalk.controller.view.page_server import served_model
 from snakewalk.controller.view.scene import draw_water, ground_hit_m, ground_mesh
-from snakewalk.drivers.clock import Clock, WallClock
+from snakewalk.drivers.clock import WallClock
 from snakewalk.sim.rendering.crowd_mesh import COLOURS, MESHES, TubeGrid
 
 _SAMPLES = 2500
@@ -141,12 +141,11 @@ def serve_crowd(
     ground: HeightField,
     frame_s: float,
     view_at: str,
-    clock: Clock | None = None,
 ) -> None:
     """Serve a crowd in real time until an interrupt."""
     page = CrowdPage(wandering, world, ground, *host_and_port(view_at))
     print(f"{page.url}  (^C ends)", flush=True)
-    clock = clock or WallClock()
+    clock = WallClock()
     due_s = clock.now_s()
     while True:
         due_s = max(due_s + FRAMES * frame_s, clock.now_s() - _LATE_S)

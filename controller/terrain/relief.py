@@ -13,7 +13,7 @@ from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.heightfield import HeightField
 from snakewalk.config.world import PlannerConfig
 from snakewalk.controller.terrain.keep_off import KeepOff
-from snakewalk.drivers.compiling import compiled, readonly_array
+from snakewalk.drivers.compiling import compiled, inlined, readonly_array
 
 EDGE_TOLERANCE_M = 1e-9
 """Distance beyond the margin at which a point still counts as on it."""
@@ -118,6 +118,20 @@ def interpolated(ground: HeightField, field: Floats, x_m: ArrayLike, y_m: ArrayL
     return values.reshape((*x.shape, *field.shape[2:]))
 
 
+@inlined
+def write_bilinear(layers: Floats, x: float, y: float, values: Floats) -> None:
+    """Write the values (k,) of layers (rows, columns, k) at one point, in samples."""
+    rows, columns, count = layers.shape
+    u = min(max(x, 0.0), columns - 1.0)
+    v = min(max(y, 0.0), rows - 1.0)
+    i, j = min(int(u), columns - 2), min(int(v), rows - 2)
+    fu, fv = u - i, v - j
+    for k in range(count):
+        low = layers[j, i, k] * (1.0 - fu) + layers[j, i + 1, k] * fu
+        high = layers[j + 1, i, k] * (1.0 - fu) + layers[j + 1, i + 1, k] * fu
+        values[k] = low * (1.0 - fv) + high * fv
+
+
 @compiled(
     f"void({readonly_array(dimensions=3, layout='C')}, float64, float64, float64,"
     f" {readonly_array(layout='C')}, {readonly_array(layout='C')}, float64[:, ::1])"
@@ -126,16 +140,8 @@ def _interpolate(
     layers: Floats, x0: float, y0: float, spacing: float, x: Floats, y: Floats, values: Floats
 ) -> None:
     """Write bilinear values (n, k) of layers (rows, columns, k) at n points."""
-    rows, columns, count = layers.shape
     for p in range(len(x)):
-        u = min(max((x[p] - x0) / spacing, 0.0), columns - 1.0)
-        v = min(max((y[p] - y0) / spacing, 0.0), rows - 1.0)
-        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
-        fu, fv = u - i, v - j
-        for k in range(count):
-            low = layers[j, i, k] * (1.0 - fu) + layers[j, i + 1, k] * fu
-            high = layers[j + 1, i, k] * (1.0 - fu) + layers[j + 1, i + 1, k] * fu
-            values[p, k] = low * (1.0 - fv) + high * fv
+        write_bilinear(layers, (x[p] - x0) / spacing, (y[p] - y0) / spacing, values[p])
 
 
 def elevation_variance_m2(ground: HeightField, radius_m: float) -> Floats:

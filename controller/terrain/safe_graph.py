@@ -25,6 +25,7 @@ from snakewalk.controller.terrain.relief import (
     fitted_gradient,
     interpolated,
     windowed_mean,
+    write_bilinear,
 )
 from snakewalk.drivers.compiling import compiled, readonly_array
 
@@ -336,20 +337,13 @@ def _weigh(
         risk: (n,) out.
 
     """
-    rows, columns, count = layers.shape
     x0, y0, spacing = grid
     west, south, east, north = within
     uneven, level_m, near_m, side_m, climb_m, limit = weights
-    field = np.empty(count)
+    field = np.empty(layers.shape[2])
     for k in range(len(points)):
         x, y, dx, dy = points[k, 0] - x0, points[k, 1] - y0, direction[k, 0], direction[k, 1]
-        u, v = min(max(x / spacing, 0.0), columns - 1.0), min(max(y / spacing, 0.0), rows - 1.0)
-        i, j = min(int(u), columns - 2), min(int(v), rows - 2)
-        fu, fv = u - i, v - j
-        for m in range(count):
-            low = layers[j, i, m] * (1.0 - fu) + layers[j, i + 1, m] * fu
-            high = layers[j + 1, i, m] * (1.0 - fu) + layers[j + 1, i + 1, m] * fu
-            field[m] = low * (1.0 - fv) + high * fv
+        write_bilinear(layers, x / spacing, y / spacing, field)
         up = (field[2] * dx + field[3] * dy) / limit
         across = field[4] * dy * dy - 2.0 * field[5] * dx * dy + field[6] * dx * dx
         side = max(across, 0.0) / (limit * limit)

@@ -53,12 +53,22 @@ def bend_basis(place: Floats, bends: int = BENDS) -> Floats:
     return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
 
 
+def headings(angle: Floats) -> tuple[Floats, Floats]:
+    """(P, 2) unit vectors along tangent angles (P,), and to their left."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c, s], axis=1), np.stack([-s, c], axis=1)
+
+
+def summed(steps: Floats) -> Floats:
+    """(P + 1, ...) places from the head backwards, for steps (P, ...) towards the head."""
+    return np.concatenate([np.zeros_like(steps[:1]), -np.cumsum(steps, axis=0)])
+
+
 def curve_of(frame: Floats, length: float, pieces: int = 400) -> Floats:
     """(pieces + 1, 2) the body's middle line, head first, equal arcs."""
     middle = (np.arange(pieces) + 0.5) / pieces
     angle = bend_basis(middle) @ frame[2 : 2 + BENDS]
-    step = np.column_stack([np.cos(angle), np.sin(angle)]) * (length / pieces)
-    line = np.vstack([np.zeros((1, 2)), -np.cumsum(step, axis=0)])
+    line = summed(headings(angle)[0] * (length / pieces))
     return np.asarray(line - 0.5 * (line[1:] + line[:-1]).mean(axis=0) + frame[:2])
 
 
@@ -66,11 +76,9 @@ def curve_slopes(frame: Floats, length: float, pieces: int = 40) -> Floats:
     """(pieces + 1, 2, 2 + BENDS + 1) derivatives of the line by x, y, bends and the length."""
     middle = (np.arange(pieces) + 0.5) / pieces
     basis = bend_basis(middle)
-    angle = basis @ frame[2 : 2 + BENDS]
-    turned = np.stack([-np.sin(angle), np.cos(angle)], axis=1)[:, :, None] * basis[:, None, :]
-    ahead = np.stack([np.cos(angle), np.sin(angle)], axis=1)[:, :, None]
-    step = np.concatenate([turned * (length / pieces), ahead / pieces], axis=2)
-    line = np.concatenate([np.zeros((1, *step.shape[1:])), -np.cumsum(step, axis=0)])
+    ahead, aside = headings(basis @ frame[2 : 2 + BENDS])
+    turned = aside[:, :, None] * basis[:, None, :]
+    line = summed(np.concatenate([turned * (length / pieces), ahead[:, :, None] / pieces], axis=2))
     line = line - 0.5 * (line[1:] + line[:-1]).mean(axis=0)
     place = np.broadcast_to(np.eye(2), (pieces + 1, 2, 2))
     return np.concatenate([place, line], axis=2)
