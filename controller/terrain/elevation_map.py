@@ -208,7 +208,9 @@ class LaplaceSystem:
         border_sum = np.zeros((count, values.shape[-1]))
         pairs = []
         for axis in (0, 1):
-            cells, is_given, sides = (grid.swapaxes(0, axis) for grid in (index, given, values))
+            cells = index.swapaxes(0, axis)
+            is_given = given.swapaxes(0, axis)
+            sides = values.swapaxes(0, axis)
             below, above = cells[:-1], cells[1:]
             for inner, beside in ((below, np.s_[1:]), (above, np.s_[:-1])):
                 edge = (inner >= 0) & is_given[beside]

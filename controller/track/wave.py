@@ -32,7 +32,7 @@ _ZOOMS = 3
 _COMPONENTS = 4
 
 
-class Pattern(NamedTuple):
+class WavePattern(NamedTuple):
     """The strongest travelling pattern of runs of frames."""
 
     turns_a_frame: float
@@ -45,7 +45,7 @@ class Pattern(NamedTuple):
     """Curvature (T, N) of the runs that were used."""
 
 
-def pattern_of_runs(number: Ints, curvature: Floats) -> Pattern:
+def pattern_of_runs(number: Ints, curvature: Floats) -> WavePattern:
     """Fit one travelling wave to curvature (T, N) of frames (T,)."""
     mean = curvature.mean(axis=0)
     components = _components(curvature - mean)
@@ -66,7 +66,7 @@ def pattern_of_runs(number: Ints, curvature: Floats) -> Pattern:
         for phasor in (signal @ mode.conj() for signal in signals)
     )
     turns = _refined_frequency(number, [run for run, _ in used], components, first)
-    return Pattern(
+    return WavePattern(
         float(np.copysign(turns, np.angle(sense))),
         np.asarray(mode),
         float(values[-1] / max(float(values.sum()), 1e-300)),
@@ -226,13 +226,13 @@ def _even_angles_rad(track: Track) -> Floats:
     return np.stack([np.interp(even, track.time_s, column) for column in track.angles_rad.T]).T
 
 
-def _pattern(curvature: Floats) -> Pattern:
+def _pattern(curvature: Floats) -> WavePattern:
     """Fit one travelling wave to curvature (T, N) without a gap."""
     analytic = analytic_signal(curvature - curvature.mean(axis=0))
     energy, modes = np.linalg.eigh(analytic.T @ analytic.conj())
     mode = modes[:, -1]
     share = float(energy[-1] / max(energy.sum(), 1e-300))
-    return Pattern(_turns_a_frame(analytic @ mode.conj()), mode, share, [curvature])
+    return WavePattern(_turns_a_frame(analytic @ mode.conj()), mode, share, [curvature])
 
 
 def _slope(mode: Complexes) -> float:
