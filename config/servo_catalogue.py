@@ -57,7 +57,7 @@ def servo_model(name_or_path: str, folder: Path | None = None) -> ServoModel:
     return _shipped_model(path.stem) if path.parent == FOLDER else _read(path)
 
 
-def model_file(name_or_path: str, start_folder: Path | None = None) -> Path | None:
+def model_file(name_or_path: str, start_folder: Path | None) -> Path | None:
     """File of a model by the rules of ``servo_model``, or None."""
     folders = [] if start_folder is None else [start_folder]
     if name_or_path.endswith(".toml"):

@@ -283,8 +283,8 @@ def examine_segments(
     robot: RobotConfig,
     run: RunConfig,
     *,
-    wiggle: bool = False,
-    on_progress: OnStep = lambda _: None,
+    wiggle: bool,
+    on_progress: OnStep,
 ) -> list[Finding]:
     """Findings about the ports of a chain's segments, each with its port's name; as ``examine``.
 

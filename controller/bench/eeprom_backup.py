@@ -79,9 +79,7 @@ def back_up(
     return BackupFile(servos=tuple(servos))
 
 
-def back_up_all(
-    lines: PortLines, on_progress: Callable[[str], None] = lambda step: None
-) -> BackupFile:
+def back_up_all(lines: PortLines, on_progress: Callable[[str], None]) -> BackupFile:
     """Read every servo on every line; raises as ``back_up``.
 
     Raises:

@@ -54,7 +54,7 @@ class RobotFiles:
         """Return the current limit of the first motion: from its rehearsal, or of the robot."""
         robot_a = load_robot(str(self.robot)).over_current_a
         summary = self.folder / _REHEARSAL / "summary.json"
-        peak_a = read_json_object(summary).get("peak_current_a") if summary.exists() else None
+        peak_a = summary.exists() and read_json_object(summary).get("peak_current_a")
         limit_a = _REHEARSED_SHARE * peak_a if peak_a else _UNREHEARSED_SHARE * robot_a
         return round(min(limit_a, robot_a), 2)
 
@@ -186,8 +186,9 @@ class GuidedSetup:
                 self._done.append(step.name)
             else:
                 del self._done[-1:]
-            text = json.dumps({"port": self.files.port, "done": self._done})
-            write_result(self._file, f"{text}\n")
+            write_result(
+                self._file, json.dumps({"port": self.files.port, "done": self._done}) + "\n"
+            )
 
     def _run_step(self, step: SetupStep) -> bool:
         """Run the step's command until it succeeds or is skipped; False: back to the last step."""

@@ -43,8 +43,8 @@ class InventoryEntry:
 def take_inventory(
     port: BytePort,
     latency_s: float,
-    bauds: Sequence[int] = (),
-    on_progress: Callable[[str], None] = lambda step: None,
+    bauds: Sequence[int],
+    on_progress: Callable[[str], None],
 ) -> list[InventoryEntry]:
     """Look for servos at each baud rate and read their state; changes nothing in them.
 
@@ -77,7 +77,7 @@ def _state(port: BytePort, latency_s: float, servo: ScanResult) -> ServoReport |
 def robot_skeleton(
     name: str,
     entries: Sequence[InventoryEntry],
-    segments: Sequence[tuple[str, Sequence[int]]] = (),
+    segments: Sequence[tuple[str, Sequence[int]]],
     *,
     axes: str,
 ) -> str:

@@ -335,7 +335,7 @@ def unshared(servo_ids: Sequence[int], probes: Sequence[Probe]) -> list[int]:
 
 
 def read_clocks(
-    bus: DynamixelBus, servo_ids: Sequence[int], patience_s: float = 0.0
+    bus: DynamixelBus, servo_ids: Sequence[int], patience_s: float
 ) -> dict[int, ServoClock]:
     """Clock of each servo that has one and replies; the others are asked for ``patience_s``.
 

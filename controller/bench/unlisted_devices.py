@@ -158,7 +158,7 @@ def unlisted(
     latency_s: float,
     *,
     noisy: bool,
-    protocol: int | str = 2,
+    protocol: int | str,
 ) -> list[Finding]:
     """Findings about devices that replied and are not the robot's: presence, IDs, alarms, torque.
 

@@ -167,7 +167,7 @@ class DeviceCamera:
 
 
 def overhead_detector(
-    run: RunConfig, robot: RobotConfig, ground: HeightField | None = None
+    run: RunConfig, robot: RobotConfig, ground: HeightField | None
 ) -> OverheadDetector:
     """Build the detector of a real camera from the run's table, above known ground.
 

@@ -45,7 +45,7 @@ def floor_prints(camera: CameraConfig) -> list[FloorPrint]:
 
 
 def top_view(
-    run: RunConfig, robot: RobotConfig, world: WorldConfig, ground: HeightField | None = None
+    run: RunConfig, robot: RobotConfig, world: WorldConfig, ground: HeightField | None
 ) -> TopView:
     """Return the view of the simulator's camera."""
     camera = run.camera
@@ -53,7 +53,7 @@ def top_view(
 
 
 def rendered_detector(
-    run: RunConfig, robot: RobotConfig, floor: Image, ground: HeightField | None = None
+    run: RunConfig, robot: RobotConfig, floor: Image, ground: HeightField | None
 ) -> OverheadDetector:
     """Build the detector of the simulator's camera from a picture (H, W, 3) of the empty floor.
 

@@ -111,7 +111,7 @@ def skeleton_of(mask: Bools) -> Skeleton:
 def skeleton_of_level(
     level: Level,
     threshold: float,
-    origin_px: tuple[float, float] = (0.0, 0.0),
+    origin_px: tuple[float, float],
     noise_level: float = 0.0,
     *,
     grey: bool = True,

@@ -54,7 +54,7 @@ def read_geo_raster(
     file: Path,
     units: ElevationChoice,
     crop: Crop | None,
-    spacing_of: Callable[[float, float], float] | None = None,
+    spacing_of: Callable[[float, float], float] | None,
 ) -> Raster:
     """Read a GeoTIFF or an ASCII grid, or its part within a crop.
 

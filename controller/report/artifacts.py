@@ -78,7 +78,7 @@ def _write_page(
     film: Path | None,
     numbers: RunSummary,
     drawn: Drawings,
-    folders: bool = False,
+    folders: bool,
 ) -> Path:
     shown = None if film is None else film_on_page(film, out_dir, *film_times(record))
     html = page(

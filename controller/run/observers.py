@@ -178,7 +178,7 @@ class Observers:
         return progressed
 
 
-def open_observer(name: str, argument: str = "") -> AbstractContextManager[Any]:
+def open_observer(name: str, argument: str) -> AbstractContextManager[Any]:
     """Return the observer of a plug-in.
 
     Raises:

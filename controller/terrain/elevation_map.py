@@ -212,10 +212,10 @@ class LaplaceSystem:
             is_given = given.swapaxes(0, axis)
             sides = values.swapaxes(0, axis)
             below, above = cells[:-1], cells[1:]
-            for inner, beside in ((below, np.s_[1:]), (above, np.s_[:-1])):
-                edge = (inner >= 0) & is_given[beside]
+            for inner, neighbours in ((below, np.s_[1:]), (above, np.s_[:-1])):
+                edge = (inner >= 0) & is_given[neighbours]
                 np.add.at(border_count, inner[edge], 1.0)
-                np.add.at(border_sum, inner[edge], sides[beside][edge])
+                np.add.at(border_sum, inner[edge], sides[neighbours][edge])
             both = (below >= 0) & (above >= 0)
             pairs.append(np.stack([below[both], above[both]]))
         return cls(border_count, border_sum, *np.concatenate(pairs, axis=1))

@@ -41,7 +41,7 @@ class IdentifiedRead:
         """(J,) angles; arguments and errors as ``positions_and_goals``."""
         return self.positions_and_goals(reads, ask_again=ask_again)[0]
 
-    def positions_and_goals(self, reads: int, *, ask_again: bool = False) -> tuple[Floats, Floats]:
+    def positions_and_goals(self, reads: int, *, ask_again: bool) -> tuple[Floats, Floats]:
         """(J,) angles, rad, and (J,) raw goals; NaN for joints that are not identified.
 
         ``ask_again`` asks the remaining servos one by one.

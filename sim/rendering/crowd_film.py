@@ -129,7 +129,7 @@ def render_crowd(
     *,
     fps: int,
     size_px: tuple[int, int],
-    on_frame: Callable[[int], None] = lambda done: None,
+    on_frame: Callable[[int], None],
 ) -> int:
     """Write shots as an MP4; return their number."""
     done = 0

@@ -52,8 +52,8 @@ def render_film(
     qpos: ArrayLike,
     path: Path,
     *,
-    style: Style = Style(),
-    marks: Marks | None = Marks(),
+    style: Style,
+    marks: Marks | None,
     on_frame: Callable[[int, int], None] | None = None,
 ) -> int:
     """Write an MP4 (H.264 if PyAV has it) of ``qpos`` (T, 7 + J) at ``time_s`` (T,), increasing.
@@ -209,7 +209,7 @@ class _Stage:
         return surface_points_m(corners, self._faces)
 
 
-def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int = 1) -> Floats:
+def poses_at(time_s: Floats, qpos: Floats, at_s: Floats, bodies: int) -> Floats:
     """Poses (F, 7 + J) at ``at_s``, linear between the recorded ones; quaternions stay unit.
 
     The first ``bodies`` groups of seven columns are place and quaternion of a floating body.

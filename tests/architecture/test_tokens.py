@@ -80,6 +80,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.track": (16_150, "0267-facts-of-a-file-have-sources.md"),
     "controller.metrics": (6_640, "0262-a-slide-is-judged-by-the-slope-under-it.md"),
     "controller.capture": (29_550, "0305-keypoints-as-the-detector.md"),
+    "controller.studies": (20_650, "0358-identify-in-three-files.md"),
     "controller.cli": (2_830, "0353-missing-files-have-near-names.md"),
 }
 """A larger limit of a package, and the file of the decision that names what left in exchange."""

@@ -84,7 +84,7 @@ class PieceGraph:
         return np.flatnonzero(speed_gap <= speed_gap.min() + 1e-12).tolist(), False
 
 
-def speed_classes(begin: Floats, end: Floats, classes: int = CLASSES) -> tuple[Ints, Ints]:
+def speed_classes(begin: Floats, end: Floats, classes: int) -> tuple[Ints, Ints]:
     """Classes of equal width from 0 to the largest speed that occurs, for both ends."""
     top = max(float(begin.max(initial=0.0)), float(end.max(initial=0.0)), 1e-12)
     return tuple(  # type: ignore[return-value]

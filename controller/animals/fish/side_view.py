@@ -25,9 +25,7 @@ class SideCamera:
     """Column of the side view where the top view has column 0."""
 
 
-def align(
-    top: list[SilhouetteFrame], side: list[SilhouetteFrame], name: str = "side film"
-) -> SideCamera:
+def align(top: list[SilhouetteFrame], side: list[SilhouetteFrame], name: str) -> SideCamera:
     """Fit scale and offset to where the silhouettes begin and end along x in both views.
 
     Raises:

@@ -89,9 +89,7 @@ def open_film(path: Path, background: Path | None = None, rate_hz: float | None 
     return FishFilm(footage, detector, some[0].shape)
 
 
-def silhouette_frame(
-    image: Image, background: Image, polarity: Polarity = Polarity.BOTH
-) -> SilhouetteFrame:
+def silhouette_frame(image: Image, background: Image, polarity: Polarity) -> SilhouetteFrame:
     """Cut the fish out of one frame; the mask is empty where nothing stands out.
 
     A tail fin seen on edge is thinner than the blur of the picture and has not half the body's

@@ -33,7 +33,7 @@ LOG_FPS = 25.0
 """Frames a second that are used of a log."""
 
 
-def animated(skin: Skin, source: str, fps: float | None = None) -> tuple[Skin, BoneMotion]:
+def animated(skin: Skin, source: str, fps: float | None) -> tuple[Skin, BoneMotion]:
     """Size a skin to the body that moves, and stand it on the ground.
 
     Args:

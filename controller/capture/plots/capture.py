@@ -250,7 +250,7 @@ def overlay_film(
     path: Path,
     frames: Iterable[DeepImage],
     animals: Sequence[Capture],
-    on_progress: Callable[[], None] = lambda: None,
+    on_progress: Callable[[], None],
 ) -> None:
     """The recording with the skeletons on it, every frame with its number and status.
 

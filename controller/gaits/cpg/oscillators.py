@@ -83,9 +83,7 @@ class Cpg:
         self._slow = Damped.start(state, np.zeros_like(state), state, 1.0)
         self._clock = Damped.start(still, still, still, 1.0)
 
-    def set_pattern(
-        self, pattern: Pattern, gain: float = 6.0, clock_gain: float | None = None
-    ) -> None:
+    def set_pattern(self, pattern: Pattern, gain: float, clock_gain: float | None = None) -> None:
         """Change to another pattern; amplitudes settle within about ``10 / gain`` seconds."""
         value, rate = self._slow.at(self._t_s)
         omega, omega_rate = self._clock.at(self._t_s)

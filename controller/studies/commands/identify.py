@@ -14,7 +14,7 @@ from snakewalk.controller.studies.commands.identify_friction import (
     identify_friction,
 )
 from snakewalk.controller.studies.commands.identify_servo import (
-    Search,
+    FitOptions,
     identify_servo,
     robot_file,
 )
@@ -105,5 +105,5 @@ def identify(
     robot_to_write = robot_file(robot, robot_out)
     if backlash and not fit:
         raise InputError("--backlash: needs a fit; remove --no-fit")
-    search = Search(start, seed, fit=fit, backlash=backlash)
+    search = FitOptions(start, seed, fit=fit, backlash=backlash)
     identify_servo(logs, judge, search, out, robot_to_write, force=force, as_json=as_json)

@@ -44,7 +44,7 @@ class RobotFile(NamedTuple):
     out: Path
 
 
-class Search(NamedTuple):
+class FitOptions(NamedTuple):
     """Constants to begin with, and which of them to fit."""
 
     start: Path | None
@@ -70,7 +70,7 @@ def robot_file(robot: str | None, out: Path | None) -> RobotFile | None:
 def identify_servo(
     logs: list[Path],
     judge: list[Path],
-    search: Search,
+    search: FitOptions,
     out: Path | None,
     robot: RobotFile | None,
     *,
