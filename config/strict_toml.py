@@ -13,7 +13,7 @@ from pydantic_core import PydanticSerializationError, to_json
 
 from snakewalk.config.archive import read_text
 from snakewalk.config.errors import ConfigError
-from snakewalk.config.value_faults import given, in_words
+from snakewalk.config.value_faults import given, in_words, unit_hint
 
 M = TypeVar("M", bound=BaseModel)
 Schemas = Callable[[], Mapping[str, type[BaseModel]]]
@@ -171,5 +171,5 @@ def _line(
     if number is not None:
         path = f"{path}:{number}"
     hint = _key_hint(model, str(loc[-1]), others) if fault["type"] == "extra_forbidden" else ""
-    text_of = in_words(fault, hint) + given(fault)
+    text_of = in_words(fault, hint) + given(fault) + unit_hint(fault)
     return f"{path}: {where}: {text_of}" if where else f"{path}: {text_of}"

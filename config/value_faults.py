@@ -9,6 +9,8 @@ _NOT_IN_NAMES = r"/\\\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2
 NAME_PATTERN = f"^[^.{_NOT_IN_NAMES}][^{_NOT_IN_NAMES}]*$"
 STOP_OUTPUT_PATTERN = r"^(-?(rts|dtr):.+|command:/.+)$"
 MARK_PATTERN = "^(set|fixed|usual|kept|ignored: .+)$"
+_USUAL_UNITS = {"rad": ("degrees", math.pi / 180.0), "m": ("mm", 1e-3)}
+"""Units of keys: a unit that people often use instead, and its size."""
 PATTERNS_IN_WORDS = {
     MARK_PATTERN: "must be set, fixed, usual, kept, or ignored: REASON",
     NAME_PATTERN: "holds '/', a control character or a leading dot",
@@ -78,6 +80,18 @@ def given(fault: dict[str, Any]) -> str:
     """Return the rejected value in brackets, if it fits into a line."""
     value = fault.get("input")
     return f" (got {value!r})" if isinstance(value, int | float | str | bool) else ""
+
+
+def unit_hint(fault: dict[str, Any]) -> str:
+    """Hint on a value that is too large, but allowed in the unit that people often use."""
+    context = fault.get("ctx", {})
+    most = context.get("le", context.get("lt"))
+    unit = next(key for key in reversed(("", *fault["loc"])) if isinstance(key, str))[-4:]
+    usual, factor = _USUAL_UNITS.get(unit.rpartition("_")[2], ("", math.inf))
+    value = fault.get("input")
+    if most is None or not isinstance(value, int | float) or abs(value * factor) > most:
+        return ""
+    return f"; {value:g} {usual} are {value * factor:.4g}"
 
 
 def _pattern_in_words(pattern: str) -> str:

@@ -68,7 +68,7 @@ RAISED: Final[dict[str, tuple[int, str]]] = {
     "controller.bench": (22_800, "0257-a-pendulum-is-a-chain-of-one-joint.md"),
     "controller.mechanics": (10_000, "0194-the-law-of-friction-is-chosen.md"),
     "controller.images": (15_150, "0264-one-place-decides-about-units.md"),
-    "config": (21_080, "0353-missing-files-have-near-names.md"),
+    "config": (21_120, "0359-a-value-in-another-unit-is-named.md"),
     "controller.mapping": (21_010, "0283-poses-from-both-depths.md"),
     "controller.motion": (10_300, "0267-facts-of-a-file-have-sources.md"),
     "controller.pose": (8_550, "0243-a-known-motion-calibrates-a-source.md"),

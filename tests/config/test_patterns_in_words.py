@@ -1,6 +1,7 @@
 """Each pattern of a schema is described by words in the message for a text that does not match."""
 
 import json
+import math
 import re
 
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from snakewalk.config.robot import RobotConfig
 from snakewalk.config.run import RunConfig
 from snakewalk.config.servo_model import ServoModel
-from snakewalk.config.value_faults import _pattern_in_words
+from snakewalk.config.value_faults import _pattern_in_words, unit_hint
 from snakewalk.config.world import WorldConfig
 
 
@@ -38,3 +39,18 @@ def test_every_pattern_of_a_file_has_words(
     }
     assert patterns
     assert [each for each in patterns if _pattern_in_words(each).startswith("must match")] == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "hint"),
+    [
+        ("limit_rad", 80, "; 80 degrees are 1.396"),
+        ("limit_rad", 800, ""),  # too large in degrees, too
+        ("length_m", 64.0, "; 64 mm are 0.064"),
+        ("mass_kg", 64.0, ""),
+        ("length_m", math.inf, ""),
+    ],
+)
+def test_a_value_in_another_unit_is_named(key: str, value: float, hint: str) -> None:
+    fault = {"loc": ("joints", key, 0), "input": value, "ctx": {"le": 3.1}}
+    assert unit_hint(fault) == hint

@@ -191,6 +191,12 @@ ROWS = [
     ("run -", "-: no such run; shipped are"),
     ("run flat-square --set world.name=../x", "world flat: name: holds '/'"),
     ("run flat-square --set run.cycle_hz=100000", "cycle_hz: must be at most 1000"),
+    (
+        "plan flat-square --set robot.yaw_limit_rad=80",
+        "must be at most 3.1 (got 80); 80 degrees are 1.396",
+    ),
+    ("plan flat-square --set run.start_m=[2000,1]", "(got 2000); 2000 mm are 2"),
+    ("gait show lateral-undulation -p winding_rad=40", "40 degrees are 0.6981"),
     ("plan same.toml", "waypoints_m: no waypoint leads farther than 1 cm from start (0.00, 0.00)"),
     ("plan nan.toml", "nan.toml:2: waypoints_m.0.0: must be a finite number (got nan)"),
     ("plan flat-square --robot many.toml", "servo IDs would run to 600; the bus has 0 to 252"),
