@@ -78,6 +78,7 @@ def remedy(options: CaptureOptions) -> str | None:
     footage = open_footage(options.recording, options.rate_hz)
     step = max(1, min(round(footage.rate_hz / _TRIALS_HZ), footage.count // _FRAMES))
     frames = list(map(in_8_bits, islice(footage.read(), 0, _FRAMES * step, step)))
+    LOGGER.info("%s: trying other options on %d frames", options.recording, len(frames))
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         (scratch / "frames").mkdir()

@@ -76,10 +76,14 @@ def test_the_command_that_captures_more_is_printed_with_its_contact_sheet(
 
 
 @pytest.mark.slow
-def test_a_film_that_no_option_helps_names_none(tmp_path: Path) -> None:
+def test_a_film_that_no_option_helps_names_none(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO")
     blank = (np.full((60, 80), 128, np.uint8) for _ in range(20))
     options = folder_of(blank, tmp_path)
     assert remedy(options) is None
+    assert "film: trying other options on 20 frames" in caplog.text
     assert not (tmp_path / "t-tried.png").exists()
 
 
