@@ -63,11 +63,11 @@ def identities_in(images: list[Image]) -> list[Identity]:
     """Identities of a film."""
     some = images[:: max(1, len(images) // _SAMPLE)]
     detector = detector_of_several(some)
-    sample = [blobs_of(one, detector.ground_of(one), detector) for one in some]
+    sample = [blobs_of(one, detector) for one in some]
     usual = usual_area(sample)
     builder = TrackletBuilder(usual)
     for image in images:
-        builder.add(blobs_of(image, detector.ground_of(image), detector, usual))
+        builder.add(blobs_of(image, detector, usual))
     return identities_of(builder.done())
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Floats
 from snakewalk.controller.capture.detections import Detections
-from snakewalk.controller.capture.staged_film import StagedFilm
+from snakewalk.controller.capture.staged_film import StagedFilm, arrays_of
 from snakewalk.controller.capture.stages.head import GROUPS, contrast_along, head_signs
 from snakewalk.controller.capture.stages.outlier_frames import Compare
 from snakewalk.controller.images.body_detector import make_detector
@@ -82,12 +82,13 @@ def measured(scene: SnakeScene, midlines_px: Floats) -> dict[str, tuple[float, f
     used = [k for k, skeleton in enumerate(seen.skeletons) if skeleton.status.has_points]
     if len(used) < len(frames) // 2:
         return {}
-    wrong = swapped(seen.points_px[used[0]], midlines_px[used[0]])
+    shown = arrays_of(seen.skeletons)
+    wrong = swapped(shown["points_px"][used[0]], midlines_px[used[0]])
     turn = slice(None, None, -1 if wrong else 1)
     contrast = contrast_along(seen.skeletons, detections.store)
     return head_signs(
-        seen.points_px[:, turn],
-        seen.radius_px[:, turn],
+        shown["points_px"][:, turn],
+        shown["radius_px"][:, turn],
         contrast[:, turn],
         scene.rate_hz,
         fixed=True,

@@ -16,6 +16,7 @@ from snakewalk.config.arrays import Bools, Floats, Singles
 from snakewalk.config.robot import RobotConfig
 from snakewalk.controller.cameras.markers.floor_markers import Bump
 from snakewalk.controller.images.compression import Compression
+from snakewalk.controller.images.cross_profile import values_at
 from snakewalk.drivers.attitude import about_up
 from snakewalk.drivers.least_squares import least_squares
 
@@ -106,12 +107,7 @@ class StandingOut:
 
     def at(self, places_m: Floats) -> Floats:
         """(...,) share at places (..., 2)."""
-        px = (self.to_px(places_m) - self.origin_px).astype(np.float32)
-        flat = px.reshape(-1, 1, 2)
-        values = cv2.remap(
-            self.share, flat[..., 0], flat[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
-        )
-        return np.asarray(values, dtype=float).reshape(places_m.shape[:-1])
+        return values_at(self.share, self.to_px(places_m) - self.origin_px)
 
 
 def track_pose(
@@ -275,8 +271,7 @@ def _fit_tips(
         if look.sections.sum() < 3:
             break
         size = np.abs(look.target)
-        usual = max(1.0, 1.4826 * float(np.median(size)))
-        weight = np.sqrt(1.0 / np.maximum(1.0, size / (1.5 * usual)))
+        weight = np.sqrt(_huber_weights(size))
         step = least_squares(look.rows * weight[:, None], look.target * weight, _REGULAR)
         shift = shift + step[:2]
         turn = turn + float(step[2])
@@ -308,11 +303,16 @@ def _fit_tips(
     return replace(tracked, fault=str(blocks)) if is_inaccurate else tracked
 
 
+def _huber_weights(size: Floats) -> Floats:
+    """(N,) weights of errors of some sizes (N,)."""
+    usual = max(1.0, 1.4826 * float(np.median(size)))
+    return 1.0 / np.maximum(1.0, size / (1.5 * usual))
+
+
 def _covariance(robot: RobotConfig, look: _Comparison, head_m: Floats, alike: float) -> Floats:
     """(3, 3) of the head at ``head_m`` from the middle of the sections."""
     size = np.abs(look.target)
-    usual = max(1.0, 1.4826 * float(np.median(size))) if size.size else 1.0
-    weight = 1.0 / np.maximum(1.0, size / (1.5 * usual))
+    weight = _huber_weights(size) if size.size else size
     information = look.rows.T @ (look.rows * weight[:, None]) + np.diag(1.0 / np.square(_UNKNOWN))
     spread = float((weight * size * size).sum()) / max(float(weight.sum()), 1e-9)
     middle = max(1.0, spread) * alike * np.linalg.inv(information)

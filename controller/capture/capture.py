@@ -12,9 +12,8 @@ from snakewalk.config.archive import read_arrays
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.detections import Detections
-from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.image_file import scaled
-from snakewalk.controller.capture.staged_film import StagedFilm
+from snakewalk.controller.capture.staged_film import StagedFilm, arrays_of
 from snakewalk.controller.capture.stages.pipeline import stages
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
@@ -27,6 +26,7 @@ _OF_FRAMES = (
     "company",
     "time_s",
 )  # arrays (T,) of a file
+_OF_FILM = ("rate_hz", "m_per_px", "head_sure", "rate_assumed", "places_recorded")  # single values
 _STILL_BODY = 0.02  # of the length: a smaller change does not count as motion
 
 
@@ -171,13 +171,9 @@ def captured_from(
 def _captured(film: StagedFilm) -> Capture:
     score, by = film.head
     return Capture(
-        points_px=film.points_px,
-        radius_px=film.radius_px,
-        length_px=film.length_px,
-        status=tuple(skeleton.status for skeleton in film.skeletons),
+        **arrays_of(film.skeletons),
         expected_px=film.expected_px,
         distractors=np.array(film.detections.distractors),
-        margin=margins(film.skeletons),
         rate_hz=film.rate_hz,
         time_s=np.arange(len(film.skeletons)) / film.rate_hz,
         head_by=by,
@@ -270,12 +266,12 @@ def load_capture(path: Path) -> CaptureFile:
     except ValueError:
         raise InputError(f"{path}: is no .npz; give a track that `animal capture` wrote") from None
     frames = len(arrays["verdict"]) if "verdict" in arrays and arrays["verdict"].ndim == 1 else 0
-    shapes: dict[str, tuple[int, ...]] = {}
-    shapes |= dict.fromkeys(_OF_FRAMES, (frames,))
-    shapes |= dict.fromkeys(
-        ("rate_hz", "m_per_px", "head_sure", "rate_assumed", "places_recorded"), ()
-    )
-    shapes |= {"points_px": (frames, SEGMENTS + 1, 2), "radius_px": (frames, SEGMENTS + 1)}
+    shapes: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(_OF_FRAMES, (frames,)),
+        **dict.fromkeys(_OF_FILM, ()),
+        "points_px": (frames, SEGMENTS + 1, 2),
+        "radius_px": (frames, SEGMENTS + 1),
+    }
     verdicts = {*map(str, FrameStatus)}
     is_complete = (
         frames > 0

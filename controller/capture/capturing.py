@@ -47,6 +47,7 @@ from snakewalk.controller.images.body_detector import (
     stands_out_both_ways,
 )
 from snakewalk.controller.images.region import WHOLE
+from snakewalk.controller.images.resting import with_neighbours
 from snakewalk.controller.images.video import Footage, in_8_bits
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.controller.track.track import UNSURE_HEAD
@@ -320,11 +321,12 @@ def _captured_parts(
     bar.update(first)
     kept = nullcontext() if parts.folder is None else parts.folder.kept_if_interrupted()
     with kept:
-        for frame in film.frames(first):
-            detection = detector.detect(frame)
+        shown = with_neighbours(film.frames, first)
+        for number, (frame, neighbours) in enumerate(shown, start=first):
+            detection = detector.detect(frame, neighbours=neighbours)
             if film.keypoints is not None:
-                detection = film.keypoints.placed(detection, len(film.stated_s) - 1)
-            parts.add(frame, detection, film.stated_s[-1])
+                detection = film.keypoints.placed(detection, number)
+            parts.add(frame, detection, film.stated_s[number])
             bar.advance()
     return parts.done()
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from snakewalk.config.arrays import Bytes, Floats, Ints
 from snakewalk.controller.capture.small_body.crop import bends_of
-from snakewalk.controller.capture.small_body.ribbon import bend_basis, headings, summed
+from snakewalk.controller.capture.small_body.ribbon import headings, summed
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, resized
 from snakewalk.controller.images.silhouette import Silhouette
+from snakewalk.controller.images.thin_body_fit import spline_basis
 from snakewalk.controller.track.frame_status import FrameStatus
 from snakewalk.drivers.compiling import compiled
 
@@ -142,13 +143,13 @@ class CoilBody:
         return np.concatenate([off, [size], bends])
 
 
-_BASIS = bend_basis((np.arange(_DISCS - 1) + 0.5) / (_DISCS - 1), COIL_BENDS)
+_BASIS = spline_basis((np.arange(_DISCS - 1) + 0.5) / (_DISCS - 1), COIL_BENDS)
 
 
 def curve(values: Floats, length: float, middle: Floats, pieces: int = _DISCS - 1) -> Floats:
     """(pieces + 1, 2) the line of a frame's values; ``middle`` (2,) of its silhouette."""
     places = (np.arange(pieces) + 0.5) / pieces
-    basis = _BASIS if pieces == len(_BASIS) else bend_basis(places, COIL_BENDS)
+    basis = _BASIS if pieces == len(_BASIS) else spline_basis(places, COIL_BENDS)
     angle = basis @ values[3:]
     line = summed(headings(angle)[0] * (length * float(np.exp(values[2])) / pieces))
     return np.asarray(line - line.mean(axis=0) + middle + values[:2])

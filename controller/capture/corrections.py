@@ -17,7 +17,7 @@ from snakewalk.config.base import Strict
 from snakewalk.config.errors import InputError
 from snakewalk.config.loader import checked
 from snakewalk.controller.capture.capture import CaptureFile
-from snakewalk.controller.capture.identity import margins
+from snakewalk.controller.capture.staged_film import arrays_of
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -119,17 +119,13 @@ def apply_corrections(file: CaptureFile, corrections: Corrections, name: str) ->
         if k in left_out or k in drawn:
             expected[k] = np.nan
         skeletons.append(after)
-    length = np.array([skeleton.length_px for skeleton in skeletons])
-    if np.isfinite(length).sum() < 2:
+    arrays = arrays_of(skeletons)
+    if np.isfinite(arrays["length_px"]).sum() < 2:
         raise InputError(f"{name}: fewer than 2 frames with points stay; leave fewer out")
     corrected = replace(
         captured,
-        points_px=np.stack([skeleton.points_px for skeleton in skeletons]),
-        radius_px=np.stack([skeleton.radius_px for skeleton in skeletons]),
-        length_px=length,
-        status=tuple(skeleton.status for skeleton in skeletons),
+        **arrays,
         expected_px=expected,
-        margin=margins(skeletons),
         head_by="given" if flipped else captured.head_by,
         head_sure=1.0 if flipped else captured.head_sure,
     )

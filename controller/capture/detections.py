@@ -13,6 +13,7 @@ from snakewalk.controller.capture.small_body.crop import LONGEST_PX, CropStore
 from snakewalk.controller.capture.small_body.tip_profile import NO_ENDS, profile_ends
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.images.body_detector import Detection
+from snakewalk.controller.images.faint_tail import TailTip
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -47,8 +48,8 @@ class Detections:
     body with a faint tail, which no coil's outline shows."""
     faint_error_px: dict[int, float] = field(default_factory=dict)
     """By frame: least expected error of bodies with faint parts, apart from hidden bands."""
-    tip_error_px: dict[int, float] = field(default_factory=dict)
-    """By frame: error of the tip of a faint tail that was followed."""
+    tips: dict[int, TailTip] = field(default_factory=dict)
+    """By frame: tip of a faint tail that was followed."""
     bands_px: list[float] = field(default_factory=list)
     """Longest light band of each body with faint parts."""
     ends_px: list[Floats] = field(default_factory=list)
@@ -85,14 +86,14 @@ class Detections:
         self.distractors.append(silhouette.distractors)
         expected = axis_px = np.nan
         ends_px = NO_ENDS
-        is_tailed = detection.tip_error_px > 0.0
+        is_tailed = detection.tip is not None
         if line_px is not None:
             axis_px = line_px
         elif body.status is FrameStatus.GOOD:
             blur_px = edge_blur_px(silhouette.level, silhouette.threshold)
             axis_px = axis_error_px(blur_px, body.length_px)
-            if is_tailed:
-                self.tip_error_px[number] = detection.tip_error_px
+            if detection.tip is not None:
+                self.tips[number] = detection.tip
             else:
                 first = np.asarray(silhouette.origin_px)
                 line = body.points_px - first
@@ -138,9 +139,7 @@ class Detections:
 
     def shows_tips(self, skeletons: Sequence[Skeleton]) -> bool:
         """Whether most tips are those of followed tails: nothing is seen beyond them."""
-        return len(self.tip_error_px) > 0.5 * sum(
-            skeleton.status.has_points for skeleton in skeletons
-        )
+        return len(self.tips) > 0.5 * sum(skeleton.status.has_points for skeleton in skeletons)
 
     @property
     def least_error_px(self) -> dict[int, float]:
@@ -153,8 +152,8 @@ class Detections:
         self.skeletons.append(no_skeleton(status))
         for values in (self.area_px, self.noise, self.contrast, self.distractors):
             values.append(0.0)
-        self.expected_px.append(np.nan)
-        self.axis_error_px.append(np.nan)
+        for errors in (self.expected_px, self.axis_error_px):
+            errors.append(np.nan)
         self.ends_px.append(NO_ENDS)
 
     def _keep_surroundings(self, number: int, frame: DeepImage, detection: Detection) -> None:

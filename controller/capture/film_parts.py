@@ -7,10 +7,11 @@ folder next to the result, and an interrupted capture continues after them.
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from snakewalk.config.arrays import DeepImage, Floats
+from snakewalk.config.arrays import DeepImage
 from snakewalk.controller.capture.capture import Capture, UnusableFilmError, captured_from
 from snakewalk.controller.capture.detections import Detections
 from snakewalk.controller.capture.identity import margin_of, margins
@@ -106,7 +107,7 @@ class FilmParts:
             return captured if self.done_frames >= FEWEST_FRAMES else captured.roughened(ROUGH)
         if self._detections.skeletons:
             self._finish()
-        folder = None if self.folder is None else self.folder.large_files
+        folder = None if self.folder is None else self.folder.path
         return joined(self.finished, self.rate_hz, self.name, folder)
 
 
@@ -132,12 +133,10 @@ def joined(
             name, [no_skeleton(one) for film_part in parts for one in film_part.read().status]
         )
     count = sum(film_part.frames for film_part in parts)
-    arrays: dict[str, Floats] = {}
+    arrays: dict[str, Any] = {}
     status: list[FrameStatus] = []
-    fixed = True
     for film_part, s in zip(parts, sign, strict=True):
         part = _reversed_capture(film_part.read()) if s * score < 0.0 else film_part.read()
-        fixed = part.places_recorded
         for array_name in _ARRAYS:
             values = getattr(part, array_name)
             if not status:
@@ -147,15 +146,14 @@ def joined(
     bodies = map(
         Skeleton, arrays["points_px"], arrays["radius_px"], arrays["length_px"].tolist(), status
     )
-    return Capture(
+    return replace(
+        part,
         **arrays,
         status=tuple(status),
         margin=margins(bodies),
-        rate_hz=rate_hz,
         time_s=np.arange(count) / rate_hz,
         head_by=by,
         head_sure=min(1.0, abs(score)),
-        places_recorded=fixed,
     )
 
 

@@ -1,18 +1,19 @@
 """Images and large arrays of a film in temporary files, so that memory stays bounded."""
 
 import tempfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-import cv2
 import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
 
 IN_MEMORY_BYTES = 2**20
 """Arrays of this size and smaller ones stay in memory."""
+_FAST = 1  # level of compression
 _ROWS = 500  # of a large array that are computed at once
 
 
@@ -22,9 +23,9 @@ class StoredImage:
 
     at: int
     size: int
+    """Bytes in the file."""
     shape: tuple[int, ...]
-    dtype: np.dtype[Any] | None
-    """Shape of a raw array; None: a PNG."""
+    dtype: np.dtype[Any]
 
 
 @dataclass(slots=True)
@@ -36,26 +37,18 @@ class ImageFile:
 
     def add(self, image: DeepImage) -> StoredImage:
         """Store an image (H, W[, C]) without a loss."""
-        packed = image.dtype == np.uint8
-        if packed:
-            fast = [cv2.IMWRITE_PNG_COMPRESSION, 1]
-            data = cv2.imencode(".png", image, fast)[1].tobytes()
-        else:
-            data = image.tobytes()
+        data = zlib.compress(image.tobytes(), _FAST)
         self._file.seek(self._end)
         self._file.write(data)
-        stored = StoredImage(self._end, len(data), image.shape, None if packed else image.dtype)
+        stored = StoredImage(self._end, len(data), image.shape, image.dtype)
         self._end += len(data)
         return stored
 
     def read(self, stored: StoredImage) -> DeepImage:
         """Return a stored image."""
         self._file.seek(stored.at)
-        data = self._file.read(stored.size)
-        if stored.dtype is not None:
-            return np.frombuffer(data, dtype=stored.dtype).reshape(stored.shape)
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-        return np.asarray(image, dtype=np.uint8).reshape(stored.shape)
+        data = zlib.decompress(self._file.read(stored.size))
+        return np.frombuffer(data, dtype=stored.dtype).reshape(stored.shape)
 
 
 def large_array(shape: tuple[int, ...], folder: Path | None) -> Floats:

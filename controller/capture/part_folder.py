@@ -129,11 +129,6 @@ class PartFolder:
             save_capture(file, CaptureFile(part, name=""))
         return FinishedPart.of(part, path)
 
-    @property
-    def large_files(self) -> Path:
-        """The folder of the result: its disk holds large arrays while they are computed."""
-        return self.path.parent if self.parent is None else self.parent.large_files
-
     def _begin(self) -> None:
         """Create the folder."""
         if self.parent is not None:

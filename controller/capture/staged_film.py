@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from snakewalk.config.arrays import Bools, Floats
 from snakewalk.controller.capture.detections import Detections
+from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -35,20 +36,22 @@ class StagedFilm:
     head: tuple[float, str] = (0.0, "taper")
     """Certainty that the first end is the head, -1 to 1, and its clearest sign."""
 
-    @property
-    def points_px(self) -> Floats:
-        """(T, 101, 2) of the skeletons."""
-        return np.stack([skeleton.points_px for skeleton in self.skeletons])
 
-    @property
-    def radius_px(self) -> Floats:
-        """(T, 101) of the skeletons."""
-        return np.stack([skeleton.radius_px for skeleton in self.skeletons])
+def evenly_chosen(numbers: Sequence[int], most: int) -> list[int]:
+    """Return at most ``most`` of some numbers, spread over them."""
+    place = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
+    return [numbers[round(k)] for k in place]
 
-    @property
-    def length_px(self) -> Floats:
-        """(T,) of the skeletons."""
-        return np.array([skeleton.length_px for skeleton in self.skeletons])
+
+def arrays_of(skeletons: Sequence[Skeleton]) -> dict[str, Any]:
+    """Return the arrays of a ``Capture`` that follow from its T skeletons."""
+    return {
+        "points_px": np.stack([skeleton.points_px for skeleton in skeletons]),
+        "radius_px": np.stack([skeleton.radius_px for skeleton in skeletons]),
+        "length_px": np.array([skeleton.length_px for skeleton in skeletons]),
+        "status": tuple(skeleton.status for skeleton in skeletons),
+        "margin": margins(skeletons),
+    }
 
 
 class Stage(Protocol):

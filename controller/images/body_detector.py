@@ -16,9 +16,10 @@ from snakewalk.controller.images.background import (
     surrounding_ground,
 )
 from snakewalk.controller.images.faint_parts import may_have_faint_parts, with_faint_parts
-from snakewalk.controller.images.faint_tail import with_tails
+from snakewalk.controller.images.faint_tail import TailTip, with_tails
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton, skeleton_of_level
 from snakewalk.controller.images.residual import check_residual, is_ghost
+from snakewalk.controller.images.resting import Neighbours
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, silhouette_of
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -54,8 +55,8 @@ class Detection:
     """Whether parts of the body are much fainter than the rest; its line is then less accurate."""
     may_have_faint_parts: bool = False
     """Whether something fainter than the silhouette goes on beyond it."""
-    tip_error_px: float = 0.0
-    """Expected error of the tip of a faint tail, along the body; 0 without one."""
+    tip: TailTip | None = None
+    """Tip of a faint tail that was followed; None without one."""
     line_error_px: float | None = None
     """Expected error of a line that another program has found; None for the medial axis."""
     core_threshold: float | None = None
@@ -86,12 +87,18 @@ class BodyDetector:
     search_faint_parts: bool = True
     """Whether parts that are much fainter than the rest of the body belong to it."""
 
-    def detect(self, image: DeepImage, ground: DeepImage | None = None) -> Detection:
+    def detect(
+        self,
+        image: DeepImage,
+        ground: DeepImage | None = None,
+        neighbours: Neighbours = (),
+    ) -> Detection:
         """Detect the animal in one frame; the status of an unusable frame is not ``GOOD``.
 
         Args:
             image: (H, W[, C]).
             ground: background for this frame; None: ``ground_of`` the frame.
+            neighbours: frames before and after it, for the faint tail of a resting animal.
 
         Raises:
             InputError: the sizes of frame and background differ.
@@ -114,7 +121,9 @@ class BodyDetector:
         hidden = body.noise_level > _HIDING * body.threshold
         part = detection.skeleton.status is FrameStatus.PART
         may_go_on = faint or hidden or part or _has_thin_end(detection.skeleton)
-        tailed = self._with_tails(image, background, body, core) if may_go_on else None
+        tailed = None
+        if may_go_on and core.status is FrameStatus.GOOD:
+            tailed = self._with_tails(image, background, body, core, neighbours)
         best = detection if tailed is None else tailed
         if faint:
             fuller = with_faint_parts(image, background, self.polarity, body)
@@ -127,14 +136,12 @@ class BodyDetector:
 
     def _confirmed(self, image: DeepImage, background: DeepImage, body: Silhouette) -> Silhouette:
         """The silhouette; its status is ``CUT`` or ``GHOST`` if the animal is not complete."""
-        if self.inside is not None and body.status is FrameStatus.GOOD:
-            left, top = (int(v) for v in body.origin_px)
-            rows, columns = body.mask.shape
-            if (body.mask & ~self.inside[top : top + rows, left : left + columns]).any():
-                body = replace(body, status=FrameStatus.CUT)
-        may_be_ghost = self.background is not None and body.status is FrameStatus.GOOD
-        if may_be_ghost and is_ghost(image, background, body):
-            body = replace(body, status=FrameStatus.GHOST)
+        if body.status is not FrameStatus.GOOD:
+            return body
+        if self.inside is not None and (body.mask & ~self.inside[body.window()]).any():
+            return replace(body, status=FrameStatus.CUT)
+        if self.background is not None and is_ghost(image, background, body):
+            return replace(body, status=FrameStatus.GHOST)
         return body
 
     def _checked_detection(
@@ -149,18 +156,21 @@ class BodyDetector:
         return Detection(body, skeleton, background)
 
     def _with_tails(
-        self, image: DeepImage, background: DeepImage, body: Silhouette, core: Skeleton
+        self,
+        image: DeepImage,
+        background: DeepImage,
+        body: Silhouette,
+        core: Skeleton,
+        neighbours: Neighbours,
     ) -> Detection | None:
         """The body with a faint tail that is thin beyond its silhouette; None without one."""
-        if core.status is not FrameStatus.GOOD:
-            return None
-        tailed = with_tails(image, background, self.polarity, body, core)
+        tailed = with_tails(image, background, self.polarity, body, core, neighbours)
         if tailed is None or tailed.skeleton.length_px < _LONGER * core.length_px:
             return None
         checked = self._checked_detection(image, background, tailed.silhouette, tailed.skeleton)
         if checked.skeleton.status is not FrameStatus.GOOD:
             return None
-        return replace(checked, tip_error_px=tailed.tip_error_px)
+        return replace(checked, tip=tailed.tip)
 
     def ground_of(self, image: DeepImage) -> DeepImage:
         """Return the background (H, W[, 3]) for a frame."""
@@ -358,10 +368,8 @@ def _repainted_detector(detector: BodyDetector, frames: Sequence[DeepImage]) -> 
             continue
         body = detection.silhouette
         reach = 2 * round(0.5 * float(np.median(detection.skeleton.radius_px)) + 2.0) + 1
-        left, top = (int(v) for v in body.origin_px)
-        rows, columns = body.level.shape
         cover = np.zeros(frame.shape[:2], dtype=np.uint8)
-        cover[top : top + rows, left : left + columns] = body.mask
+        cover[body.window()] = body.mask
         cover = np.asarray(cv2.dilate(cover, np.ones((reach, reach), np.uint8)), dtype=np.uint8)
         out.append(_with_ground(frame, detection.background, cover))
     if len(out) < max(_CALM, len(frames) // 2):

@@ -58,9 +58,7 @@ def with_faint_parts(
     if parts is None:
         return None
     label, stats = parts
-    left, top = (int(v) for v in body.origin_px)
-    rows, columns = body.level.shape
-    inner = label[top : top + rows, left : left + columns]
+    inner = label[body.window()]
     core_part = int(np.bincount(inner[body.mask & (inner > 0)], minlength=2).argmax())
     x, y, wide, high, _ = (int(v) for v in stats[core_part])
     core_box = cv2.boundingRect(body.mask.astype(np.uint8))
@@ -69,7 +67,7 @@ def with_faint_parts(
     window = (slice(y, y + high), slice(x, x + wide))
     joined = label[window] == core_part
     core = np.zeros(label.shape, dtype=np.uint8)
-    core[top : top + rows, left : left + columns] = body.mask
+    core[body.window()] = body.mask
     thick = 2.0 * float(cv2.distanceTransform(core, cv2.DIST_L2, 5).max())
     away = np.asarray(cv2.distanceTransform(1 - core[window], cv2.DIST_L2, 5))
     beyond = joined & (away > _AWAY_WIDTHS * thick)

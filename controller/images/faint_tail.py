@@ -12,8 +12,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from snakewalk.config.arrays import Bools, DeepImage, Floats, Singles
+from snakewalk.controller.images.cross_profile import values_at
 from snakewalk.controller.images.faint_parts import FAINTEST
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords
+from snakewalk.controller.images.resting import Neighbours, resting_mean
 from snakewalk.controller.images.silhouette import Polarity, Silhouette, contrast
 from snakewalk.controller.kinematics.arc_length import arc_lengths
 
@@ -38,13 +40,22 @@ _TIP = 1.5  # of the ray over its clearness: error of the tip (measured on one f
 
 
 @dataclass(frozen=True, slots=True)
+class TailTip:
+    """Accuracy of the tip of a faint tail, along the body."""
+
+    error_px: float
+    """Expected error in the frame alone."""
+    lengthening_px: float
+    """Length that the mean of resting frames adds to that of the frame alone."""
+
+
+@dataclass(frozen=True, slots=True)
 class TailedBody:
     """A body with the faint tail beyond the end of its silhouette."""
 
     silhouette: Silhouette
     skeleton: Skeleton
-    tip_error_px: float
-    """Expected error of the tip of the tail, along the body."""
+    tip: TailTip
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +104,12 @@ def follow_tail(
             _ridge(level, np.broadcast_to(tip, (len(directions), 2)), directions, half) / noise
         )
         best = int(np.argmax(ridge_levels - np.abs(_FAN)))
-        ahead_px = 1.0
+        angle += float(np.clip(_FAN_RAD * _FAN[best], -1.0 / _RADIUS_PX, 1.0 / _RADIUS_PX))
+        unit = np.array([np.cos(angle), np.sin(angle)])
         if ridge_levels[best] < _CLEAR:
             # a ray that only begins on the tail is as clear as its part on the tail is long
             usual = float(np.mean(clear[-_AVERAGED_STEPS:]))
             ahead_px = _DIRECTION_PX * min(1.0, float(ridge_levels[best]) / max(usual, _CLEAR))
-        angle += float(np.clip(_FAN_RAD * _FAN[best], -1.0 / _RADIUS_PX, 1.0 / _RADIUS_PX))
-        unit = np.array([np.cos(angle), np.sin(angle)])
-        if ridge_levels[best] < _CLEAR:
             points.extend(tip + k * unit for k in np.arange(1.0, ahead_px + 0.5))
             break
         tip = tip + unit
@@ -125,9 +134,7 @@ def _ridge(level: Singles, start: Floats, directions: Floats, half: float) -> Fl
     ring = half + _GROUND_GAP_PX
     across = np.array([-0.5 * half, 0.0, 0.5 * half, -ring, ring])
     places = middle[:, :, None] + across[:, None] * side[:, None, None]
-    x, y = np.moveaxis(places.reshape(len(directions), -1, 2), -1, 0).astype(np.float32)
-    shown = cv2.remap(level, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    shown_level = np.asarray(shown, dtype=float).reshape(places.shape[:-1]).mean(axis=1)
+    shown_level = values_at(level, places, cv2.BORDER_REPLICATE).mean(axis=1)
     return np.asarray(shown_level[:, :3].mean(axis=1) - shown_level[:, 3:].max(axis=1))
 
 
@@ -156,8 +163,12 @@ def with_tails(
     polarity: Polarity,
     body: Silhouette,
     body_skeleton: Skeleton,
+    neighbours: Neighbours = (),
 ) -> TailedBody | None:
     """Return the body with the faint tail beyond either end; None if nothing goes on there.
+
+    The tail of a resting animal is followed in the mean of the frame and its neighbours. Frames of
+    a compressed film share their faults, so the expected error is that of the frame alone.
 
     Args:
         image: (H, W[, 3]) the frame.
@@ -165,47 +176,79 @@ def with_tails(
         polarity: whether the animal is darker or lighter than its ground.
         body: the part above half of the contrast.
         body_skeleton: its skeleton.
+        neighbours: frames before and after, the animal alone in them.
 
     """
     around = round(_MARGIN_LENGTHS * body_skeleton.length_px) + _MARGIN_PX
-    rows, columns = body.level.shape
-    left, top = (int(v) for v in body.origin_px)
-    x, y = max(0, left - around), max(0, top - around)
-    window = (slice(y, top + rows + around), slice(x, left + columns + around))
-    level = np.asarray(contrast(image[window], background[window], polarity), dtype=np.float32)
+    window = body.window(around)
+    corner = np.array([window[1].start, window[0].start], dtype=float)
+    ground = background[window]
+    level = _level(image[window], ground, polarity)
     mask = np.zeros(level.shape, dtype=np.uint8)
-    inner = (slice(top - y, top - y + rows), slice(left - x, left - x + columns))
+    inner = body.window_within(window)
     mask[inner] = body.mask
     away_px = np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 5), dtype=float)
     faintest = 2.0 * FAINTEST * body.threshold
-    line, radius = body_skeleton.points_px - [x, y], body_skeleton.radius_px
-    clearness, added = [], []
-    for _ in range(2):
-        end = float(np.median(radius[-_END_STATIONS:]))
-        tail = follow_tail(level, line, end, away_px, faintest)
-        if tail is not None:
-            clearness.append(tail.clearness)
-            added.append(tail.points)
-            line = np.vstack([line, tail.points])
-            radius = np.concatenate([radius, np.linspace(end, _THINNEST_PX, len(tail.points))])
-        line, radius = line[::-1], radius[::-1]
-    if not added:
+    core = replace(body_skeleton, points_px=body_skeleton.points_px - corner)
+    single = tailed = _with_both_tails(level, core, away_px, faintest)
+    mean = resting_mean(image, neighbours, body, window)
+    if mean is not None:
+        mean_level = _level(mean, ground.astype(np.float32), polarity)
+        tailed = _with_both_tails(mean_level, core, away_px, faintest)
+    if not tailed.added:
         return None
+    line = tailed.points
     smooth = gaussian_filter1d(line, _SMOOTH, axis=0, mode="nearest")
     arc = arc_lengths(line)
-    smooth = np.vstack([line[:1], smooth, line[-1:]]) + np.array([x, y])
+    smooth = np.vstack([line[:1], smooth, line[-1:]]) + corner
     shares = np.linspace(0.0, arc[-1], SEGMENTS + 1)
-    skeleton = in_equal_chords(smooth, np.interp(shares, arc, radius))
+    skeleton = in_equal_chords(smooth, np.interp(shares, arc, tailed.radius_px))
     if skeleton is None:
         return None
     body_level = np.zeros(level.shape, dtype=np.float32)
     body_level[inner] = body.level
-    for points in added:
+    for points in tailed.added:
         cv2.polylines(
             mask, [np.rint(points).astype(np.int32)], isClosed=False, color=2, thickness=3
         )
     body_level[mask == 2] = np.maximum(body_level[mask == 2], _DRAWN * body.threshold)
     area = float(np.count_nonzero(body_level > body.threshold))
-    silhouette = replace(body, level=body_level, origin_px=(float(x), float(y)), area_px=area)
-    error = _TIP * _DIRECTION_PX / min(clearness)
-    return TailedBody(silhouette, skeleton, error)
+    x, y = corner.tolist()
+    silhouette = replace(body, level=body_level, origin_px=(x, y), area_px=area)
+    lengthening_px = float(arc[-1] - arc_lengths(single.points)[-1])
+    tip = TailTip(_TIP * _DIRECTION_PX / single.clearness, lengthening_px)
+    return TailedBody(silhouette, skeleton, tip)
+
+
+def _level(picture: DeepImage, ground: DeepImage, polarity: Polarity) -> Singles:
+    return np.asarray(contrast(picture, ground, polarity), dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class _TailedLine:
+    """A line with the tails beyond its ends."""
+
+    points: Floats
+    radius_px: Floats
+    added: list[Floats]
+    """Points of each tail."""
+    clearness: float
+    """Clearness of the less clear tail; that of an unsure one without a tail."""
+
+
+def _with_both_tails(
+    level: Singles, core: Skeleton, away_px: Floats, faintest: float
+) -> _TailedLine:
+    """The line of a skeleton with its tails; the arguments are those of ``follow_tail``."""
+    line, radius = core.points_px, core.radius_px
+    tails: list[FollowedTail] = []
+    for _ in range(2):
+        end = float(np.median(radius[-_END_STATIONS:]))
+        tail = follow_tail(level, line, end, away_px, faintest)
+        if tail is not None:
+            tails.append(tail)
+            line = np.vstack([line, tail.points])
+            radius = np.concatenate([radius, np.linspace(end, _THINNEST_PX, len(tail.points))])
+        line, radius = line[::-1], radius[::-1]
+    clearness = min((tail.clearness for tail in tails), default=_UNSURE)
+    return _TailedLine(line, radius, [tail.points for tail in tails], clearness)

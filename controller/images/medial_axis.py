@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from skimage.morphology import skeletonize
 
 from snakewalk.config.arrays import Bools, Floats, Image, Ints, Singles
+from snakewalk.controller.images.cross_profile import along_and_side, values_at
 from snakewalk.controller.images.equipartition import NoEquipartitionError, equipartition
 from snakewalk.controller.images.pointed_tips import to_pointed_tips
 from snakewalk.controller.images.thin_body_fit import THIN_PX, fitted
@@ -187,7 +187,7 @@ def _in_segments(
     even = in_equal_chords(line, np.zeros(1))
     if even is None:
         return no_skeleton(FrameStatus.BLOB)
-    radius = _sample(depth, even.points_px) / step
+    radius = values_at(depth, even.points_px) / step
     for head in heads:
         within = np.hypot(*(even.points_px - head.place).T) < head.length
         radius[within] = np.maximum(radius[within], head.deep / step)
@@ -239,7 +239,7 @@ def _to_the_tips(
     """
     line = gaussian_filter1d(chain, _SMOOTH, axis=0, mode="nearest")
     arc = arc_lengths(line)
-    deep = _sample(depth, line)
+    deep = values_at(depth, line)
     # within a radius of the end, the axis of a blunt body turns into a corner
     inner = np.flatnonzero((arc >= deep) & (arc[-1] - arc >= deep))
     if len(inner) < 4:
@@ -259,7 +259,7 @@ def _to_the_tips(
             ends.append(_tip(end[-reach:], fine, tip))
         else:
             front = _to_the_front(end, float(deep.max()), solid)
-            heads.append(_WideEnd(end[-1], float(_sample(depth, end[-1:])[0]), float(len(front))))
+            heads.append(_WideEnd(end[-1], float(values_at(depth, end[-1:])[0]), float(len(front))))
             ends.append(front)
     return np.vstack([ends[0][::-1], core, ends[1]])
 
@@ -301,13 +301,12 @@ def _centred_line(line: Floats, fine: Level, threshold: float) -> Floats:
 
     Thinning is off by up to a pixel, and smoothing shortens bends.
     """
-    along = np.gradient(line, axis=0)
-    side = np.column_stack([-along[:, 1], along[:, 0]]) / np.hypot(*along.T)[:, None]
+    _, side = along_and_side(line)
     out = np.arange(0.0, WORKING_WIDTH, 0.5)
     reach = []
     for sign in (1.0, -1.0):
         ray = line[:, None] + sign * out[:, None] * side[:, None]
-        level = _sample(fine, ray)
+        level = values_at(fine, ray)
         below = level < threshold
         last = np.argmax(below, axis=1)
         row = np.arange(len(line))
@@ -333,7 +332,7 @@ def _tip(end: Floats, fine: Level, threshold: float) -> Floats:
     for _ in range(round(4.0 * WORKING_WIDTH)):
         there = tip + ahead
         side = np.array([-ahead[1], ahead[0]])
-        level = _sample(fine, np.vstack([there, there + across[:, None] * side]))
+        level = values_at(fine, np.vstack([there, there + across[:, None] * side]))
         if level[0] <= threshold:
             part = (last - threshold) / max(last - level[0], 1e-6)
             tips.append(tip + float(np.clip(part, 0.0, 1.0)) * ahead)
@@ -354,21 +353,6 @@ def _bounded_direction(turned: Floats, first: Floats) -> Floats:
     slope = float(turned @ side) / max(float(turned @ first), 1e-9)
     slope = float(np.clip(slope, -_MOST_TURN, _MOST_TURN))
     return np.asarray((first + slope * side) / np.hypot(1.0, slope))
-
-
-def _sample(image: NDArray[np.generic], points: Floats) -> Floats:
-    """Interpolate at points (..., 2), one or two leading axes; 0 outside."""
-    rows = points if points.ndim == 3 else points[:, None]
-    x, y = np.ascontiguousarray(np.moveaxis(rows, -1, 0), dtype=np.float32)
-    samples = cv2.remap(
-        np.asarray(image, dtype=np.float32),
-        x,
-        y,
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=0,
-    )
-    return np.asarray(samples, dtype=float).reshape(points.shape[:-1])
 
 
 def _largest_part(mask: Bools) -> Image | None:

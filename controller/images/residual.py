@@ -5,6 +5,7 @@ import numpy as np
 
 from snakewalk.config.arrays import Bools, DeepImage, Floats
 from snakewalk.controller.images.background import surrounding_ground
+from snakewalk.controller.images.cross_profile import values_at
 from snakewalk.controller.images.medial_axis import Skeleton
 from snakewalk.controller.images.silhouette import (
     Polarity,
@@ -50,19 +51,16 @@ def check_residual(
     """
     wide = 2.0 * max(np.median(skeleton.radius_px), 0.5)
     around = round(_MARGIN_LENGTHS * skeleton.length_px)
-    rows, columns = silhouette.level.shape
-    left, top = (int(v) for v in silhouette.origin_px)
-    low_x, low_y = max(0, left - around), max(0, top - around)
-    window = (slice(low_y, top + rows + around), slice(low_x, left + columns + around))
+    window = silhouette.window(around)
     window_image = image[window]
     ground = background[window]
     body = np.zeros(window_image.shape[:2], dtype=bool)
-    body[top - low_y : top - low_y + rows, left - low_x : left - low_x + columns] = silhouette.mask
+    body[silhouette.window_within(window)] = silhouette.mask
     soft_level = soft_contrast(window_image, ground, polarity)
     level = 2.0 * silhouette.threshold
     mass = float(soft_level[body].sum())
     least = max(silhouette.noise_level, _WEAK_LEVEL * level)
-    tips = skeleton.points_px[[0, -1]] - [low_x, low_y]
+    tips = skeleton.points_px[[0, -1]] - [window[1].start, window[0].start]
     apart = cv2.distanceTransform((~body).astype(np.uint8), cv2.DIST_L2, 5)
     away_px = np.asarray(apart, dtype=np.float32)
     if _beyond_tips(soft_level, away_px, tips, wide, least) > _PART * mass:
@@ -82,9 +80,7 @@ def is_ghost(image: DeepImage, background: DeepImage, silhouette: Silhouette) ->
     Frame minus background has the gradient a - b along the outline. The share of the frame in its
     square, a (a - b), is 1 for a body on bare ground and 0 where only the background shows a body.
     """
-    rows, columns = silhouette.level.shape
-    left, top = (int(v) for v in silhouette.origin_px)
-    window = (slice(top, top + rows), slice(left, left + columns))
+    window = silhouette.window()
     body = silhouette.mask.astype(np.uint8)
     box = np.ones((3, 3), dtype=np.uint8)
     outline = cv2.dilate(body, box) != cv2.erode(body, box)
@@ -127,8 +123,8 @@ def _continues_to_itself(
         away[np.abs(along - along[tip]) < _OTHER_PART_WIDTHS * wide] = np.inf
         if away.min() > _GAP_WIDTHS * wide:
             continue
-        x, y = np.linspace(line[tip], line[np.argmin(away)], _GAP_SAMPLES, dtype=np.float32).T
-        level = cv2.remap(silhouette.level, x, y, cv2.INTER_LINEAR)
+        gap = np.linspace(line[tip], line[np.argmin(away)], _GAP_SAMPLES)
+        level = values_at(silhouette.level, gap)
         gap_px = float((level < silhouette.threshold).mean() * away.min())
         if gap_px > _GAP_BLURS * blur_px and level.min() > least:
             return True

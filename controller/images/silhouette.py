@@ -52,6 +52,23 @@ class Silhouette:
         """(h, w) pixels of the body."""
         return self.level > self.threshold
 
+    def window(self, margin_px: int = 0) -> tuple[slice, slice]:
+        """Rows and columns of the cut-out in its image, with a margin within the image."""
+        left, top = (int(v) for v in self.origin_px)
+        rows, columns = self.level.shape
+        return (
+            slice(max(0, top - margin_px), top + rows + margin_px),
+            slice(max(0, left - margin_px), left + columns + margin_px),
+        )
+
+    def window_within(self, outer: tuple[slice, slice]) -> tuple[slice, slice]:
+        """Rows and columns of the cut-out within a window with a margin."""
+        rows, columns = (
+            slice(side.start - first.start, side.stop - first.start)
+            for side, first in zip(self.window(), outer, strict=True)
+        )
+        return rows, columns
+
 
 def edge_width_px(level: Singles, threshold: float) -> float:
     """Standard deviation of a blurred step as steep as a body's boundary, with all filters.

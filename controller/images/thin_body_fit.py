@@ -27,15 +27,14 @@ _TAPER = 0.02  # share of the length at each end that tapers and is too faint fo
 _MISFIT = 0.25  # of the picture's own strength: a larger residual rejects the fit
 
 
-def _basis(count: int) -> Floats:
-    places = np.linspace(0.0, 1.0, count)
-    inner = np.linspace(0.0, 1.0, _CONTROLS - 2)
-    knots = np.concatenate([[0.0] * 3, inner, [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(places, knots, 3).toarray(), dtype=float)
+def spline_basis(place: Floats, count: int) -> Floats:
+    """(P, count) cubic B-splines at ``place`` (P,), from 0 at one end to 1 at the other."""
+    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, count - 2), [1.0] * 3])
+    return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
 
 
-_SPOT_BASIS = _basis(_SPOTS)
-_FINE_BASIS = _basis(401)
+_SPOT_BASIS = spline_basis(np.linspace(0.0, 1.0, _SPOTS), _CONTROLS)
+_FINE_BASIS = spline_basis(np.linspace(0.0, 1.0, 401), _CONTROLS)
 _HATS = np.stack(
     [
         np.interp(np.linspace(0.0, 1.0, _SPOTS), np.linspace(0.0, 1.0, _STATIONS), row)

@@ -105,13 +105,7 @@ def silhouette_frame(image: Image, background: Image, polarity: Polarity) -> Sil
     silhouette = silhouette_of(plain, background, polarity)
     mask = np.zeros(plain.shape, dtype=bool)
     if silhouette.area_px > 0.0:
-        left, top = (int(coordinate) for coordinate in silhouette.origin_px)
-        rows, columns = silhouette.level.shape
-        edge = max(4, max(rows, columns) // 4)
-        part = (
-            slice(max(0, top - edge), top + rows + edge),
-            slice(max(0, left - edge), left + columns + edge),
-        )
+        part = silhouette.window(max(4, max(silhouette.level.shape) // 4))
         smooth_contrast = cv2.GaussianBlur(
             contrast(plain[part], background[part], polarity), (3, 3), 0.0
         )
@@ -121,7 +115,7 @@ def silhouette_frame(image: Image, background: Image, polarity: Polarity) -> Sil
         )
         _, label = cv2.connectedComponents((smooth_contrast > low).astype(np.uint8), connectivity=8)
         core = np.zeros(label.shape, dtype=bool)
-        core[top - part[0].start :, left - part[1].start :][:rows, :columns] = silhouette.mask
+        core[silhouette.window_within(part)] = silhouette.mask
         kept = np.unique(label[core])
         mask[part] = np.isin(label, kept[kept > 0])
     return SilhouetteFrame(

@@ -9,10 +9,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from snakewalk.config.arrays import DeepImage, Floats, Image, Indices, Int32s
+from snakewalk.config.arrays import DeepImage, Floats, Image, Int32s
 from snakewalk.config.colours import HEAD, rgb
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture.capture import Capture
+from snakewalk.controller.capture.staged_film import evenly_chosen
 from snakewalk.controller.console.result_files import atomic_write
 from snakewalk.controller.images.body_detector import BodyDetector
 from snakewalk.controller.images.silhouette import Polarity
@@ -201,9 +202,7 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
     """
     body = detector.detect(image).silhouette
     mask = np.zeros(image.shape[:2], dtype=np.uint8)
-    x, y = (int(v) for v in body.origin_px)
-    high, wide = body.mask.shape
-    mask[y : y + high, x : x + wide] = body.mask * np.uint8(200)
+    mask[body.window()] = body.mask * np.uint8(200)
     rows, columns, points_px = _window_of_animal(points_px)
     image = image[rows, columns]
     mask = mask[rows, columns]
@@ -237,13 +236,9 @@ def step_picture(path: Path, image: DeepImage, detector: BodyDetector, points_px
 
 def _chosen(captured: Capture, places: int) -> list[int]:
     good = captured.good
-    bad = _spread(np.flatnonzero(~good), max(places // 3, places - int(good.sum())))
-    return bad + _spread(np.flatnonzero(good), places - len(bad))
-
-
-def _spread(numbers: Indices, most: int) -> list[int]:
-    place = np.linspace(0, len(numbers) - 1, min(most, len(numbers)))
-    return [int(numbers[round(k)]) for k in place]
+    bad = np.flatnonzero(~good).tolist()
+    bad = evenly_chosen(bad, max(places // 3, places - int(good.sum())))
+    return bad + evenly_chosen(np.flatnonzero(good).tolist(), places - len(bad))
 
 
 def overlay_film(

@@ -23,6 +23,10 @@ from snakewalk.controller.capture.several.identities import Identity, identities
 from snakewalk.controller.capture.several.tracklets import TrackletBuilder
 from snakewalk.controller.images.background import background_candidates
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
+from snakewalk.controller.images.resting import (
+    Neighbours,
+    with_neighbours,
+)
 from snakewalk.controller.images.silhouette import Polarity, as_deep_as
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -86,9 +90,7 @@ def find_animals(
         InputError: fewer animals than wanted, or none.
 
     """
-    blob_frames = [
-        blobs_of(sample_frame, detector.ground_of(sample_frame), detector) for sample_frame in some
-    ]
+    blob_frames = [blobs_of(sample_frame, detector) for sample_frame in some]
     usual = usual_area(blob_frames)
     sample = [blobs.area_px for blobs in blob_frames]
     if usual <= 0.0:
@@ -96,7 +98,7 @@ def find_animals(
     builder = TrackletBuilder(usual)
     count = 0
     for frame in frames:
-        builder.add(blobs_of(frame, detector.ground_of(frame), detector, usual))
+        builder.add(blobs_of(frame, detector, usual))
         count += 1
         on_progress()
     every = identities_of(builder.done())
@@ -132,17 +134,16 @@ def with_bare_ground(detector: BodyDetector, frames: Sequence[DeepImage]) -> Bod
     first = detector.background
     if first is None:
         return detector
-    usual = usual_area([blobs_of(frame, first, detector) for frame in frames])
+    usual = usual_area([blobs_of(frame, detector) for frame in frames])
     stack = np.stack(frames)
     covered = np.zeros(stack.shape[:3], dtype=np.uint8)
     box, gap = (np.ones((side, side), dtype=np.uint8) for side in (_COVER_PX, _GAP_PX))
-    for cover, frame in zip(covered, frames, strict=True):
-        blobs = blobs_of(frame, first, detector, usual)
+    shown_frames = with_neighbours(lambda number: frames[number:])
+    for cover, (frame, neighbours) in zip(covered, shown_frames, strict=True):
+        blobs = blobs_of(frame, detector, usual)
         for number in range(len(blobs.area_px)):
-            body = _detected_animal(frame, first, detector, blobs, number)[1].silhouette
-            left, top = (int(v) for v in body.origin_px)
-            rows, columns = body.mask.shape
-            cover[top : top + rows, left : left + columns] |= body.mask
+            _, detection = _detected_animal(frame, first, detector, blobs, number, neighbours)
+            cover[detection.silhouette.window()] |= detection.silhouette.mask
         cover[:] = cv2.morphologyEx(cv2.dilate(cover, box), cv2.MORPH_CLOSE, gap)
     free = len(frames) - covered.sum(axis=0, dtype=int)
     grounds = {polarity: ground for ground, polarity, _ in background_candidates(frames)}
@@ -226,9 +227,10 @@ def capture_animals(
     first = min(before)
     for _ in range(first):
         on_progress()
-    for number, frame in enumerate(frames(first), start=first):
+    shown_frames = with_neighbours(frames, first)
+    for number, (frame, neighbours) in enumerate(shown_frames, start=first):
         ground = detector.ground_of(frame)
-        blobs = blobs_of(frame, ground, detector, animals_found.usual_px)
+        blobs = blobs_of(frame, detector, animals_found.usual_px, ground)
         followed = {int(plan[number]) for plan in plans}
         others = [k for k in range(len(blobs.area_px)) if k not in followed]
         for animal, (plan, film) in enumerate(zip(plans, films, strict=True)):
@@ -243,7 +245,9 @@ def capture_animals(
                 own_px = identities[animal].tracklets[0].area_px
                 film.skip(merged_status(blobs, others, places[animal], own_px))
             else:
-                shown, detection = _detected_animal(frame, ground, detector, blobs, index)
+                shown, detection = _detected_animal(
+                    frame, ground, detector, blobs, index, neighbours
+                )
                 film.add(shown, detection)
         on_progress()
     return [
@@ -300,19 +304,30 @@ def _plan(identity: Identity, count: int) -> SignedInts:
 
 
 def _detected_animal(
-    frame: DeepImage, ground: DeepImage, detector: BodyDetector, blobs: Blobs, number: int
+    frame: DeepImage,
+    ground: DeepImage,
+    detector: BodyDetector,
+    blobs: Blobs,
+    number: int,
+    neighbours: Neighbours,
 ) -> tuple[DeepImage, Detection]:
     """The frame with this animal alone, and the animal in it."""
     length, width = np.exp(blobs.shape[number][:2])
     window = own_window(
         blobs, number, max(_LEAST_WINDOW_PX, round(_WINDOW_LENGTHS * float(length)))
     )
-    part = frame[window].copy()
     covered = mask_of_other_animals(blobs, number, window, round(0.5 * float(width)) + 3)
-    part[covered] = ground[window][covered]
+
+    def alone(image: DeepImage) -> DeepImage:
+        part = image[window].copy()
+        part[covered] = ground[window][covered]
+        return part
+
+    part = alone(frame)
     inside = None if detector.inside is None else detector.inside[window]
     local = replace(detector, inside=inside)
-    detection = local.detect(part, np.ascontiguousarray(ground[window]))
+    shown_alone = [map(alone, side) for side in neighbours]
+    detection = local.detect(part, np.ascontiguousarray(ground[window]), shown_alone)
     corner = np.array([window[1].start, window[0].start], dtype=float)
     shown = ground.copy()
     shown[window] = part

@@ -45,38 +45,35 @@ class Blobs:
 
 
 def blobs_of(
-    frame: DeepImage, ground: DeepImage, detector: BodyDetector, usual_px: float = 0.0
+    frame: DeepImage,
+    detector: BodyDetector,
+    usual_px: float = 0.0,
+    ground: DeepImage | None = None,
 ) -> Blobs:
     """Return the blobs of a frame.
 
     Args:
         frame: (H, W[, C]).
-        ground: the frame without animals.
         detector: its polarity, threshold and region are used.
         usual_px: usual area of an animal; 0: any size.
+        ground: the frame without animals; None: that of the detector.
 
     """
+    if ground is None:
+        ground = detector.ground_of(frame)
     contrast_image = soft_contrast(frame, ground, detector.polarity)
     if detector.inside is not None:
         contrast_image = np.where(detector.inside, contrast_image, np.zeros_like(contrast_image))
     threshold = detector.threshold
     if threshold is None:
         threshold = body_threshold(contrast_image, *noise_of(contrast_image))
-    parts = (
-        None
-        if threshold is None
-        else connected_parts((contrast_image > threshold).astype(np.uint8))
+    parts = None
+    if threshold is not None:
+        parts = connected_parts((contrast_image > threshold).astype(np.uint8))
+    label, stats = parts or (
+        np.zeros(contrast_image.shape, dtype=np.int32),
+        np.zeros((1, cv2.CC_STAT_MAX), dtype=np.int32),
     )
-    if parts is None:
-        none = np.zeros((0, 4), dtype=int)
-        return Blobs(
-            np.zeros(contrast_image.shape, np.int32),
-            none,
-            np.zeros(0),
-            np.zeros((0, 2)),
-            np.zeros((0, 3)),
-        )
-    label, stats = parts
     area = stats[:, cv2.CC_STAT_AREA].astype(float)
     kept = 1 + np.flatnonzero(area[1:] >= max(1.0, SMALLEST * usual_px))
     number = np.zeros(len(stats), dtype=np.int32)
@@ -153,35 +150,30 @@ def detector_of_several(
     if background is not None:
         polarity = usual_polarity(frames, background)
         return BodyDetector(background, polarity, "given", 0, inside, threshold)
-    tried: list[tuple[BodyDetector, int, float]] = []
+    tried: list[tuple[int, float, BodyDetector, list[Blobs]]] = []
     polarity = usual_polarity(frames, median_background(frames))
     for ground, supposed, source in background_candidates(frames):
         if supposed is not None and supposed is not polarity:
             continue
         detector = BodyDetector(ground, polarity, source, 0, inside, threshold)
-        count, area = count_of([blobs_of(frame, ground, detector) for frame in frames])
+        blobs = [blobs_of(frame, detector) for frame in frames]
+        count, area = count_of(blobs)
         if count:
-            tried.append(
-                (detector, 0 if requested_count is None else abs(count - requested_count), area)
-            )
+            excess = 0 if requested_count is None else abs(count - requested_count)
+            tried.append((excess, area, detector, blobs))
     surface = BodyDetector(None, polarity, _SURFACE, 0, inside, threshold)
     if not tried:
         return surface
-    nearest = min(away for _, away, _ in tried)
-    tried = [trial for trial in tried if trial[1] == nearest]
-    largest = max(area for _, _, area in tried)
-    fixed = next(detector for detector, _, area in tried if area >= _LEAST_AREA * largest)
-    return surface if _breaks_animals(surface, fixed, frames) else fixed
+    nearest = min(trial[0] for trial in tried)
+    tried = [trial for trial in tried if trial[0] == nearest]
+    largest = max(trial[1] for trial in tried)
+    _, _, fixed, parts = next(trial for trial in tried if trial[1] >= _LEAST_AREA * largest)
+    regions = [blobs_of(frame, surface) for frame in frames]
+    return surface if _breaks_animals(regions, parts) else fixed
 
 
-def _breaks_animals(
-    surface: BodyDetector, fixed: BodyDetector, frames: Sequence[DeepImage]
-) -> bool:
+def _breaks_animals(regions: Sequence[Blobs], parts: Sequence[Blobs]) -> bool:
     """Whether a fixed background hides the middles of animals that a surface shows."""
-    regions, parts = (
-        [blobs_of(frame, detector.ground_of(frame), detector) for frame in frames]
-        for detector in (surface, fixed)
-    )
     usual = usual_area(regions)
     broken = 0
     for blobs, pieces in zip(regions, parts, strict=True):
@@ -192,7 +184,7 @@ def _breaks_animals(
             blobs.area_px[region] < _SINGLE_AREA * usual
         )
         broken += int((np.bincount(region[is_piece]) > 1).any())
-    return broken > _BROKEN * len(frames) and usual > _LARGER * usual_area(parts)
+    return broken > _BROKEN * len(regions) and usual > _LARGER * usual_area(parts)
 
 
 def own_window(blobs: Blobs, number: int, around_px: int) -> tuple[slice, slice]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.several.tracklets import Tracklet
+from snakewalk.controller.capture.several.tracklets import Tracklet, linked_groups
 
 SURE = 10.0
 """Additional cost of the best exchange from which an assignment is certain (ours; measured on
@@ -110,7 +110,9 @@ def _links(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> list[_Link]
     """Assign ends to starts; shapes are those of all tracklets that certain links join."""
     cost = _costs(tracklets, links)
     out = []
-    for old_indices, new_indices in _groups(cost):
+    pairs = np.array([(old, new) for old, starts in cost.items() for new in starts], dtype=int)
+    for olds, news in linked_groups(*pairs.reshape(-1, 2).T):
+        old_indices, new_indices = olds.tolist(), news.tolist()
         some = np.array(
             [[cost[old].get(new, np.inf) for new in new_indices] for old in old_indices]
         )
@@ -120,7 +122,7 @@ def _links(tracklets: Sequence[Tracklet], links: Sequence[_Link]) -> list[_Link]
         )
         for row, column in _assigned_pairs(some, alone):
             margin = _margin(some, row, column, _assigned_pairs(some, alone), alone)
-            out.append(_Link(int(old_indices[row]), int(new_indices[column]), margin))
+            out.append(_Link(old_indices[row], new_indices[column], margin))
     return out
 
 
@@ -151,28 +153,6 @@ def _margin(
         if np.isfinite(cost[other, column]):
             best = min(best, float(cost[other, column] - cost[row, column]))
     return best
-
-
-def _groups(cost: _Costs) -> list[tuple[list[int], list[int]]]:
-    """Ends and starts that belong together, as (ends, starts)."""
-    ends_of: dict[int, list[int]] = {}
-    for end, starts in cost.items():
-        for start in starts:
-            ends_of.setdefault(start, []).append(end)
-    out = []
-    free = set(cost)
-    while free:
-        ends: set[int] = set()
-        starts_seen: set[int] = set()
-        fresh = {free.pop()}
-        while fresh:
-            ends |= fresh
-            more = {start for end in fresh for start in cost[end]} - starts_seen
-            starts_seen |= more
-            fresh = {end for start in more for end in ends_of[start]} - ends
-        free -= ends
-        out.append((sorted(ends), sorted(starts_seen)))
-    return out
 
 
 def _later_starts(tracklets: Sequence[Tracklet]) -> Iterator[tuple[int, int]]:

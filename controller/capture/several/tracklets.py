@@ -10,8 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from snakewalk.config.arrays import Bools, Floats, Int32s, Ints
+from snakewalk.config.arrays import Bools, Floats, Indices, Int32s
 from snakewalk.controller.capture.several.blobs import Blobs
 
 _LEAST_OVERLAP = 0.15  # of the smaller blob's pixels: the blobs show the same animal
@@ -106,7 +108,7 @@ class TrackletBuilder:
         nodes: list[_Node | None] = [None] * count
         if self._previous_frame is not None and len(self._nodes):
             links = self._links(self._previous_frame, blobs)
-            for old_indices, new_indices in _components(links):
+            for old_indices, new_indices in linked_groups(*np.nonzero(links)):
                 self._link(old_indices, new_indices, blobs, nodes)
         for number in range(count):
             if nodes[number] is None:
@@ -130,12 +132,10 @@ class TrackletBuilder:
             elif not short or begins is not None or ends is not None:
                 kept.append(tracklet)
         for kept_tracklet in kept:
-            kept_tracklet.begins_in = (
-                None if kept_tracklet.begins_in is None else self._root(kept_tracklet.begins_in)
-            )
-            kept_tracklet.ends_in = (
-                None if kept_tracklet.ends_in is None else self._root(kept_tracklet.ends_in)
-            )
+            if kept_tracklet.begins_in is not None:
+                kept_tracklet.begins_in = self._root(kept_tracklet.begins_in)
+            if kept_tracklet.ends_in is not None:
+                kept_tracklet.ends_in = self._root(kept_tracklet.ends_in)
         return sorted(kept, key=lambda kept_part: kept_part.frames[0])
 
     def _links(self, before: Blobs, blobs: Blobs) -> Bools:
@@ -170,7 +170,7 @@ class TrackletBuilder:
         return links
 
     def _link(
-        self, old_indices: Ints, new_indices: Ints, blobs: Blobs, nodes: list[_Node | None]
+        self, old_indices: Indices, new_indices: Indices, blobs: Blobs, nodes: list[_Node | None]
     ) -> None:
         """Continue old nodes in the new blobs, which show the same animals."""
         before = [
@@ -262,25 +262,19 @@ def _shared_pixels(before: Int32s, label: Int32s, old_indices: int, new_indices:
     )
 
 
-def _components(links: Bools) -> list[tuple[Ints, Ints]]:
-    """Groups of linked blobs of two frames (n, m), each with at least one of both."""
-    out = []
-    free = set(np.flatnonzero(links.any(axis=1)).tolist())
-    while free:
-        old_indices: set[int] = {free.pop()}
-        new_indices: set[int] = set()
-        while True:
-            more = (
-                set(np.flatnonzero(links[sorted(old_indices)].any(axis=0)).tolist()) - new_indices
-            )
-            new_indices |= more
-            back = (
-                set(np.flatnonzero(links[:, sorted(new_indices)].any(axis=1)).tolist())
-                - old_indices
-            )
-            old_indices |= back
-            if not more and not back:
-                break
-        free -= old_indices
-        out.append((np.array(sorted(old_indices)), np.array(sorted(new_indices))))
-    return out
+def linked_groups(olds: Indices, news: Indices) -> list[tuple[Indices, Indices]]:
+    """Groups of old and new numbers that pairs link, each with at least one of both.
+
+    Args:
+        olds: (P,) old number of each pair.
+        news: (P,) new number of each pair.
+
+    """
+    first_new = int(olds.max(initial=-1)) + 1
+    count = first_new + int(news.max(initial=-1)) + 1
+    graph = coo_array((np.ones(len(olds)), (olds, first_new + news)), shape=(count, count))
+    _, group = connected_components(graph, directed=False)
+    return [
+        (np.flatnonzero(group[:first_new] == number), np.flatnonzero(group[first_new:] == number))
+        for number in np.unique(group[olds])
+    ]

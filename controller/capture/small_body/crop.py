@@ -8,8 +8,9 @@ import numpy as np
 
 from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.controller.capture.image_file import ImageFile, StoredImage
-from snakewalk.controller.capture.small_body.ribbon import BENDS, bend_basis
+from snakewalk.controller.capture.small_body.ribbon import BENDS
 from snakewalk.controller.capture.verification.frame_store import surroundings
+from snakewalk.controller.images.thin_body_fit import spline_basis
 
 LONGEST_PX = 120.0
 """Bodies up to this length are fitted."""
@@ -200,7 +201,7 @@ def bends_of(line: Floats, bends: int = BENDS) -> Floats:
     step = -np.diff(line, axis=0)
     angle = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     place = (np.arange(len(angle)) + 0.5) / len(angle)
-    return np.asarray(np.linalg.lstsq(bend_basis(place, bends), angle, rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(spline_basis(place, bends), angle, rcond=None)[0])
 
 
 def reversed_body(frame: Floats) -> Floats:

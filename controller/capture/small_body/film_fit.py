@@ -30,6 +30,7 @@ from snakewalk.controller.capture.small_body.ribbon import (
     curve_slopes,
 )
 from snakewalk.controller.capture.small_body.tip_profile import beyond_tips_px, tips_error_px
+from snakewalk.controller.capture.staged_film import evenly_chosen
 from snakewalk.controller.images.medial_axis import SEGMENTS, Skeleton, in_equal_chords, no_skeleton
 from snakewalk.controller.track.frame_status import FrameStatus
 
@@ -132,14 +133,6 @@ def fit_film(
         line = space.to_px(curve_of(fit.frame, float(body.values[0])) + views[k].first)
         out[k] = _skeleton(line, body, space)
     return FittedFilm(tuple(out), expected, body)
-
-
-def with_least_errors(film: FittedFilm, least_px: Mapping[int, float]) -> FittedFilm:
-    """The film with lower bounds on the expected errors of some frames."""
-    expected = film.expected_px.copy()
-    for k, least in least_px.items():
-        expected[k] = np.maximum(expected[k], least)
-    return replace(film, expected_px=expected)
 
 
 def with_tip_errors(film: FittedFilm, ends_px: Sequence[Floats], solved: Bools) -> FittedFilm:
@@ -268,8 +261,7 @@ def _recover_lost(
 def _spread(good: list[int], views: Mapping[int, View]) -> list[int]:
     picture_px = float(np.median([views[k].picture.size for k in good]))
     most = int(np.clip(_SAMPLE_PX / picture_px, _FEWEST_SAMPLES, _MOST_SAMPLES))
-    place = np.linspace(0, len(good) - 1, min(most, len(good)))
-    return [good[round(k)] for k in place]
+    return evenly_chosen(good, most)
 
 
 def _first_body(views: Sequence[View], length: float) -> Floats:

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.images.thin_body_fit import draw_spots
+from snakewalk.controller.images.thin_body_fit import draw_spots, spline_basis
 
 BENDS = 10
 """Coefficients of the tangent angle."""
@@ -47,12 +46,6 @@ class Grid:
         return cls(along, int(np.clip(np.ceil(wide / spacing), 1, _ROWS)))
 
 
-def bend_basis(place: Floats, bends: int = BENDS) -> Floats:
-    """(P, bends) cubic B-splines of the tangent angle at ``place`` (P,), 0 the head, 1 the tail."""
-    knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, bends - 2), [1.0] * 3])
-    return np.asarray(BSpline.design_matrix(place, knots, 3).toarray(), dtype=float)
-
-
 def headings(angle: Floats) -> tuple[Floats, Floats]:
     """(P, 2) unit vectors along tangent angles (P,), and to their left."""
     c, s = np.cos(angle), np.sin(angle)
@@ -67,7 +60,7 @@ def summed(steps: Floats) -> Floats:
 def curve_of(frame: Floats, length: float, pieces: int = 400) -> Floats:
     """(pieces + 1, 2) the body's middle line, head first, equal arcs."""
     middle = (np.arange(pieces) + 0.5) / pieces
-    angle = bend_basis(middle) @ frame[2 : 2 + BENDS]
+    angle = spline_basis(middle, BENDS) @ frame[2 : 2 + BENDS]
     line = summed(headings(angle)[0] * (length / pieces))
     return np.asarray(line - 0.5 * (line[1:] + line[:-1]).mean(axis=0) + frame[:2])
 
@@ -75,7 +68,7 @@ def curve_of(frame: Floats, length: float, pieces: int = 400) -> Floats:
 def curve_slopes(frame: Floats, length: float, pieces: int = 40) -> Floats:
     """(pieces + 1, 2, 2 + BENDS + 1) derivatives of the line by x, y, bends and the length."""
     middle = (np.arange(pieces) + 0.5) / pieces
-    basis = bend_basis(middle)
+    basis = spline_basis(middle, BENDS)
     ahead, aside = headings(basis @ frame[2 : 2 + BENDS])
     turned = aside[:, :, None] * basis[:, None, :]
     line = summed(np.concatenate([turned * (length / pieces), ahead[:, :, None] / pieces], axis=2))
@@ -91,7 +84,7 @@ class Ribbon:
         n, m = grid.along, grid.across
         self.grid = grid
         place = (np.arange(n) + 0.5) / n
-        self.basis = bend_basis(place)
+        self.basis = spline_basis(place, BENDS)
         self.hats = np.stack([np.interp(place, STATIONS, row) for row in np.eye(len(STATIONS))], 1)
         sums = (np.tri(n, k=-1) + 0.5 * np.eye(n)) / n
         self.sums = sums - sums.mean(axis=0)

@@ -7,7 +7,6 @@ import numpy as np
 from snakewalk.controller.capture.identity import margins
 from snakewalk.controller.capture.small_body.film_fit import (
     fit_film,
-    with_least_errors,
     with_tip_errors,
 )
 from snakewalk.controller.capture.staged_film import StagedFilm, with_statuses
@@ -20,7 +19,7 @@ class Complete:
     def run(self, film: StagedFilm) -> StagedFilm:
         """Return the film with complete lines; the head is known."""
         detections = film.detections
-        steady, tips_px = with_steady_tails(film.skeletons, detections.tip_error_px)
+        steady, tips_px = with_steady_tails(film.skeletons, detections.tips)
         expected = film.expected_px.copy()
         for k, tip_px in tips_px.items():
             # blur moves the head only; the points between share the errors of both ends
@@ -28,7 +27,8 @@ class Complete:
         crops = detections.crops.without(set(np.flatnonzero(film.solved).tolist()))
         fitted = fit_film(steady, crops, margins(film.skeletons), expected, fixed=film.fixed)
         fitted = with_tip_errors(fitted, detections.ends_px, film.solved)
-        fitted = with_least_errors(fitted, detections.least_error_px)
         expected = fitted.expected_px
+        for k, least in detections.least_error_px.items():
+            expected[k] = np.maximum(expected[k], least)
         skeletons = with_statuses(fitted.skeletons, expected)
         return replace(film, skeletons=skeletons, expected_px=expected)

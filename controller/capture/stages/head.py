@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from snakewalk.config.arrays import Floats
-from snakewalk.controller.capture.staged_film import StagedFilm
+from snakewalk.controller.capture.staged_film import StagedFilm, arrays_of
 from snakewalk.controller.capture.verification.frame_store import FrameStore
 from snakewalk.controller.capture.verification.profiles import body_profile
 from snakewalk.controller.images.medial_axis import Skeleton
@@ -64,8 +64,14 @@ class Identify:
         """Return the film with the head first in all frames, and its probability."""
         skeletons = film.skeletons
         contrast = contrast_along(skeletons, film.detections.store)
+        shown = arrays_of(skeletons)
         score, by = head_end(
-            film.points_px, film.radius_px, contrast, film.rate_hz, film.head_px, fixed=film.fixed
+            shown["points_px"],
+            shown["radius_px"],
+            contrast,
+            film.rate_hz,
+            film.head_px,
+            fixed=film.fixed,
         )
         if score < 0.0:
             skeletons = tuple(skeleton.reversed() for skeleton in skeletons)

@@ -35,9 +35,7 @@ class Compare:
         """Return the film with aligned ends; outliers have a status instead of points."""
         marked = mark_empty(film.skeletons, np.array(film.detections.contrast))
         detections = film.detections
-        checked = mark_outliers(
-            align_ends(marked), np.array(detections.area_px), detections.tip_error_px
-        )
+        checked = mark_outliers(align_ends(marked), np.array(detections.area_px), detections.tips)
         return replace(film, skeletons=align_ends(checked))
 
 

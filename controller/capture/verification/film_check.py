@@ -107,7 +107,7 @@ class Verify:
         """Return the film; contradicted frames have no points, unclear ones are rough."""
         detections = film.detections
         skeletons, judged_px = verified(film.skeletons, detections.store)
-        judged_px[[*detections.tip_error_px]] = 0.0  # their tips have errors of their own
+        judged_px[[*detections.tips]] = 0.0  # their tips have errors of their own
         expected = np.hypot(film.expected_px, np.where(film.solved, 0.0, judged_px))
         usual = expected[~film.solved & np.isfinite(expected)]
         least = COIL_LEAST * float(np.median(usual)) if usual.size else 0.0
@@ -117,7 +117,9 @@ class Verify:
             skeletons, detections.store
         )
         if goes_on or detections.is_unclear(skeletons):
-            expected = np.fmax(expected, _FAINT_TAIL * film.length_px)
+            expected = np.fmax(
+                expected, [_FAINT_TAIL * skeleton.length_px for skeleton in film.skeletons]
+            )
         return replace(film, skeletons=with_statuses(skeletons, expected), expected_px=expected)
 
 

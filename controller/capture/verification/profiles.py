@@ -8,6 +8,7 @@ from scipy.ndimage import uniform_filter1d
 
 from snakewalk.config.arrays import Floats, Singles
 from snakewalk.controller.capture.verification.frame_store import CutOut
+from snakewalk.controller.images.cross_profile import along_and_side, values_at
 from snakewalk.controller.images.medial_axis import Skeleton
 
 _INNER_HALF_WIDTH = 0.5  # of the half width on both sides of the line: the body
@@ -46,9 +47,7 @@ def body_profile(body: Skeleton, cut_out: CutOut) -> BodyProfile:
     image = image[..., None] if image.ndim == 2 else image
     line = body.points_px - np.asarray(cut_out.origin_px, dtype=float)
     half = np.maximum(body.radius_px, 0.5)
-    along = np.gradient(line, axis=0)
-    along = along / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
-    side = np.column_stack([-along[:, 1], along[:, 0]])
+    along, side = along_and_side(line)
     inner = np.linspace(-_INNER_HALF_WIDTH, _INNER_HALF_WIDTH, 3)
     on = _grey_values(
         image, line[:, None] + (inner * half[:, None])[..., None] * side[:, None]
@@ -154,10 +153,8 @@ def _rings(image: Singles, line: Floats, half: Floats, outward: Floats) -> Float
 
 def _grey_values(image: Singles, places: Floats) -> Floats:
     """(..., C) grey values at places (A, B, 2); NaN outside the image."""
-    x, y = np.moveaxis(places, -1, 0).astype(np.float32)
-    shown = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    levels: Floats = np.asarray(shown, dtype=np.float64).reshape(*places.shape[:-1], image.shape[2])
-    rows, columns = image.shape[:2]
-    outside = (x < 0) | (y < 0) | (x > columns - 1) | (y > rows - 1)
-    levels[outside] = np.nan
+    levels = values_at(image, places, cv2.BORDER_REPLICATE)
+    rounded = places.astype(np.float32)
+    last = np.subtract(image.shape[1::-1], 1)
+    levels[((rounded < 0) | (rounded > last)).any(axis=-1)] = np.nan
     return levels

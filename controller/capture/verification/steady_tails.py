@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.ndimage import median_filter
 
+from snakewalk.config.arrays import Floats
+from snakewalk.controller.images.faint_tail import TailTip
 from snakewalk.controller.images.medial_axis import Skeleton, in_equal_chords
 
 _FRAMES = 9  # whose usual length counts; a beating tail is blurred for less than that
@@ -18,29 +20,35 @@ _END_STATIONS = 5  # the direction in which a line is lengthened
 
 
 def with_steady_tails(
-    bodies: Sequence[Skeleton], tip_error_px: Mapping[int, float]
+    bodies: Sequence[Skeleton], tips: Mapping[int, TailTip]
 ) -> tuple[list[Skeleton], dict[int, float]]:
     """Return the bodies with steadied tails, and the expected error of each tip, px.
 
     Args:
         bodies: (T) head first.
-        tip_error_px: by frame with a followed tail, from its own picture.
+        tips: by frame with a followed tail. The spread of lengths is that of single frames.
 
     """
     out = list(bodies)
-    numbers = [k for k in tip_error_px if out[k].status.has_points]
+    numbers = [k for k in tips if out[k].status.has_points]
     if not numbers:
         return out, {}
     own_px = np.array([out[k].length_px for k in numbers])
-    usual_px = median_filter(own_px, _FRAMES, mode="nearest")
-    change_px = (1.0 - _OWN_SHARE) * (usual_px - own_px)
-    spread_px = 1.4826 * float(np.median(np.abs(change_px)))
-    error_px = float(np.hypot(np.median([tip_error_px[k] for k in numbers]), spread_px))
+    change_px = _towards_usual_px(own_px)
+    single_px = own_px - [tips[k].lengthening_px for k in numbers]
+    spread_px = 1.4826 * float(np.median(np.abs(_towards_usual_px(single_px))))
+    error_px = float(np.hypot(np.median([tips[k].error_px for k in numbers]), spread_px))
     errors: dict[int, float] = {}
     for k, change in zip(numbers, change_px.tolist(), strict=True):
         out[k] = _changed_length(out[k], change)
         errors[k] = float(np.hypot(error_px, change * (abs(change) > _OUTLIER * spread_px)))
     return out, errors
+
+
+def _towards_usual_px(length_px: Floats) -> Floats:
+    """(T,) change of each length (T,) towards those of the frames before and after."""
+    usual_px = median_filter(length_px, _FRAMES, mode="nearest")
+    return np.asarray((1.0 - _OWN_SHARE) * (usual_px - length_px))
 
 
 def _changed_length(body: Skeleton, change_px: float) -> Skeleton:

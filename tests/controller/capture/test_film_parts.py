@@ -2,6 +2,7 @@
 
 import tracemalloc
 import weakref
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from snakewalk.config.arrays import DeepImage
+from snakewalk.config.arrays import DeepImage, Floats
 from snakewalk.config.errors import InputError
 from snakewalk.controller.capture import capturing, film_parts, image_file
 from snakewalk.controller.capture.capture import Capture, CaptureFile, load_capture, save_capture
@@ -19,10 +20,16 @@ from snakewalk.controller.capture.film.film_options import CaptureOptions
 from snakewalk.controller.capture.film_parts import FilmParts
 from snakewalk.controller.capture.image_file import ImageFile, large_array, scaled
 from snakewalk.controller.capture.part_folder import PartFolder
-from snakewalk.controller.images.body_detector import Detection, make_detector
+from snakewalk.controller.capture.several.animal_films import (
+    capture_animals,
+    films_of,
+    find_animals,
+)
+from snakewalk.controller.images.body_detector import BodyDetector, Detection, make_detector
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 from tests.helpers.film_options import changed, film_options
+from tests.oracles.drawn_larva import GROUND, larva
 from tests.oracles.rendered_snake import SnakeScene, empty, film, true_midlines
 from tests.oracles.skeleton_accuracy import point_error
 
@@ -92,6 +99,37 @@ def test_an_interrupted_capture_is_continued(
     options.output.unlink()
     with pytest.raises(InputError, match="there is nothing to continue; leave --resume out"):
         capture_recording(changed(options, resume=True))
+
+
+@pytest.mark.slow
+def test_a_resting_larva_has_the_same_line_after_an_interruption(tmp_path: Path) -> None:
+    """Frames before the part that is continued show its tail more clearly."""
+    frames = [larva(0.0, number, tail_levels=20.0) for number in range(26)]
+    ground = np.full_like(frames[0], round(GROUND))
+    detector = BodyDetector(ground, Polarity.DARK, "given")
+    animals = find_animals(frames, frames, detector, requested_count=1, name="larva")
+
+    def captured(folder: Path, on_progress: Callable[[], None], *, resume: bool) -> Floats:
+        parts = PartFolder(folder, {})
+        films = films_of(animals, 30.0, "larva", parts, resume=resume, part_frames=10)
+        assert films[0].done_frames == 10 * resume
+        (animal,) = capture_animals(
+            lambda first: frames[first:], detector, animals, films, on_progress=on_progress
+        )
+        assert animal.captured is not None
+        return animal.captured.points_px
+
+    steps = iter(range(15))
+
+    def interrupt() -> None:
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+
+    complete = captured(tmp_path / "complete.part", lambda: None, resume=False)
+    folder = tmp_path / "interrupted.part"
+    with pytest.raises(KeyboardInterrupt):
+        captured(folder, interrupt, resume=False)
+    assert np.array_equal(captured(folder, lambda: None, resume=True), complete, equal_nan=True)
 
 
 @pytest.mark.nightly("a further film: 3 s of CPU")

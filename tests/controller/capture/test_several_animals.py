@@ -266,7 +266,7 @@ def test_a_part_of_an_animal_that_joins_it_again_is_no_contact() -> None:
         image = ground.copy()
         for part in parts:
             image[part] = 50
-        builder.add(blobs_of(image, ground, detector))
+        builder.add(blobs_of(image, detector))
     (one,) = builder.done()
     assert len(one.frames) == 13
     assert one.ends_in is None
@@ -381,6 +381,6 @@ def test_an_animal_touches_another_only_in_one_silhouette(
     for part in [*parts, np.s_[10:26, 250:290]]:
         image[part] = 50
     detector = BodyDetector(ground, Polarity.DARK, "given", threshold=60.0)
-    blobs = blobs_of(image, ground, detector)
+    blobs = blobs_of(image, detector)
     others = [k for k in range(len(blobs.area_px)) if parts or blobs.middle_px[k, 0] < 200.0]
     assert merged_status(blobs, others, np.array([25.0, 14.0]), 320.0) is status

@@ -10,12 +10,14 @@ from snakewalk.controller.capture.several.blobs import detector_of_several
 from snakewalk.controller.capture.verification.steady_tails import with_steady_tails
 from snakewalk.controller.images.background import background_candidates, median_background
 from snakewalk.controller.images.body_detector import BodyDetector
+from snakewalk.controller.images.faint_tail import TailTip
 from snakewalk.controller.images.medial_axis import Skeleton, no_skeleton
 from snakewalk.controller.images.silhouette import Polarity
 from snakewalk.controller.track.frame_status import FrameStatus
 
 FRAMES = 40
 TRUE_PX = 100.0
+TIPS = dict.fromkeys(range(FRAMES), TailTip(1.5, 0.0))
 
 
 def _body(length_px: float) -> Skeleton:
@@ -26,7 +28,7 @@ def _body(length_px: float) -> Skeleton:
 def test_noisy_lengths_are_nearer_to_the_truth_and_keep_the_head() -> None:
     own_px = TRUE_PX + np.random.default_rng(1).normal(0.0, 3.0, FRAMES)
     bodies = [_body(float(length)) for length in own_px]
-    steady, errors = with_steady_tails(bodies, dict.fromkeys(range(FRAMES), 1.5))
+    steady, errors = with_steady_tails(bodies, TIPS)
     steady_px = np.array([body.length_px for body in steady])
     before, after = (np.abs(px - TRUE_PX).mean() for px in (own_px, steady_px))
     assert after < 0.75 * before
@@ -40,14 +42,14 @@ def test_a_tail_that_is_seen_half_is_expected_to_be_off() -> None:
     lengths = [TRUE_PX + 0.5 * (-1.0) ** k for k in range(FRAMES)]
     lengths[20] = 0.8 * TRUE_PX
     bodies = [_body(length) for length in lengths]
-    steady, errors = with_steady_tails(bodies, dict.fromkeys(range(FRAMES), 1.5))
+    steady, errors = with_steady_tails(bodies, TIPS)
     assert steady[20].length_px == pytest.approx(90.0, abs=1.0)
     assert errors[20] > 5.0 > 2.5 > errors[19]
 
 
 def test_frames_without_a_followed_tail_do_not_change() -> None:
     bodies = [_body(90.0), no_skeleton(FrameStatus.PART), _body(110.0)]
-    steady, errors = with_steady_tails(bodies, {1: 1.0})
+    steady, errors = with_steady_tails(bodies, {1: TIPS[1]})
     assert steady == bodies
     assert not errors
 
