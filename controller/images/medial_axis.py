@@ -40,9 +40,9 @@ _MOST_TURN = float(np.tan(np.radians(37.0)))  # of that way from the line's own 
 # eye, or another part next to the body (tried on a film of a larva)
 _WIDE_END = 1.35  # of the median depth: an end with a deeper place is a head with eyes on its sides
 _NEAR_END = 0.3  # of the axis: that place lies nearer to the end
-_SHORT_END = 3.6  # depths, from that place to the end of the axis
+_SHORT_END = 4.5  # depths, from that place to the end of the axis
 _AS_DEEP = 0.85  # of the largest depth: the eyes are about as wide as the place between them
-_HOOK_COSINE = float(np.cos(np.radians(25.0)))  # the axis turns there into one half of the wide end
+_HOOK_COSINE = float(np.cos(np.radians(18.0)))  # the axis turns there into one half of the wide end
 _REACH = 3.0  # depths from that place: pixels of the wide end
 _FRONT = 95.0  # percentile of the pixels ahead of the place: the front of a wide end
 

@@ -15,7 +15,7 @@ from snakewalk.controller.images.medial_axis import Skeleton, in_equal_chords
 
 _FRAMES = 9  # whose usual length counts; a beating tail is blurred for less than that
 _OWN_SHARE = 0.5  # of the frame's own length in the steadied one (from one film of a larva)
-_OUTLIER = 4.0  # standard deviations: the frame shows less of its tail, or more than a tail
+_OUTLIER = 3.0  # standard deviations: the frame shows less of its tail, or more than a tail
 _END_STATIONS = 5  # the direction in which a line is lengthened
 
 
