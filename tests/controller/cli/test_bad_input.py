@@ -289,7 +289,10 @@ ROWS = [
     ("world from nosuch.tif -o w.toml", "nosuch.tif: No such file"),
     ("world from noise.bin -o w.toml", "noise.bin: ends in none of .tif .tiff .asc"),
     ("world from text.png -o w.toml", "text.png: is no PNG"),
-    ("world from cells.csv -o w.toml --cell 1", "line 2, column 1: 'x' is not a number"),
+    (
+        "world from cells.csv -o w.toml --cell 1",
+        "line 2: column 1: expected a number or nothing, found 'x'",
+    ),
     ("world from cells.csv -o w.toml --cell nan", "--cell: must be a finite number (got 'nan')"),
     ("world from cells.csv -o w.toml --scale -2", "--scale -2: must be from 1e-06 to 1e+06"),
     ("world from cells.csv -o w.toml --crop 1,2", "--crop 1,2: expected X0,Y0,X1,Y1"),
