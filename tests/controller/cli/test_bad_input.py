@@ -19,7 +19,7 @@ ROWS = [
     ("log report nosuch.mcap", "nosuch.mcap: No such file"),
     ("log report flatt.npz", "flatt.npz: No such file or directory; did you mean flat.npz?"),
     ("animal analyse one.csvv", "one.csvv: no such recording or file; did you mean one.csv"),
-    ("gait fit heigths.csv", "heigths.csv: no such file; did you mean heights.csv?"),
+    ("gait fit heigths.csv", "heigths.csv: no such file; did you mean heights.csv"),
     ("log report empty", "is not an MCAP log"),
     ("log replay .", "a folder; a run's log is log.mcap"),
     (f"animal capture {_NO_UTF8} -o t.npz", r"h\xe9.csv: this name is not UTF-8; rename the file"),
