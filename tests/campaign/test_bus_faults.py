@@ -39,6 +39,7 @@ def test_a_fault_that_no_check_sees_is_silent(tmp_path: Path, mocker: MockerFixt
     mocker.patch(
         "snakewalk.drivers.safety.following_error.FollowingError.update", return_value=None
     )
+    mocker.patch("snakewalk.drivers.chain.motion_sensors.MotionSensors.update", return_value=[])
     result = _named("second master: Goal Position of all joints, every", tmp_path)
     assert (result.outcome, result.silent) == ("goes on", True)
 
