@@ -212,9 +212,9 @@ def _forward(
     centres[links, 2] = sum_z / total_weight
 
 
-def pose_at(position_m: Floats, heading_rad: float) -> BodyPose:
+def pose_at(position_m: Floats, heading_rad: float, time_s: float = 0.0) -> BodyPose:
     """Return the pose of a level head link."""
-    return BodyPose(0.0, np.append(position_m[:2], 0.0), about_up(heading_rad))
+    return BodyPose(time_s, np.append(position_m[:2], 0.0), about_up(heading_rad))
 
 
 def mean_heading_rad(robot: RobotConfig, joint_rad: Floats) -> float:
