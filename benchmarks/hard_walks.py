@@ -34,6 +34,8 @@ from snakewalk.sim.physics.plant import MujocoPlant
 
 KINDS: Final = ("steep", "soft", "stuck", "rolled", "slipping", "at limit")
 SECONDS: Final = 15.0
+LIFTS: Final = 10
+"""Steps by which a turned body is lifted out of rough ground."""
 LAWS: Final = ("ellipse", "scales", "wheels")
 LOADS: Final = (" A for too long", "winding at about", "the chain draws about")
 """Words of trips that protect servos and supply from a load that they truly have."""
@@ -108,14 +110,17 @@ def prepared(seed: int) -> tuple[str, WalkRun]:
 
 @contextmanager
 def on_its_back(angle_rad: float) -> Iterator[None]:
-    """Turn simulated bodies about the head's axis when they are laid down."""
+    """Turn simulated bodies about the head's axis when they are laid down, above rough ground."""
     turn = np.array([np.cos(0.5 * angle_rad), np.sin(0.5 * angle_rad), 0.0, 0.0])
 
     def reset(plant: MujocoPlant, *place: Any) -> None:
         _RESET(plant, *place)
-        data = plant.mechanics.data
+        model, data = plant.mechanics.model, plant.mechanics.data
         mujoco.mju_mulQuat(data.qpos[3:7], data.qpos[3:7].copy(), turn)
-        mujoco.mj_forward(plant.mechanics.model, data)
+        mujoco.mj_forward(model, data)
+        for _ in range(LIFTS):
+            data.qpos[2] -= data.contact.dist.min(initial=0.0)
+            mujoco.mj_forward(model, data)
 
     with patch.object(MujocoPlant, "reset", reset):
         yield
