@@ -327,7 +327,7 @@ KINDS = [
         "reversed",
         set_register("Drive Mode", 1),
         "drive mode",
-        "joint yaw_03 (ID 3) turns the other way",
+        "joint yaw_03 (ID 3) has a reversed direction",
     ),
     Kind(
         "torque by a goal",
