@@ -113,12 +113,13 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
     text = f"moved {travelled:.1f} m, {max(progress, 0.0):.1f} m of it along the path"
     ahead_m = np.linspace(0.0, header.robot.length_m, 5)
     steep_rad = _steepest_rad(record, -1, np.median(pose.path_s_m[rows]) + ahead_m)
-    is_steep = steep_rad > max(_holds_rad(record), CLIMBED_RAD)
-    climb = _of_climb(
-        record, first, f"{text}, which climbs by {np.degrees(steep_rad):.0f} deg there"
-    )
+    climb = None
+    if steep_rad > max(_holds_rad(record), CLIMBED_RAD):
+        climb = _of_climb(
+            record, first, f"{text}, which climbs by {np.degrees(steep_rad):.0f} deg there"
+        )
     place_m = np.ptp(pose.centre_m[rows, :2], axis=0)
-    if is_steep and np.hypot(*place_m) < PROGRESS_SHARE * travelled:  # it turns before the slope
+    if climb and np.hypot(*place_m) < PROGRESS_SHARE * travelled:  # it turns before the slope
         return climb
     for part in (first, rows):
         if astray := _astray(record, part):
@@ -135,7 +136,7 @@ def _of_advance(record: RunRecord, rows: np.ndarray) -> Failure:
         late = f"out of time with {left_m:.1f} m of path left"
         slowed = [event.text for event in record.events if event.kind == "derating"]
         return Failure("joint", f"{late}; {slowed[0]}") if slowed else Failure("time", late)
-    if is_steep:
+    if climb:
         return climb
     slid_m, fall_rad = _slide(record, rows)
     falls = f"where the ground falls by {np.degrees(fall_rad):.0f} deg"

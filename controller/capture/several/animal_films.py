@@ -23,10 +23,7 @@ from snakewalk.controller.capture.several.identities import Identity, identities
 from snakewalk.controller.capture.several.tracklets import TrackletBuilder
 from snakewalk.controller.images.background import background_candidates
 from snakewalk.controller.images.body_detector import BodyDetector, Detection
-from snakewalk.controller.images.resting import (
-    Neighbours,
-    with_neighbours,
-)
+from snakewalk.controller.images.resting import Neighbours, with_neighbours
 from snakewalk.controller.images.silhouette import Polarity, as_deep_as
 from snakewalk.controller.track.frame_status import FrameStatus
 

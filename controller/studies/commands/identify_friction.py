@@ -107,7 +107,6 @@ def _laws(logs: list[FrictionLog]) -> LawFit | None:
 def _read_runs(
     paths: list[Path], judge: list[Path], given: WorldConfig | None, *, lifting: bool
 ) -> dict[Path, FrictionLog]:
-
     logs = {}
     for path in (*paths, *judge):
         record = open_log(path)
@@ -130,7 +129,6 @@ def _read_runs(
 
 
 def _write_mass(out: Path, robot: RobotConfig, mass: Found, paths: list[Path]) -> None:
-
     after = with_mass(robot, float(f"{mass.value:.4g}")).model_copy(update={"name": out.stem})
     comment = (
         f"Mass found by `snakewalk robot identify` from {', '.join(map(str, paths))}:\n"

@@ -63,7 +63,6 @@ def robot_file(robot: str | None, out: Path | None) -> RobotFile | None:
             "to with the constants"
         )
     check_ending(out, "a robot's file (--robot-out)", ".toml")
-
     return RobotFile(load_robot(robot), out)
 
 
